@@ -1,5 +1,6 @@
 """The likelihood of a whole record, against normal densities summed over exact states."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -59,6 +60,15 @@ RIGS = {
     "pivots": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.2, 0.1), (-0.3, 0.0)), 0.0),
     "friction": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.0, 0.0),), 0.3),
     "arc": (Circle(0.4, 0.4, 0.1), Circle(0.41, 0.401, 0.1), Rod(rest_curvature=0.6), CELL, ((0.0, 0.0),), 0.3),
+    "tapered": (Circle(0.4, 0.4, 0.1), Circle(0.41, 0.401, 0.1), Rod(taper=0.5), CELL, ((0.0, 0.0),), 0.0),
+    "curved by a function": (
+        Parabola(0.5, 0.5),
+        Parabola(0.503, 0.4995),
+        Rod(taper=0.3, rest_curvature=lambda s: 0.6 * s - 0.2),
+        CELL,
+        ((0.0, 0.0),),
+        0.3,
+    ),
     "arc in SI": (
         Parabola(2.5, 0.1),
         Parabola(2.52, 0.0999, 0.0004),
@@ -125,6 +135,42 @@ def test_the_rest_curvature_of_a_rig_is_that_of_the_rod_in_addition():
     rig = Rig(rest_curvature=rod.rest_curvature, friction=friction)
     np.testing.assert_array_equal(taken_for_straight.log_likelihood(contours, rig=rig), stated)
     assert taken_for_straight.log_likelihood(contours, rig=Rig(friction=friction)).max() < stated.max() - 100.0
+
+
+@pytest.mark.parametrize("rod", ["arc", "curved by a function"])
+def test_the_taper_of_a_rig_is_that_of_the_rod_in_addition(rod):
+    """A likelihood that takes it as stated has another table; both have errors as large as noise requires."""
+    true, other, stated, cell, _, friction = RIGS[rod]
+    contours, tapered = stack([true, other]), replace(stated, taper=stated.taper + 0.1)
+    record = cell.measure(swept(true, rod=tapered, friction=friction, step=np.radians(5.0)), seed=3)
+    rig = Rig(taper=np.array([0.1, 0.1]), friction=friction)
+    for exact in (True, False):
+        known = RecordLikelihood(record, cell, friction, exact)
+        with_rig = RecordLikelihood(with_rod(record, stated), cell, friction, exact)
+        found, expected = with_rig.log_likelihood(contours, rig=rig), known.log_likelihood(contours)
+        np.testing.assert_allclose(found, expected, atol=1e-8 if exact else 0.05)
+        assert with_rig.log_likelihood(contours).max() < expected.max() - 10.0
+
+
+def test_rods_that_vary_cost_no_accuracy_where_all_of_the_rig_is_inferred():
+    """Draws of taper, rest curvature and friction in the ranges of the table and beyond them, as without a table."""
+    cell, friction = RIGS["curved by a function"][3], RIGS["curved by a function"][5]
+    measured, rng = measured_by("curved by a function"), np.random.default_rng(1)
+    count = 40
+    contours = stack([Parabola(*place) for place in rng.normal([0.5, 0.5, 0.0], 0.01, (count, 3))])
+    rig = Rig(
+        taper=rng.normal(0.0, 0.1, count),
+        rest_curvature=rng.normal(0.0, 0.1, count),
+        friction=np.abs(rng.normal(0.0, 0.4, count)),
+    )
+    assert np.any(np.abs(rig.taper) > 0.15)
+    assert np.any(np.arctan(rig.friction) > 0.5)
+    loads, usable = RecordLikelihood(measured, cell, friction).predict(contours, rig)
+    exact, usable_exactly = RecordLikelihood(measured, cell, friction, exact=True).predict(contours, rig)
+    np.testing.assert_array_equal(usable, usable_exactly)
+    error = SHARE[False] * np.abs(exact).max(axis=(0, 1))
+    close = np.all(np.abs(loads - exact) <= error, axis=-1)
+    assert np.count_nonzero(~close) <= 4  # samples so near snap-off that they are on the other side of it
 
 
 def swept_in(rig):

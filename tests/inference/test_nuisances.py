@@ -288,6 +288,36 @@ def test_friction_is_that_of_each_contour():
     assert np.median(np.abs(loads[0] - true).max(axis=1)[true[:, 0] != 0.0]) > 1e-2
 
 
+def test_the_taper_is_inferred_about_the_stated_one():
+    """In the loads of scans, and with a prior that ends where tapers do; a rod may be an arc as stated."""
+    truth, angles = Parabola(0.5, 0.5), np.linspace(0.1, 3.0, 59)
+    for stated in (Rod(), Rod(rest_curvature=0.3), Rod(taper=0.4)):
+        record = CELL.measure(scan(truth, rod=stated, drive_angles=angles).record, seed=1)
+        model = model_of(record, ["taper", "rest_curvature"])
+        assert model.may_vanish[model.names.index("taper")]
+        prior = model.priors["taper"]
+        low, high = prior.support()
+        np.testing.assert_allclose([low, high], [0.0, 0.95], atol=1e-12)
+        assert (
+            prior.logpdf(stated.taper)
+            > prior.logpdf(stated.taper + 0.05)
+            == pytest.approx(prior.logpdf(stated.taper) - 0.5)
+        )
+        for taper in (stated.taper, stated.taper + 0.07):
+            point = np.array([[0.5, 0.5, 0.0, taper, stated.mean_rest_curvature + 0.1]])
+            assert model.forward_parameters == ("a", "q", "x_c", "taper", "rest_curvature")
+            rod = stated.reshaped(stated.mean_rest_curvature + 0.1, taper)
+            expected = scan(truth, rod=rod, drive_angles=angles).record
+            loads = np.stack([expected[name].values for name in CHANNELS], axis=-1)
+            np.testing.assert_allclose(model.loads(point)[0], loads, atol=1e-6 * np.abs(loads).max())
+
+
+def test_the_taper_of_a_rod_with_a_diameter_is_not_inferred():
+    record = CELL.measure(scan(Parabola(0.5, 0.5), rod=Rod(diameter=0.02), drive_step=0.1).record, seed=1)
+    with refused(ParameterError, "taper cannot be inferred", "diameter"):
+        nuisances_of(record, ["taper"], {}, CELL, 0.0)
+
+
 @pytest.mark.parametrize("rod", [Rod(), SI], ids=["dimensionless", "SI"])
 def test_gains_biases_drifts_and_rigidity_change_what_is_sensed_as_they_say(rod):
     names = ["rigidity_scale", "moment_gain", "force_y_gain", "lever", "bias", "force_y_drift"]

@@ -152,5 +152,6 @@ class Misspecification:
             friction=drawn.friction + self.friction,
             drive_angle_backlash=drawn.drive_angle_backlash,
             rest_curvature=drawn.rest_curvature + self.rest_curvature,
+            taper=drawn.taper,
             base_shifts=shifts,
         )

@@ -18,12 +18,14 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.encoder import EncoderErrors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.paths import Paths, trace
+from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.shapes import shapes_of
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
+    from tactile_bayes.mechanics.forward_table import ForwardTable
     from tactile_bayes.mechanics.sweeps import Segments, Shapes, Solutions, Sweeps
 
 __all__ = ["RecordLikelihood", "Rig", "bases_of", "without_errors"]
@@ -34,6 +36,13 @@ _UNFELT = 2e-3
 
 _LEAST = 1e-10
 """Least tolerance of loads, over the largest load: tables are no more accurate."""
+
+_TABULATED = 5e-6
+"""Least tolerance of loads for which the pose of a rod with a profile comes from a table."""
+
+_TAPER, _BEND, _FRICTION_ANGLE = 0.15, 0.2, (0.0, 0.5)
+"""Ranges of tables: distances from the stated taper and rest curvature [1/L], three and four standard deviations of the
+default priors, and angles up to that of a coefficient of 0.55. Few draws are beyond them, and integrated."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +76,8 @@ class Rig(NamedTuple):
     """Reading of the encoder in forward motion less that in backward motion, in addition to the data sheet [rad]."""
     rest_curvature: Any = 0.0
     """Rest curvature of the rod in addition to the stated one [1/L]."""
+    taper: Any = 0.0
+    """Taper of the rod in addition to the stated one."""
     base_shifts: Any = None
     """Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
     after the last given one are not shifted."""
@@ -139,6 +150,7 @@ class RecordLikelihood:
         self._signs = np.array([-1.0 if segment.backward else 1.0 for segment in self.segments])
         longest = max(segment.samples.size for segment in self.segments)
         self._samples_by_errors: dict[bytes, Segments] = {}
+        self._tables: dict[tuple[bool, ...], ForwardTable] = {}
         self._angles = np.full((len(self.segments), longest), np.nan)
         for row, segment in zip(self._angles, self.segments, strict=True):
             read = angle[segment.samples]
@@ -178,6 +190,7 @@ class RecordLikelihood:
             self._in_sweep_frame(contours, rig),
             friction_angle=np.tile(np.arctan(rig.friction), segments),
             suspension_compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, segments),
+            profile=self._profile(rig),
             tolerance=None if exact else self._tolerance,
             drive_angles=drive_angles,
         )
@@ -187,8 +200,39 @@ class RecordLikelihood:
         base_x, base_y = self._bases(rig).reshape(-1, 2).T
         backward = np.repeat(self._signs < 0.0, count)
         every = contours.take(np.tile(np.arange(count), segments))
-        curvature = np.tile(self.rod.rest_curvature / self.rod.curvature_unit + rig.rest_curvature, segments)
-        return SweepFrame(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward, curvature)
+        of_rod = (np.tile(values, segments) for values in self._shape_of_rod(rig))
+        return SweepFrame(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward, *of_rod)
+
+    def _profile(self, rig: Rig) -> Profile | None:
+        """Return the profile of the rod, without what the rig adds to it; None for arcs."""
+        return self._as_profile if self.rod.profile is not None or np.any(rig.taper) else None
+
+    @cached_property
+    def _as_profile(self) -> Profile:
+        return self.rod.as_profile()
+
+    def _shape_of_rod(self, rig: Rig) -> tuple[Floats, Floats]:
+        """Return rest curvature and taper of each contour, as in `Sweeps`."""
+        known = self.rod.rest_curvature / self.rod.curvature_unit if self._profile(rig) is None else 0.0
+        return known + rig.rest_curvature, self.rod.taper + rig.taper
+
+    def _table(self, rig: Rig) -> ForwardTable:
+        """Return a table for the rod, made at the first rig in which the same differs from what is stated."""
+        from tactile_bayes.mechanics.forward_table import NO_TABLE, Box, forward_table  # numba takes a second to load
+
+        profile = self._profile(rig)
+        if self.exact or profile is None or self._tolerance.min() < _TABULATED:
+            return NO_TABLE
+        varied = bool(np.any(rig.taper)), bool(np.any(rig.rest_curvature)), bool(np.any(rig.friction != self.friction))
+        if varied not in self._tables:
+            taper, angle = self.rod.taper, float(np.arctan(self.friction))
+            box = Box(
+                (max(taper - _TAPER, 0.0), min(taper + _TAPER, STEEPEST_TAPER)) if varied[0] else (taper, taper),
+                (-_BEND, _BEND) if varied[1] else (0.0, 0.0),
+                _FRICTION_ANGLE if varied[2] else (angle, angle),
+            )
+            self._tables[varied] = forward_table(profile, box)
+        return self._tables[varied]
 
     def _bases(self, rig: Rig) -> Floats:
         """Return the pivots, shape (segments, n, 2)."""
@@ -292,6 +336,8 @@ class RecordLikelihood:
             self._sweeps(rig),
             self._samples_with(errors),
             (contours.shape[0], errors.size * len(self.measured)),
+            profile=self._profile(rig),
+            table=self._table(rig),
             tolerance=None if self.exact else self._tolerance,
             asks_clearance=not self.is_always_clear,
         )
@@ -317,7 +363,7 @@ class RecordLikelihood:
         from tactile_bayes.mechanics.sweeps import Sweeps
 
         count, segments = rig.friction.size, len(self.segments)
-        bases = self._bases(rig)
+        bases, (curvature, taper) = self._bases(rig), self._shape_of_rod(rig)
         return Sweeps(
             contour=np.tile(np.arange(count), segments),
             segment=np.repeat(np.arange(segments), count),
@@ -328,8 +374,8 @@ class RecordLikelihood:
             backward=np.repeat(self._signs < 0.0, count),
             friction_angle=np.tile(np.arctan(rig.friction), segments),
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, segments),
-            taper=np.zeros(segments * count),
-            rest_curvature=np.tile(self.rod.rest_curvature / self.rod.curvature_unit + rig.rest_curvature, segments),
+            rest_curvature=np.tile(curvature, segments),
+            taper=np.tile(taper, segments),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
             rigidity=np.tile(rig.rigidity_scale, segments),
         )

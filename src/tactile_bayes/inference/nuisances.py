@@ -18,6 +18,7 @@ from tactile_bayes.inference.likelihood import Rig, bases_of
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import present_channels, rod_of
 
@@ -26,8 +27,8 @@ __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_o
 STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
 """Default nuisance parameters, of which those that a record cannot identify are left out."""
 
-MAY_VANISH = ("friction", "suspension_compliance")
-"""Parameters that are zero or positive, and probably zero."""
+MAY_VANISH = ("friction", "suspension_compliance", "taper")
+"""Parameters that are zero or positive, and may be zero."""
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "drift", "gain")}
@@ -39,8 +40,9 @@ BIAS = 0.1
 """Standard deviation of the prior of a bias, in EI/L and EI/L²."""
 
 _RIGIDITY, _OFFSET, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.02, 0.3, 0.05, 0.01
-_LEVER, _BACKLASH, _CURVATURE = 0.005, np.radians(0.2), 0.05
-"""Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; L; and 1/L."""
+_LEVER, _BACKLASH, _CURVATURE, _TAPER = 0.005, np.radians(0.2), 0.05, 0.05
+"""Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; L; 1/L; and of the
+diameter at the base."""
 
 
 _BASE = re.compile(r"base_(\d+)_([xy])")
@@ -65,6 +67,7 @@ _KINDS = {
     "suspension_compliance": _Kind(0.0, np.inf, power_of_moment=-1),
     "friction": _Kind(0.0, float(np.tan(MAX_FRICTION_ANGLE))),
     "rest_curvature": _Kind(-np.inf, np.inf, power_of_length=-1),
+    "taper": _Kind(0.0, STEEPEST_TAPER),
     **{name: _Kind(-np.inf, np.inf, power_of_moment=1) for name in (*_GROUPS["bias"], *_GROUPS["drift"])},
     **{name: _Kind(0.0, np.inf) for name in _GROUPS["gain"]},
     **{name: _Kind(-np.inf, np.inf, power_of_length=1) for name in _GROUPS["lever"]},
@@ -130,6 +133,8 @@ class Nuisances:
         if "rest_curvature" in self.names:
             off = values["rest_curvature"] - self.rod.mean_rest_curvature
             known["rest_curvature"] = off / self.units["rest_curvature"]
+        if "taper" in self.names:
+            known["taper"] = values["taper"] - self.rod.taper
         return Rig(
             base_shifts=self._base_shifts(values),
             **known,
@@ -255,6 +260,9 @@ def nuisances_of(
     if "rest_curvature" in defaults:
         deviation = rod.rest_curvature_deviation or _CURVATURE * rod.curvature_unit
         defaults["rest_curvature"] = stats.norm(rod.mean_rest_curvature, deviation)
+    if "taper" in defaults:
+        ends = ((end - rod.taper) / _TAPER for end in nuisances.bounds("taper"))
+        defaults["taper"] = stats.truncnorm(*ends, loc=rod.taper, scale=_TAPER)
     return replace(nuisances, priors=defaults)
 
 
@@ -268,6 +276,11 @@ def _unidentifiable(measured: xr.Dataset) -> dict[str, str]:
         reasons["backlash"] = (
             f"every sweep is {only}, and in one direction it cannot be distinguished from drive_angle_offset; "
             "infer that"
+        )
+    if rod_of(measured).diameter:
+        reasons["taper"] = (
+            "the rod has a diameter, and contact beside the centreline of a tapered rod is not modelled; state the rod "
+            "without it"
         )
     return reasons
 

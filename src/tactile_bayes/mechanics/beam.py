@@ -11,11 +11,20 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.forward_table import chord_in, pose_in, sheet
 from tactile_bayes.mechanics.pose import Pose, by_arclength, pose, pose_and_slopes
 from tactile_bayes.mechanics.profile import Profile
-from tactile_bayes.mechanics.profile_pose import part_along, pose_along_and_slopes
+from tactile_bayes.mechanics.profile_pose import at_contact, part_along, pose_along_and_slopes
 from tactile_bayes.mechanics.profile_shape import beyond_along, chord_along, largest_bending_along, rest_along
-from tactile_bayes.mechanics.taylor import FORWARD, cell_at, rest_curvature_at, workspace
+from tactile_bayes.mechanics.taylor import (
+    FORWARD,
+    March,
+    State,
+    cell_at,
+    most_rest_curvature,
+    rest_curvature_at,
+    workspace,
+)
 
 __all__ = [
     "Beam",
@@ -26,10 +35,12 @@ __all__ = [
     "bending",
     "chord_to",
     "free_end",
+    "from_tip",
     "loaded_part",
     "mirrored_beam",
     "mirrored_by",
     "rest_curvature",
+    "varied",
     "varied_of",
     "whole_pose",
 ]
@@ -44,6 +55,12 @@ class Varied(NamedTuple):
 
     profile: Profile
     work: Floats
+    sheet: Floats
+    """Coefficients of its pose, from a table."""
+    slenderness: float
+    """That of the table; 0 if there are no coefficients."""
+    sign: float
+    """Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose."""
 
 
 class Beam(NamedTuple):
@@ -53,6 +70,8 @@ class Beam(NamedTuple):
     """Constant rest curvature [1/L]; 0 for rods with a profile."""
     reach: float
     """Distance from pivot to tip at rest [L]."""
+    most_curvature: float
+    """Upper bound of the rest curvature [1/L]."""
     varied: Varied | None
     """Properties along the rod; None for uniform rods of constant rest curvature."""
 
@@ -72,16 +91,22 @@ class Chord(NamedTuple):
 
 def varied_of(profile: Profile | None) -> Varied | None:
     """Profile with a workspace, if there is one."""
-    return None if profile is None else Varied(profile, workspace())
+    return None if profile is None else varied(profile)
+
+
+def varied(profile: Profile) -> Varied:
+    """Profile with a workspace, and without coefficients of a table."""
+    return Varied(profile, workspace(), sheet(), 0.0, 1.0)
 
 
 @compiled
 def mirrored_by(curvature: float, varied: Varied | None) -> Beam:
     """Rod of a contact, as in `Rods`."""
     if varied is None:
-        return Beam(curvature, 1.0, varied)
+        return Beam(curvature, 1.0, curvature, varied)
     edges, bent, rigidity, taper, bend, _ = varied.profile
-    return Beam(0.0, 1.0, Varied(Profile(edges, bent, rigidity, taper, bend, curvature), varied.work))
+    of_contact = Profile(edges, bent, rigidity, taper, bend, curvature)
+    return Beam(0.0, 1.0, math.inf, Varied(of_contact, varied.work, varied.sheet, varied.slenderness, varied.sign))
 
 
 @compiled
@@ -89,14 +114,15 @@ def beam_of(curvature: float, varied: Varied | None) -> Beam:
     """Uniform rod whose rest shape is an arc of length one, or a rod whose properties vary along it."""
     if varied is None:
         half = 0.5 * curvature
-        return Beam(curvature, 1.0 if half == 0.0 else math.sin(half) / half, varied)
-    return Beam(0.0, rest_along(varied.profile, 1.0, varied.work).distance, varied)
+        return Beam(curvature, 1.0 if half == 0.0 else math.sin(half) / half, curvature, varied)
+    reach = rest_along(varied.profile, 1.0, varied.work).distance
+    return Beam(0.0, reach, most_rest_curvature(varied.profile), varied)
 
 
 @compiled
 def mirrored_beam(beam: Beam) -> Beam:
     """Rod in the frame of the opposite sweep."""
-    return Beam(-beam.curvature, beam.reach, _mirrored(beam.varied))
+    return Beam(-beam.curvature, beam.reach, math.inf, _mirrored(beam.varied))
 
 
 @compiled
@@ -104,7 +130,13 @@ def _mirrored(varied: Varied | None) -> Varied | None:
     if varied is None:
         return varied
     edges, curvature, rigidity, taper, bend, sign = varied.profile
-    return Varied(Profile(edges, curvature, rigidity, taper, bend, -sign), varied.work)
+    return Varied(
+        Profile(edges, curvature, rigidity, taper, bend, -sign),
+        varied.work,
+        varied.sheet,
+        varied.slenderness,
+        varied.sign,
+    )
 
 
 @compiled
@@ -124,6 +156,12 @@ def _pose(
 ) -> tuple[Pose, Pose, Pose]:
     if varied is None:
         return pose_and_slopes(psi1, arclength, force, curvature, tip)
+    if varied.slenderness > 0.0 and varied.sign == varied.profile.sign:
+        inside, here, by_q, by_force = pose_in(
+            varied.sheet, varied.slenderness, varied.profile.taper, psi1, arclength, force, tip
+        )
+        if inside:
+            return here, by_q, by_force
     here, by_psi1, by_arclength, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
     return here, by_psi1 if tip else by_arclength, by_force
 
@@ -147,16 +185,19 @@ def _whole_pose(
 @compiled
 def chord_to(beam: Beam, distance: float) -> Chord:
     """Chord of the rod at rest to its first point at a distance from the pivot."""
-    return _chord(beam.varied, beam.curvature, distance)
+    return _chord(beam.varied, beam.curvature, beam.reach, distance)
 
 
 @compiled
-def _chord(varied: Varied | None, curvature: float, distance: float) -> Chord:
+def _chord(varied: Varied | None, curvature: float, reach: float, distance: float) -> Chord:
     if varied is None:
         sine = min(max(0.5 * curvature * distance, -1.0), 1.0)
         angle, cos = math.asin(sine), math.sqrt((1.0 - sine) * (1.0 + sine))
         arclength = distance if curvature == 0.0 else 2.0 * angle / curvature
         return Chord(arclength, angle, angle, 0.5 * curvature / cos if cos > _ACROSS else 0.0)
+    if varied.slenderness > 0.0:
+        in_table = chord_in(varied.sheet, varied.sign != varied.profile.sign, reach, distance)
+        return Chord(in_table.arclength, in_table.at_base, in_table.at_point, in_table.rate)
     found = chord_along(varied.profile, distance, varied.work)
     at_point = found.slope - found.bearing
     cos = math.cos(at_point)
@@ -226,13 +267,32 @@ def _free_end(varied: Varied | None, curvature: float, arclength: float, share: 
 
 
 @compiled
-def loaded_part(beam: Beam, psi1: float, force: float, share: float) -> Pose:
-    """Point of a rod in tip contact, at a share of the arc length from the tip, as seen from there as in `pose`."""
-    return _loaded_part(beam.varied, beam.curvature, psi1, force, share)
+def from_tip(beam: Beam, psi1: float) -> March:
+    """Start of a walk along a rod in tip contact; see `loaded_part`."""
+    return _from_tip(beam.varied, psi1)
 
 
 @compiled
-def _loaded_part(varied: Varied | None, curvature: float, psi1: float, force: float, share: float) -> Pose:
+def _from_tip(varied: Varied | None, psi1: float) -> March:
     if varied is None:
-        return pose(psi1, share, force, curvature)
-    return part_along(varied.profile, psi1, 1.0, 1.0 - share, force, varied.work)
+        return March(1.0, 0, State(psi1, 0.0, 0.0, 0.0))
+    return at_contact(varied.profile, psi1, 1.0)
+
+
+@compiled
+def loaded_part(beam: Beam, psi1: float, force: float, share: float, before: March) -> March:
+    """Point of a rod in tip contact, at a share of the arc length from the tip, as seen from there as in `pose`.
+
+    The walk goes on from a point nearer the tip.
+    """
+    return _loaded_part(beam.varied, beam.curvature, psi1, force, share, before)
+
+
+@compiled
+def _loaded_part(
+    varied: Varied | None, curvature: float, psi1: float, force: float, share: float, before: March
+) -> March:
+    if varied is None:
+        here = pose(psi1, share, force, curvature)
+        return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v))
+    return part_along(varied.profile, before, 1.0 - share, force, varied.work)

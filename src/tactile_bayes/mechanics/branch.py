@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.beam import free_end, loaded_part, rest_curvature
+from tactile_bayes.mechanics.beam import free_end, from_tip, loaded_part, rest_curvature
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
@@ -117,6 +117,8 @@ _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
 
 _BODY = 8
 """Number of parts of the rod between which a second contact is looked for."""
+
+_ACROSS = 0.5 * math.pi
 
 _BY_Q = Equilibrium(0.0, 1.0, 0.0)
 
@@ -432,7 +434,7 @@ def _second_contact(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> flo
     than the rod, or further on, at its tip. In tip contact it may be the loaded part.
     """
     outline, beam = scene.outline, scene.beam
-    if beam.varied is None and beam.curvature <= 0.0:
+    if beam.most_curvature <= 0.0:
         return math.nan
     low, high = ends(outline)
     for k in range(work.nodes.size):
@@ -445,12 +447,16 @@ def _second_contact(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> flo
         if not scene.exact and 0 < k < work.nodes.size - 1 and work.nodes[k + 1] <= stop:
             continue
         if leg.tip:
-            force = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k])
+            turned = q + scene.rig.friction_angle
+            if 0.5 * beam.most_curvature <= turned <= _ACROSS:  # the rod is bent toward the object no more than at rest
+                continue
+            force, part = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k]), from_tip(beam, q)
             for j in range(1, _BODY):
-                part, delta = loaded_part(beam, q, force, j / _BODY), scene.rig.friction_angle
+                part, delta = loaded_part(beam, q, force, j / _BODY, part), scene.rig.friction_angle
                 cos = spot.cos * math.cos(delta) - spot.sin * math.sin(delta)
                 sin = spot.sin * math.cos(delta) + spot.cos * math.sin(delta)
-                x, y = -part.u * cos + part.v * sin, -part.u * sin - part.v * cos
+                u, v = part.state.u, part.state.v
+                x, y = -u * cos + v * sin, -u * sin - v * cos
                 if y * spot.cos > x * spot.sin and is_inside(outline, spot.x + x, spot.y + y, low, high):
                     return p
         elif q < 1.0:

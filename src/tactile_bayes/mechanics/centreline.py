@@ -116,12 +116,11 @@ def rod_shape(
 
 def _along(wrenches: Floats, profile: Profile, s: Floats) -> tuple[Floats, Floats]:
     """Points of a rod that varies along its length, from wrenches mirrored to forward ones and the side."""
-    from tactile_bayes.mechanics.beam import Varied  # numba takes a second to load
+    from tactile_bayes.mechanics.beam import varied  # numba takes a second to load
     from tactile_bayes.mechanics.states import profile_shapes
-    from tactile_bayes.mechanics.taylor import workspace
 
     x, y = np.empty((2, len(wrenches), s.size))
-    profile_shapes(wrenches, Varied(profile, workspace()), s, x, y)
+    profile_shapes(wrenches, varied(profile), s, x, y)
     return x, y
 
 

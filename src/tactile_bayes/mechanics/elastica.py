@@ -314,15 +314,14 @@ def forward_contacts(wrenches: Floats, rods: Rods) -> Floats:
     ndarray, shape (6, n)
         As `Contact`.
     """
-    from tactile_bayes.mechanics.beam import Varied  # numba takes a second to load
+    from tactile_bayes.mechanics.beam import varied  # numba takes a second to load
     from tactile_bayes.mechanics.states import arc_contacts, contacts, profile_contacts
-    from tactile_bayes.mechanics.taylor import workspace
 
     columns, out = np.column_stack([wrenches, rods.curvature]), np.empty((len(wrenches), 6))
     if rods.profile is None:
         _solve(contacts, arc_contacts, columns, (), (out,))
     else:
-        profile_contacts(columns, Varied(rods.profile, workspace()), out)
+        profile_contacts(columns, varied(rods.profile), out)
     return np.ascontiguousarray(out.T)
 
 

@@ -16,6 +16,7 @@ from tactile_bayes.mechanics.pose import Pose
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.taylor import (
     BACKWARD,
+    March,
     Slope,
     State,
     advance,
@@ -27,24 +28,29 @@ from tactile_bayes.mechanics.taylor import (
     slopes_moved,
 )
 
-__all__ = ["part_along", "pose_along", "pose_along_and_slopes"]
+__all__ = ["at_contact", "part_along", "pose_along", "pose_along_and_slopes"]
 
 
 @compiled
 def pose_along(profile: Profile, psi1: float, arclength: float, force: float, work: Floats) -> Pose:
     """Pose for ψ1, arc length s1 and force f, in rod lengths and EI(0)/L²."""
-    return part_along(profile, psi1, arclength, 0.0, force, work)
+    march = part_along(profile, at_contact(profile, psi1, arclength), 0.0, force, work)
+    return Pose(march.state.u, march.state.v, march.state.psi - psi1)
 
 
 @compiled
-def part_along(profile: Profile, psi1: float, arclength: float, until: float, force: float, work: Floats) -> Pose:
-    """Pose of a point between pivot and contact, at an arc length, in place of that of the pivot."""
-    march = begin(profile, arclength, BACKWARD, State(psi1, 0.0, 0.0, 0.0))
+def at_contact(profile: Profile, psi1: float, arclength: float) -> March:
+    """Start of a march at the contact."""
+    return begin(profile, arclength, BACKWARD, State(psi1, 0.0, 0.0, 0.0))
+
+
+@compiled
+def part_along(profile: Profile, march: March, until: float, force: float, work: Floats) -> March:
+    """March on toward the pivot, to an arc length."""
     while march.at > until:
         _, march = advance(profile, march, BACKWARD, until, force, work)
     # NaN of the arc length is that of series that overflow.
-    state = march.state
-    return Pose(state.u, state.v, state.psi - psi1)
+    return march
 
 
 @compiled

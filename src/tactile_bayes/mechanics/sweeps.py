@@ -15,6 +15,7 @@ from tactile_bayes.mechanics.branch import MOST_CHANGES, BranchWorkspace, branch
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.curves import Accuracy
 from tactile_bayes.mechanics.equilibrium import Equilibrium, Rig, Scene, balance, in_phase
+from tactile_bayes.mechanics.forward_table import NO_TABLE, ForwardTable, prepare
 from tactile_bayes.mechanics.limits import clear_angle
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.profile import Profile
@@ -164,27 +165,29 @@ def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
 
 
 @compiled
-def _scene(shapes: Shapes, varied: Varied | None, sweep: Any, exact: bool, table: Floats) -> Scene:
+def _scene(shapes: Shapes, varied: Varied | None, known: ForwardTable, sweep: Any, exact: bool, table: Floats) -> Scene:
     """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
     sign = -1.0 if sweep.backward else 1.0
     rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
-    return Scene(_outline(shapes, sweep, table), _beam(varied, sweep, sign), rig, exact)
+    return Scene(_outline(shapes, sweep, table), _beam(varied, known, sweep, sign), rig, exact)
 
 
 @compiled
-def _beam(varied: Varied | None, sweep: Any, sign: float) -> Beam:
+def _beam(varied: Varied | None, table: ForwardTable, sweep: Any, sign: float) -> Beam:
     """Rod of a sweep."""
     if varied is None:
         return beam_of(sign * sweep.rest_curvature, varied)
     edges, curvature, rigidity, _, bend, _ = varied.profile
     of_sweep = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
-    return beam_of(0.0, Varied(of_sweep, varied.work))
+    slenderness = table.slenderness if prepare(table, of_sweep, sweep.friction_angle, varied.sheet) else 0.0
+    return beam_of(0.0, Varied(of_sweep, varied.work, varied.sheet, slenderness, sign))
 
 
 @cached
 def _solve_events(
     shapes: Shapes,
     varied: Varied | None,
+    known: ForwardTable,
     sweeps: Any,
     events: Floats,
     table: Floats,
@@ -192,7 +195,7 @@ def _solve_events(
 ) -> None:
     """Write the states of events; see `solve_events`."""
     for i in range(sweeps.size):
-        scene = _scene(shapes, varied, sweeps[i], True, table)
+        scene = _scene(shapes, varied, known, sweeps[i], True, table)
         for k in range(events.shape[1]):
             out[i, k] = math.nan
             out[i, k, 0] = 0.0
@@ -209,7 +212,7 @@ def solve_events(shapes: Shapes, sweeps: Sweeps, events: Floats, profile: Profil
     """
     out = np.empty((*events.shape[:2], STATE_COLUMNS))
     table = np.empty(shapes.tables.shape[1:])
-    _solve_events(shapes, varied_of(profile), _as_sweeps(sweeps), events, table, out)
+    _solve_events(shapes, varied_of(profile), NO_TABLE, _as_sweeps(sweeps), events, table, out)
     return out
 
 
@@ -217,6 +220,7 @@ def solve_events(shapes: Shapes, sweeps: Sweeps, events: Floats, profile: Profil
 def _solve(
     shapes: Shapes,
     varied: Varied | None,
+    known: ForwardTable,
     sweeps: Any,
     segments: Segments,
     exact: bool,
@@ -250,7 +254,7 @@ def _solve(
     count, knots = shapes.knots.shape[1], workspace.knots
     for i in range(sweeps.size):
         sweep, event, c = sweeps[i], events[i], sweeps[i].contour
-        scene = _scene(shapes, varied, sweep, exact, table)
+        scene = _scene(shapes, varied, known, sweep, exact, table)
         for k in range(count):
             knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
@@ -273,6 +277,7 @@ def solve_sweeps(
     shape: tuple[int, int],
     *,
     profile: Profile | None = None,
+    table: ForwardTable = NO_TABLE,
     tolerance: Floats | None = None,
     states: bool = False,
     polished: bool = True,
@@ -290,6 +295,8 @@ def solve_sweeps(
     profile : Profile, optional
         Rod whose rest curvature or rigidity varies along it, the same in all sweeps but for the taper, and for what is
         added to its rest curvature; by default rods are uniform and of constant rest curvature.
+    table : ForwardTable, optional
+        Table of the profile, for loads with errors of some 1e-6 of the largest.
     tolerance : ndarray, shape (3,), optional
         Tolerated errors of moment and forces [EI/L and EI/L²]; by default events are exact, and loads have errors of
         some 1e-8 of the largest.
@@ -314,6 +321,7 @@ def solve_sweeps(
     _solve(
         shapes,
         varied_of(profile),
+        table,
         sweep,
         segments,
         tolerance is None,

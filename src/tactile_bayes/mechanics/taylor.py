@@ -38,6 +38,7 @@ __all__ = [
     "begin",
     "bending_at",
     "cell_at",
+    "most_rest_curvature",
     "moved",
     "rest_curvature_at",
     "series",
@@ -126,6 +127,19 @@ def rest_curvature_at(profile: Profile, cell: int, arclength: float) -> float:
     for k in range(profile.curvature.shape[1] - 1, -1, -1):
         value = value * offset + profile.curvature[cell, k]
     return profile.sign * (value + profile.bend)
+
+
+@compiled
+def most_rest_curvature(profile: Profile) -> float:
+    """Upper bound of the rest curvature."""
+    most = -math.inf
+    for cell in range(profile.edges.size - 1):
+        bound, power = profile.sign * (profile.curvature[cell, 0] + profile.bend), 1.0
+        for k in range(1, profile.curvature.shape[1]):
+            power *= profile.edges[cell + 1] - profile.edges[cell]
+            bound += max(profile.sign * profile.curvature[cell, k], 0.0) * power
+        most = max(most, bound)
+    return most
 
 
 @compiled

@@ -1,0 +1,362 @@
+"""The pose of rods whose properties vary along them, as polynomials, for likelihoods.
+
+All rods of a likelihood have one profile. Its table holds their pose as polynomials in
+
+    tip contact:         ψ1 and f Λ(1)²,
+    tangential contact:  s1 and f Λ(s1)², up to the tip, and beyond it: the last series of a phase may go on there,
+
+with the length Λ(s) = ∫ EI^(−1/2) ds of a uniform rod that bends as much; and in those of taper, addition to the rest
+curvature and friction angle that vary between the rods. These are the same throughout a sweep, and contracted once.
+
+Polynomials interpolate at Chebyshev nodes and at f = 0: there the deficit of the chord, from which the force follows,
+is of second order, and an error in it would be one of its square root in the force. They are not extrapolated.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.pose import Pose
+from tactile_bayes.mechanics.profile import Profile
+from tactile_bayes.mechanics.profile_pose import pose_along
+from tactile_bayes.mechanics.profile_shape import chord_along, rest_along
+from tactile_bayes.mechanics.taylor import workspace
+from tactile_bayes.numerics import chebyshev
+
+__all__ = ["NO_TABLE", "Box", "ForwardTable", "RestChord", "chord_in", "forward_table", "pose_in", "prepare", "sheet"]
+
+_ROWS, _TERMS = 16, 24
+"""Terms in ψ1 or s1, and in the force and the distance of the rod at rest."""
+
+_COLUMNS = 3 * _TERMS
+
+_TANGENTIAL, _BEYOND_TIP, _AT_REST, _POSE = _ROWS, 2 * _ROWS, 3 * _ROWS, 3 * _ROWS + 2
+"""First rows of a rod's coefficients; those in tip contact come first, and the mirror image has its own at rest."""
+
+_WORST = 1e-5
+"""Largest error of the pose with which a table is of use."""
+
+_OUTER = 6, 5, 8
+"""Nodes in a taper, bend and friction angle that vary."""
+
+_MOST = max(_OUTER)
+
+_NEGLIGIBLE, _AT_ONSET, _BLUNT = 2e-7, 100.0, 100.0
+"""Size of terms in these that are left out; how much smaller it is without a force, and how much larger beyond the
+tip."""
+
+_PSI1, _FORCE, _BEYOND = (-1.0, 1.4), 36.0, 0.6
+"""Range of ψ1, largest f Λ², and largest Λ beyond the tip, over Λ(1)."""
+
+_THRUST = 20.0
+"""f Λ² before which sweeps end with a thrust through the pivot; their last series may go on."""
+
+_SCALE = 10.0
+"""f Λ² from which on polynomials are in its logarithm."""
+
+_SPAN = math.log1p(_FORCE / _SCALE)
+
+_ROUNDING = 1e-12
+"""Distance from the end of a range that counts as zero."""
+
+_CHECKS = 400
+"""Points at which the error is measured."""
+
+
+class Box(NamedTuple):
+    """Ranges of what differs between the rods of a table; a range without width is a value."""
+
+    taper: tuple[float, float]
+    bend: tuple[float, float]
+    friction_angle: tuple[float, float]
+
+
+class Terms(NamedTuple):
+    """Coefficients in taper, bend and friction angle that are not negligible."""
+
+    orders: Index
+    """Orders of the Chebyshev polynomials, shape (terms, 3)."""
+    coefficients: Floats
+    """Coefficients of a rod and of its mirror image, shape (2, terms, rows, columns)."""
+
+
+class ForwardTable(NamedTuple):
+    """Coefficients of all rods of a box."""
+
+    tip: Terms
+    """Tip contact."""
+    tangential: Terms
+    """Tangential contact up to the tip."""
+    beyond: Terms
+    """Tangential contact beyond it."""
+    chord: Terms
+    """Arc length, bearing and slope of the rod at rest at a distance, in one row."""
+    box: Floats
+    """Least and largest taper, bend and friction angle, shape (3, 2)."""
+    slenderness: float
+    """Λ(1) without the taper."""
+
+
+class RestChord(NamedTuple):
+    """Chord of a rod at rest; see `beam.Chord`."""
+
+    arclength: float
+    at_base: float
+    at_point: float
+    rate: float
+
+
+_NONE = Terms(np.zeros((0, 3), dtype=np.intp), np.zeros((2, 0, 0, 0)))
+
+NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 1.0)
+"""Table without any rod."""
+
+
+def sheet() -> Floats:
+    """Return an array for the coefficients of one rod and those of one pose."""
+    return np.zeros((_POSE + 3, _COLUMNS))
+
+
+def forward_table(profile: Profile, box: Box) -> ForwardTable:
+    """Return the table of a profile, or `NO_TABLE` if it would need too many terms."""
+    table = _tabulated(profile, box)
+    return table if _errors(profile, table).max() <= _WORST else NO_TABLE
+
+
+def _tabulated(profile: Profile, box: Box) -> ForwardTable:
+    work = workspace()
+    shares = [chebyshev.nodes(count if high > low else 1) for count, (low, high) in zip(_OUTER, box, strict=True)]
+    tapers, bends, deltas = (low + (high - low) * z for z, (low, high) in zip(shares, box, strict=True))
+    outer = tapers.size, bends.size, deltas.size
+    slenderness = _slenderness(profile)
+    ways, loading = chebyshev.nodes(_ROWS), np.concatenate([[0.0], chebyshev.nodes(_TERMS - 1)])
+    forces = _SCALE * np.expm1(_SPAN * loading)
+    tip, tangential = np.empty((2, *outer[:2], _ROWS, _TERMS, 3)), np.empty((2, *outer, 2, _ROWS, _TERMS, 3))
+    chord, distances = np.empty((2, outer[1], 3, _TERMS)), chebyshev.nodes(_TERMS)
+    psi1, at_tip = _PSI1[0] + (_PSI1[1] - _PSI1[0]) * ways, np.ones(_ROWS)
+    for (i, sign), (b, bend) in product(enumerate((1.0, -1.0)), enumerate(bends)):
+        for a, taper in enumerate(tapers):
+            rod = profile._replace(taper=taper, bend=bend, sign=sign)
+            _write_poses(rod, psi1, at_tip, forces, slenderness, work, tip[i, a, b])
+            for (d, delta), k in product(enumerate(deltas), range(2)):
+                lengths, out = (1.0 + _BEYOND * (1.0 - taper) * ways if k else ways), tangential[i, a, b, d, k]
+                _write_poses(rod, -delta * at_tip, lengths, forces, slenderness, work, out)
+                out[..., :2] /= lengths[:, None, None]
+        _write_chords(profile._replace(bend=bend, sign=sign), distances, work, chord[i, b])
+    inner, felt = ((-3, ways), (-2, loading)), np.where(forces > 0.0, forces < _THRUST, _AT_ONSET)[:, None]
+    return ForwardTable(
+        _terms(tip[:, :, :, None], felt, *inner),
+        _terms(tangential[..., 0, :, :, :], felt, *inner),
+        _terms(tangential[..., 1, :, :, :], felt / _BLUNT, *inner),
+        _terms(chord[:, None, :, None, None], _AT_ONSET, (-1, distances)),
+        np.array(box),
+        slenderness,
+    )
+
+
+def _terms(values: Floats, relevance: Floats | float, *inner: tuple[int, Floats]) -> Terms:
+    """Terms from values at nodes, those in taper, bend and friction angle along the axes after the first."""
+    for axis in (1, 2, 3):
+        values = np.moveaxis(chebyshev.coefficients(np.moveaxis(values, axis, -1)), 0, axis)
+    size = (relevance * np.abs(values)).max(axis=(0, 4, 5, 6))
+    orders = np.argwhere(size > _NEGLIGIBLE)
+    for axis, points in inner:
+        fit = np.linalg.inv(np.vander(2.0 * points - 1.0, increasing=True))
+        values = np.moveaxis(np.tensordot(fit, values, (1, axis)), 0, axis)
+    coefficients = values.reshape(*values.shape[:4], -1, _COLUMNS)
+    return Terms(orders, np.ascontiguousarray(coefficients[:, *orders.T]))
+
+
+def _slenderness(profile: Profile) -> float:
+    """Λ(1) without the taper, to a few digits: it scales the force, no more."""
+    s = np.linspace(0.0, 1.0, 201)
+    cell = np.searchsorted(profile.edges[1:-1], s, side="right")
+    rigidity = np.array(
+        [np.polyval(profile.rigidity[c, ::-1], at - profile.edges[c]) for c, at in zip(cell, s, strict=True)]
+    )
+    return float(np.mean(rigidity**-0.5))
+
+
+@compiled
+def _length(slenderness: float, taper: float, arclength: float) -> tuple[float, float]:
+    """Λ, and its derivative by the arc length."""
+    if arclength > 1.0:
+        rate = slenderness / ((1.0 - taper) * (1.0 - taper))
+        return slenderness / (1.0 - taper) + (arclength - 1.0) * rate, rate
+    width = 1.0 - taper * arclength
+    return slenderness * arclength / width, slenderness / (width * width)
+
+
+@cached
+def _write_poses(
+    profile: Profile,
+    psi1: Floats,
+    arclengths: Floats,
+    forces: Floats,
+    slenderness: float,
+    work: Floats,
+    out: Floats,
+) -> None:
+    for i in range(psi1.size):
+        length = _length(slenderness, profile.taper, arclengths[i])[0]
+        for k in range(forces.size):
+            here = pose_along(profile, psi1[i], arclengths[i], forces[k] / (length * length), work)
+            out[i, k, 0], out[i, k, 1], out[i, k, 2] = here.u, here.v, here.turn
+
+
+@cached
+def _write_chords(profile: Profile, distances: Floats, work: Floats, out: Floats) -> None:
+    reach = rest_along(profile, 1.0, work).distance
+    for k in range(distances.size):
+        found = chord_along(profile, distances[k] * reach, work)
+        out[0, k], out[1, k], out[2, k] = found.arclength, found.bearing, found.slope
+
+
+@compiled
+def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet: Floats) -> bool:
+    """Write the coefficients of one rod, and return False if the table does not hold it."""
+    box, values = table.box, (profile.taper, profile.bend, friction_angle)
+    for c in range(3):
+        if not box[c, 0] - _ROUNDING <= values[c] <= box[c, 1] + _ROUNDING:
+            return False
+    for c in range(3):
+        x = (2.0 * values[c] - box[c, 0] - box[c, 1]) / (box[c, 1] - box[c, 0]) if box[c, 1] > box[c, 0] else 0.0
+        sheet[_POSE + c, 0], sheet[_POSE + c, 1] = 1.0, x
+        for k in range(2, _MOST):
+            sheet[_POSE + c, k] = 2.0 * x * sheet[_POSE + c, k - 1] - sheet[_POSE + c, k - 2]
+    mirrored = 0 if profile.sign > 0.0 else 1
+    _contract(table.tip, mirrored, sheet, 0)
+    _contract(table.tangential, mirrored, sheet, _TANGENTIAL)
+    _contract(table.beyond, mirrored, sheet, _BEYOND_TIP)
+    _contract(table.chord, mirrored, sheet, _AT_REST)
+    _contract(table.chord, 1 - mirrored, sheet, _AT_REST + 1)
+    return True
+
+
+@compiled
+def _contract(terms: Terms, mirrored: int, sheet: Floats, row: int) -> None:
+    """Write the sum over taper, bend and friction angle, from their polynomials."""
+    orders, coefficients = terms.orders, terms.coefficients
+    rows = coefficients.shape[2]
+    sheet[row : row + rows] = 0.0
+    for k in range(orders.shape[0]):
+        weight = sheet[_POSE, orders[k, 0]] * sheet[_POSE + 1, orders[k, 1]] * sheet[_POSE + 2, orders[k, 2]]
+        for i in range(rows):
+            for j in range(_COLUMNS):
+                sheet[row + i, j] += weight * coefficients[mirrored, k, i, j]
+
+
+@compiled
+def pose_in(
+    sheet: Floats, slenderness: float, taper: float, psi1: float, arclength: float, force: float, tip: bool
+) -> tuple[bool, Pose, Pose, Pose]:
+    """Whether there is a pose; the pose, and its derivatives by ψ1 or the arc length, and by the force."""
+    length, rate = _length(slenderness, taper, arclength)
+    scaled = force * length * length
+    z, by_scaled = 2.0 / _SPAN * math.log1p(scaled / _SCALE) - 1.0, 2.0 / (_SPAN * (_SCALE + scaled))
+    by_force = by_scaled * length * length
+    if tip:
+        by_x = 2.0 / (_PSI1[1] - _PSI1[0])
+        x = (psi1 - _PSI1[0]) * by_x - 1.0
+        inside = -1.0 <= x <= 1.0 and z <= 1.0
+        here, in_x, in_z = _sums(sheet, 0, x, z)
+        return inside, here, _times(by_x, in_x), _times(by_force, in_z)
+    row, begin, by_x = _TANGENTIAL, 0.0, 2.0
+    if arclength > 1.0:
+        row, begin, by_x = _BEYOND_TIP, 1.0, 2.0 / (_BEYOND * (1.0 - taper))
+    x = (arclength - begin) * by_x - 1.0
+    inside = -1.0 <= x <= 1.0 and z <= 1.0
+    here, in_x, in_z = _sums(sheet, row, x, z)
+    by_s = 2.0 * by_scaled * force * length * rate
+    in_s = Pose(by_x * in_x.u + by_s * in_z.u, by_x * in_x.v + by_s * in_z.v, by_x * in_x.turn + by_s * in_z.turn)
+    return (
+        inside,
+        _stretched(arclength, here),
+        Pose(here.u + arclength * in_s.u, here.v + arclength * in_s.v, in_s.turn),
+        _times(by_force, _stretched(arclength, in_z)),
+    )
+
+
+@compiled
+def _times(factor: float, pose: Pose) -> Pose:
+    return Pose(factor * pose.u, factor * pose.v, factor * pose.turn)
+
+
+@compiled
+def _stretched(factor: float, pose: Pose) -> Pose:
+    return Pose(factor * pose.u, factor * pose.v, pose.turn)
+
+
+@compiled
+def _sums(sheet: Floats, row: int, x: float, z: float) -> tuple[Pose, Pose, Pose]:
+    """Three polynomials in two variables, and their derivatives."""
+    for j in range(_COLUMNS):
+        at, by = sheet[row + _ROWS - 1, j], 0.0
+        for i in range(_ROWS - 2, -1, -1):
+            by = by * x + at
+            at = at * x + sheet[row + i, j]
+        sheet[_POSE, j], sheet[_POSE + 1, j] = at, by
+    u, v, turn, u_x, v_x, turn_x, u_z, v_z, turn_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(_COLUMNS - 3, -1, -3):
+        u_z, v_z, turn_z = u_z * z + u, v_z * z + v, turn_z * z + turn
+        u, v, turn = u * z + sheet[_POSE, j], v * z + sheet[_POSE, j + 1], turn * z + sheet[_POSE, j + 2]
+        u_x, v_x = u_x * z + sheet[_POSE + 1, j], v_x * z + sheet[_POSE + 1, j + 1]
+        turn_x = turn_x * z + sheet[_POSE + 1, j + 2]
+    return Pose(u, v, turn), Pose(u_x, v_x, turn_x), Pose(u_z, v_z, turn_z)
+
+
+@compiled
+def chord_in(sheet: Floats, mirrored: bool, reach: float, distance: float) -> RestChord:
+    """Chord of a rod or its mirror image at rest, continued beyond its tip as a straight line."""
+    row = _AT_REST + 1 if mirrored else _AT_REST
+    x = 2.0 * min(distance / reach, 1.0) - 1.0
+    arclength, bearing, slope, to_bearing, to_slope = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(_TERMS - 1, -1, -1):
+        to_bearing, to_slope = to_bearing * x + bearing, to_slope * x + slope
+        arclength = arclength * x + sheet[row, k]
+        bearing = bearing * x + sheet[row, _TERMS + k]
+        slope = slope * x + sheet[row, 2 * _TERMS + k]
+    at_point = slope - bearing
+    if distance <= reach:
+        return RestChord(arclength, bearing, at_point, 2.0 / reach * (to_slope - to_bearing))
+    arm = reach * math.sin(at_point)
+    angle = math.asin(arm / distance)
+    cos = math.cos(angle)
+    beyond = distance * cos - reach * math.cos(at_point)
+    return RestChord(arclength + beyond, slope - angle, angle, -arm / (distance * distance * cos))
+
+
+@cached
+def _write_errors(
+    profile: Profile, table: ForwardTable, samples: Floats, work: Floats, sheet: Floats, out: Floats
+) -> None:
+    """Write the errors of the pose at points of all dimensions, given as shares, for contacts before the thrust."""
+    box, at = table.box, samples
+    for k in range(samples.shape[0]):
+        taper = box[0, 0] + at[k, 0] * (box[0, 1] - box[0, 0])
+        bend = box[1, 0] + at[k, 1] * (box[1, 1] - box[1, 0])
+        delta = box[2, 0] + at[k, 2] * (box[2, 1] - box[2, 0])
+        sign, tip = (1.0 if at[k, 3] < 0.5 else -1.0), at[k, 4] < 0.5
+        rod = Profile(profile.edges, profile.curvature, profile.rigidity, taper, bend, sign)
+        psi1, arclength = (at[k, 5] * (_PSI1[1] + delta) - delta, 1.0) if tip else (-delta, at[k, 5])
+        length = _length(table.slenderness, taper, arclength)[0]
+        force = _SCALE * math.expm1(_SPAN * at[k, 6]) / (length * length)
+        exact = pose_along(rod, psi1, arclength, force, work)
+        prepare(table, rod, delta, sheet)
+        _, found, _, _ = pose_in(sheet, table.slenderness, taper, psi1, arclength, force, tip)
+        out[k] = max(abs(found.u - exact.u), abs(found.v - exact.v)) / arclength
+        out[k] = max(out[k], abs(found.turn - exact.turn))
+        if exact.u < 0.0:
+            out[k] = 0.0
+
+
+def _errors(profile: Profile, table: ForwardTable) -> Floats:
+    out = np.empty(_CHECKS)
+    _write_errors(profile, table, np.random.default_rng(0).uniform(size=(_CHECKS, 7)), workspace(), sheet(), out)
+    return out
