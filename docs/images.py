@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.integrate import cumulative_simpson
 
 import tactile_bayes as tb
 
@@ -52,7 +53,47 @@ def contacts() -> Figure:
     return figure
 
 
+def whisker() -> Figure:
+    """A traced whisker, and contact points that it and a straight one imply."""
+    s = np.linspace(0.0, 0.1, 41)
+    slope = 2.0 * s + 20.0 * s**2
+    x, y = (cumulative_simpson(way, x=s, initial=0.0) for way in (np.cos(slope), np.sin(slope)))
+    scatter = np.random.default_rng(1).normal(scale=1e-4, size=(2, s.size))
+    rigidity = 3e9 * np.pi * 1e-3**4 / 64
+    traced = tb.Rod.from_shape(x + scatter[0], y + scatter[1], rigidity, taper=0.5)
+    true = tb.Rod(0.1, rigidity, rest_curvature=lambda s: 2.0 + 40.0 * s, taper=0.5)
+    parabola = tb.contours.Parabola(a=5.0, q=0.07)
+    cell = tb.LoadCell(force_noise=3e-4, moment_noise=1.5e-5)
+    measured = cell.measure(tb.scan(parabola, rod=true, drive_step=np.radians(3)).record, seed=2)
+
+    figure = Figure(figsize=(8.0, 6.5), layout="constrained")
+    above, below = figure.subplots(2, 1)
+    along = np.linspace(0.0, traced.length, 501)
+    turn = cumulative_simpson(traced.rest_curvature(along), x=along, initial=0.0)
+    shape = [cumulative_simpson(way, x=along, initial=0.0) for way in (np.cos(turn), np.sin(turn))]
+    drawn, points = shape[0] + 1j * shape[1], x + scatter[0] + 1j * (y + scatter[1])
+    points = points - points[0]
+    drawn = drawn * np.exp(1j * np.angle(points[-1] / drawn[-1]))
+    above.plot(1e3 * points.real, 1e3 * points.imag, "o", markersize=4.0, color="#0072B2", label="traced")
+    above.plot(1e3 * drawn.real, 1e3 * drawn.imag, color="#D55E00", label="rod")
+    above.set(xlabel="$x$ / mm", ylabel="$y$ / mm", ylim=(-3.0, 25.0), aspect="equal")
+    above.legend(frameon=False, loc="upper left")
+
+    width = np.linspace(-0.06, 0.06, 201)
+    below.plot(1e3 * width, 1e3 * parabola.height(width), color="black", label="object")
+    straight = tb.Rod(traced.length, rigidity, taper=0.5)
+    drawn_for = (("traced rod", traced, "o", "#0072B2"), ("straight rod", straight, "^", "#D55E00"))
+    for name, rod, marker, colour in drawn_for:
+        found = tb.reconstruct(measured, method="constrained", rod=rod, load_cell=cell)
+        below.plot(
+            1e3 * found.contact_x, 1e3 * found.contact_y, marker, markersize=4.0, color=colour, label=name, mfc="none"
+        )
+    below.set(xlabel="$x$ / mm", ylabel="$y$ / mm", ylim=(54.0, 98.0), aspect="equal")
+    below.legend(frameon=False, loc="lower left", ncols=3)
+    return figure
+
+
 if __name__ == "__main__":
     with mpl.rc_context({"font.size": 12.0}):
-        for draw in (bases, contacts):
+        for draw in (bases, contacts, whisker):
             draw().savefig(IMAGES / f"{draw.__name__}.png", dpi=140, bbox_inches="tight")

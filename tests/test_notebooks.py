@@ -5,11 +5,13 @@ from pathlib import Path
 
 import pytest
 
-NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
+NOTEBOOKS = sorted(
+    (Path(__file__).parents[1] / "notebooks").glob("*.ipynb"), key=lambda path: int(path.name.split("_")[0])
+)
 
 
-def test_there_are_nine_in_order():
-    assert [int(path.name.split("_")[0]) for path in NOTEBOOKS] == list(range(1, 10))
+def test_there_are_ten_in_order():
+    assert [int(path.name.split("_")[0]) for path in NOTEBOOKS] == list(range(1, 11))
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -87,7 +87,7 @@ def infer_contour(
     seed : int or numpy.random.SeedSequence
         Seed of all random numbers; the same seed gives the same draws.
     rod : Rod, optional
-        Rod in place of the one that an SI record states.
+        Rod in place of the one that the record states, in its units: straight, curved or tapered.
     friction : float, optional
         Coulomb's coefficient μ if it is known. By default it is among the nuisances; if other nuisances are given, the
         default is 0.
@@ -99,7 +99,7 @@ def infer_contour(
         motion [rad]), "drift" (of all channels, or "moment_drift" and so on: linear change of a zero from the first
         sample to the last; the bias is the zero in the middle), "gain" (likewise), "friction" (Coulomb's coefficient),
         "suspension_compliance" (turn of the pivot per holding moment), "rest_curvature" (mean curvature of the unloaded
-        rod), "taper" (part by which its diameter has fallen at the tip). By default the first five and friction, except
+        rod; how it varies along the rod stays as stated), "taper". By default the first five and friction, except
         those that are not identifiable (the lever without the moment, the backlash in a single direction) and a given
         friction; an empty list takes all as stated. "base": shifts of the second and further pivots of a record, as
         "base_2_x", "base_2_y", "base_3_x" and so on. The position of the first pivot is not identifiable, since a
@@ -158,9 +158,10 @@ def infer_contour(
     nuisances: rigidity_scale log-normal around 1 with 5 %, drive_angle_offset normal with 1°, biases and drifts normal
     with 0.1 EI/L and EI/L² (a bias of which the load cell states a bias_uncertainty is integrated out instead), lever_x
     and lever_y normal with 0.5 % of L, backlash normal with 0.2°, gains normal around 1 with 2 %, friction half-normal
-    with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, rest_curvature and taper normal around
-    what is stated with 0.05/L and 0.05, the taper from 0 to 0.95, pivots normal with 1 % of L. In addition,
-    contours out of reach are excluded, and those that the rod would still cut after snap-off.
+    with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, rest_curvature normal around the stated
+    mean with the rod's rest_curvature_deviation, or 0.05/L if it has none, taper normal around the stated one with
+    0.05, pivots normal with 1 % of L. In addition, contours out of reach are excluded, those that the rod would still
+    cut after snap-off, and those that a rod curved toward the object would touch twice.
 
     Examples
     --------

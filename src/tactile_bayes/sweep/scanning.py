@@ -157,7 +157,8 @@ def scan(
 ) -> Scan:
     """Sweep the rod along a contour, and record the loads at its base from before first contact to after snap-off.
 
-    This is Step 1 of Merker et al. 2018, doi 10.1155/2018/1613945, in closed form.
+    This is Step 1 of Merker et al. 2018, doi 10.1155/2018/1613945, in closed form for uniform rods that are straight or
+    arcs, and by Taylor series for others.
 
     Parameters
     ----------
@@ -175,7 +176,7 @@ def scan(
         Drive angles in place of this grid [rad], used in increasing order forward and in decreasing order backward,
         without duplicates.
     rod : Rod, optional
-        By default the dimensionless rod. A rod with a diameter touches with its surface.
+        By default the dimensionless rod, which is straight. A rod with a diameter touches with its surface.
     friction : float
         Coulomb's coefficient μ of the sliding rod, at most 0.84.
 
@@ -198,7 +199,8 @@ def scan(
     ReachError
         If the rod is too short to touch the contour.
     ContourError
-        If the pivot is not below the contour or too close to it, or the rod would touch beyond an end of it.
+        If the pivot is not below the contour or too close to it, the rod would touch beyond an end of it, or a rod that
+        is curved toward the contour would touch it twice.
     ParameterError
         If an argument is invalid.
 
