@@ -87,6 +87,12 @@ CASES: Mapping[str, Mapping[str, Run]] = {
         {"rest_curvature": 0.05}, {}, rest_curvature_inferred={"nuisances": (*STANDARD, "rest_curvature")}
     ),
     "curved by 0.4/L": _untold({"rest_curvature": 0.4}, {}, rest_curvature_inferred=OF_UNKNOWN_SHAPE),
+    "tapered by 10 %": _untold({"taper": 0.1}, {}, taper_inferred={"nuisances": (*STANDARD, "taper")}),
+    "tapered by 50 %": _untold(
+        {"taper": 0.5},
+        {},
+        taper_inferred={"nuisances": (*STANDARD, "taper"), "priors": {"taper": stats.uniform(0, 0.9)}},
+    ),
     "drift of two noises": _untold({"drift": (0.04, 0.1, 0.1)}, {}, drift_inferred={"nuisances": (*STANDARD, "drift")}),
     "outliers (t, 2.5)": _untold(OUTLIERS, {}, told_of_them=OUTLIERS),
     **{

@@ -25,6 +25,7 @@ NUMBERS = {
     "rigidity_scale": 1,
     "drive_angle_offset": 1,
     "rest_curvature": 1,
+    "taper": 1,
     "bias": 3,
     "drift": 3,
     "base_shift": 2,
@@ -60,6 +61,8 @@ class Misspecification:
         Encoder offset in addition to the inferred one [rad].
     rest_curvature : float
         Rest curvature of the rod in addition to the stated or inferred one [1/rod length].
+    taper : float
+        Taper of the rod in addition to the stated or inferred one.
     bias, drift : (float, float, float)
         Errors of the readings of moment, force_x and force_y, in the record's units, in addition to the inferred ones:
         a drift is the linear change of a zero from the first sample to the last, a bias its value in the middle.
@@ -90,6 +93,7 @@ class Misspecification:
     rigidity_scale: float = 1.0
     drive_angle_offset: float = 0.0
     rest_curvature: float = 0.0
+    taper: float = 0.0
     bias: Triple = _NOTHING
     drift: Triple = _NOTHING
     load_cell: LoadCell | None = None
@@ -152,6 +156,6 @@ class Misspecification:
             friction=drawn.friction + self.friction,
             drive_angle_backlash=drawn.drive_angle_backlash,
             rest_curvature=drawn.rest_curvature + self.rest_curvature,
-            taper=drawn.taper,
+            taper=drawn.taper + self.taper,
             base_shifts=shifts,
         )
