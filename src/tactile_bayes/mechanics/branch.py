@@ -349,7 +349,8 @@ def follow_branch(
                     until = at_change
                 if folds:
                     until = settle_on(loaded, leg, stop, guess(work, stop), SETTLED)
-                twice = _second_contact(scene, leg, stop, work)
+                goes_on = math.isfinite(behind_begin.at.p)
+                twice = _second_contact(scene, leg, goes_on, stop, work)
                 if not math.isnan(twice):
                     return _nothing(_TOUCHES_TWICE, near.distance, twice)
                 last_at, last_tip, steadiness = until.at, leg.tip, 0.0
@@ -427,7 +428,7 @@ def _note_event(at: Equilibrium, tip: bool, out: Floats) -> None:
 
 
 @compiled
-def _second_contact(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> float:
+def _second_contact(scene: Scene, leg: Leg, goes_on: bool, stop: float, work: LegCurves) -> float:
     """Contact up to a position on a leg at which a rod curved toward the object would touch it twice; NaN without one.
 
     In tangential contact the free end goes on as an arc. It is in the object at once where the contour is less curved
@@ -437,7 +438,7 @@ def _second_contact(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> flo
     if beam.most_curvature <= 0.0:
         return math.nan
     low, high = ends(outline)
-    for k in range(work.nodes.size):
+    for k in range(1 if goes_on else 0, work.nodes.size):  # a leg that goes on begins where the last one was checked
         if k > 0 and work.nodes[k] > stop:
             break
         p, q = work.at_nodes[PLACE, k], work.at_nodes[REST, k]

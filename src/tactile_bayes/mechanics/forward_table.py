@@ -42,7 +42,7 @@ _TANGENTIAL, _BEYOND_TIP, _AT_REST, _POSE = _ROWS, 2 * _ROWS, 3 * _ROWS, 3 * _RO
 _WORST = 1e-5
 """Largest error of the pose with which a table is of use."""
 
-_OUTER = 6, 5, 8
+_OUTER = 5, 5, 7
 """Nodes in a taper, bend and friction angle that vary."""
 
 _MOST = max(_OUTER)
@@ -155,7 +155,7 @@ def _tabulated(profile: Profile, box: Box) -> ForwardTable:
         _terms(tangential[..., 0, :, :, :], felt, *inner),
         _terms(tangential[..., 1, :, :, :], felt / _BLUNT, *inner),
         _terms(chord[:, None, :, None, None], _AT_ONSET, (-1, distances)),
-        np.array(box),
+        np.array(box, dtype=float),
         slenderness,
     )
 
@@ -165,7 +165,7 @@ def _terms(values: Floats, relevance: Floats | float, *inner: tuple[int, Floats]
     for axis in (1, 2, 3):
         values = np.moveaxis(chebyshev.coefficients(np.moveaxis(values, axis, -1)), 0, axis)
     size = (relevance * np.abs(values)).max(axis=(0, 4, 5, 6))
-    orders = np.argwhere(size > _NEGLIGIBLE)
+    orders = np.ascontiguousarray(np.argwhere(size > _NEGLIGIBLE))
     for axis, points in inner:
         fit = np.linalg.inv(np.vander(2.0 * points - 1.0, increasing=True))
         values = np.moveaxis(np.tensordot(fit, values, (1, axis)), 0, axis)
