@@ -1,12 +1,10 @@
 """State of any rod in contact: contact → base wrench, by continuation.
 
-Straight uniform rods have a closed form (`states`). For any other one a uniform rod with constant rest curvature κ that
-makes the same contact is changed into it: for a share λ from 0 to 1
-
-    rest curvature (1 − λ) κ + λ κ0(s),        rigidity 1 + λ (B(s) − 1),        taper λ t.
-
-The force is positive all along. In tip contact the first rod is the straight one, in tangential contact the arc that
-lies along the contour without any force.
+Straight uniform rods have a closed form (`states`). For any other one a rod with constant rest curvature κ that makes
+the same contact is changed into it, with a share λ from 0 to 1 of the rest curvature (1 − λ) κ + λ κ0(s). The force is
+positive all along. In tangential contact it begins with the arc that lies along the contour without any force, of
+whatever rigidity. In tip contact it begins with the straight rod, which is first changed from a uniform one, by a share
+of the rigidity 1 + λ (B(s) − 1) and the taper λ t: a straight rod reaches whatever the curved one does.
 """
 
 from __future__ import annotations
@@ -34,6 +32,9 @@ _NEAR, _SHRINKS = 0.05, 0.25
 _SETTLED = 1e-8
 """Newton step after which rounding errors are left only."""
 
+_UNIFORM, _STIFFENED, _WHOLE = 0.0, 1.0, 2.0
+"""Where a continuation begins, where the rigidity is that of the rod, and where the rest curvature is so too."""
+
 _NUDGE = 1e-6
 """Change of the share for a derivative by it, which serves for a first guess."""
 
@@ -56,7 +57,7 @@ NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math
 
 
 class Start(NamedTuple):
-    """A state to continue from: rest curvature of the uniform rod, ψ1 or arc length, and force."""
+    """A state to continue from: constant rest curvature, ψ1 or arc length, and force."""
 
     curvature: float
     q: float
@@ -73,25 +74,34 @@ def unloaded_arc(u: float, v: float, delta: float) -> Start:
 
 
 @compiled
-def _between(beam: Beam, begin: float, share: float, room: Profile | None) -> Beam:
-    """Rod between a uniform one of constant rest curvature and another one; its profile is written to the room."""
-    return _mixed(beam.varied, beam.curvature, begin, share, room)
+def _between(beam: Beam, begin: float, way: float, room: Profile | None) -> Beam:
+    """Rod on the way of a continuation that begins with a rest curvature; its profile is written to the room."""
+    return _mixed(beam.varied, beam.curvature, begin, way, room)
 
 
 @compiled
-def _mixed(varied: Varied | None, curvature: float, begin: float, share: float, room: Profile | None) -> Beam:
-    left = 1.0 - share
+def _mixed(varied: Varied | None, curvature: float, begin: float, way: float, room: Profile | None) -> Beam:
+    left = min(_WHOLE - way, 1.0)
     if varied is None or room is None:
         return Beam(curvature - left * (curvature - begin), 1.0, varied)
     edges, bent, rigidity, taper, bend, sign = varied.profile
+    bent_share, rigid_share = 1.0 - left, min(way, 1.0)
     for i in range(edges.size):
         for k in range(bent.shape[1]):
-            room.curvature[i, k] = share * bent[i, k]
+            room.curvature[i, k] = bent_share * bent[i, k]
         for k in range(rigidity.shape[1]):
-            room.rigidity[i, k] = share * rigidity[i, k]
-        room.rigidity[i, 0] += left
-    bend = share * bend + left * sign * begin
-    return Beam(0.0, 1.0, Varied(Profile(edges, room.curvature, room.rigidity, share * taper, bend, sign), varied.work))
+            room.rigidity[i, k] = rigid_share * rigidity[i, k]
+        room.rigidity[i, 0] += 1.0 - rigid_share
+    bend = bent_share * bend + left * sign * begin
+    profile = Profile(edges, room.curvature, room.rigidity, rigid_share * taper, bend, sign)
+    return Beam(0.0, 1.0, Varied(profile, varied.work))
+
+
+@compiled
+def _begins_at(varied: Varied | None, tip: bool) -> float:
+    if varied is None:
+        return _STIFFENED
+    return _UNIFORM if tip else _STIFFENED
 
 
 class _Slopes(NamedTuple):
@@ -149,31 +159,33 @@ def _settled(u: float, v: float, delta: float, beam: Beam, tip: bool, q: float, 
 def _continued(
     u: float, v: float, delta: float, beam: Beam, tip: bool, start: Start, room: Profile | None
 ) -> tuple[float, float]:
-    """(q, f) of a rod, continued from a uniform one; NaN where the continuation ends before.
+    """(q, f) of a rod, continued from one of constant rest curvature; NaN where the continuation ends before.
 
     The start may be somewhat off the contact: it is left behind at the same time.
     """
     begin, q, force = start
-    at_start = _between(beam, begin, 0.0, room)
-    if not _has_pose(q, force, at_start, tip):
+    way = _begins_at(beam.varied, tip)
+    rod = _between(beam, begin, way, room)
+    if not _has_pose(q, force, rod, tip):
         return math.nan, math.nan
-    here = _slopes(q, force, at_start, delta, tip)
-    from_u, from_v, way, step = here.here.u, here.here.v, 0.0, 1.0
+    here = _slopes(q, force, rod, delta, tip)
+    step, whole = 1.0, _WHOLE - way
+    off_u, off_v = (u - here.here.u) / whole, (v - here.here.v) / whole
     for _ in range(_MOST_STEPS):
         aside = _slopes(q, force, _between(beam, begin, way + _NUDGE, room), delta, tip).here
         by_u, by_v = (aside.u - here.here.u) / _NUDGE, (aside.v - here.here.v) / _NUDGE
-        dq, df = _step(here, u - from_u - by_u, v - from_v - by_v)
+        dq, df = _step(here, off_u - by_u, off_v - by_v)
         for _ in range(_MOST_STEPS):
-            end = min(way + step, 1.0)
-            left, gone, rod = 1.0 - end, end - way, _between(beam, begin, end, room)
-            on_u, on_v = u - left * (u - from_u), v - left * (v - from_v)
+            end = min(way + step, _STIFFENED if way < _STIFFENED else _WHOLE)
+            left, gone, rod = _WHOLE - end, end - way, _between(beam, begin, end, room)
+            on_u, on_v = u - left * off_u, v - left * off_v
             new_q, new_force = _settled(on_u, on_v, delta, rod, tip, q + gone * dq, force + gone * df)
             if new_force > 0.0 or not step > _LEAST_STEP:
                 break
             step *= 0.5
-        if end == 1.0 or not new_force > 0.0:
+        if end == _WHOLE or not new_force > 0.0:
             return new_q, new_force
-        q, force, way, step = new_q, new_force, end, 2.0 * step
+        q, force, way, step = new_q, new_force, end, min(2.0 * step, 1.0)
         here = _slopes(q, force, rod, delta, tip)
     return math.nan, math.nan
 
@@ -182,7 +194,7 @@ def _continued(
 def continued_state(
     x: float, y: float, alpha: float, delta: float, beam: Beam, tip: bool, start: Start, room: Profile | None
 ) -> State:
-    """State of a contact, continued from a uniform rod with the same contact; NaN where this ends.
+    """State of a contact, continued from that of another rod with the same contact; NaN where this ends.
 
     The derivatives follow from those of the pose: with the slope of the contour the frame of the force turns.
     """

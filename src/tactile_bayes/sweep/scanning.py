@@ -82,8 +82,8 @@ def equilibria(
 ) -> xr.Dataset:
     """States in which the rod touches a contour at given slope angles.
 
-    They solve equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, in closed form, or by continuation if
-    the rod is not straight and uniform. Beyond snap-off they are equilibria too, but unstable.
+    They solve equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, in closed form, or by continuation
+    if the rod is not straight and uniform. Beyond snap-off they are equilibria too, but unstable.
 
     A rod that is curved toward the object, as a load does not bend it, may touch with its tip in two equilibria at one
     slope angle. Early in a sweep the load only straightens it, and the contact moves outward, toward larger |α|; later
