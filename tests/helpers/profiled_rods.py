@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
 from tactile_bayes.mechanics.profile import Profile, profile_of
+from tactile_bayes.mechanics.rod import Rod
 
 Function = Callable[[float], float]
 
@@ -92,3 +93,37 @@ def integrated_pose(rod: RodAlong, psi1: float, arclength: float, force: float) 
     """u, v and turn of `pose`."""
     psi0, _, u, v = integrated(rod, [psi1, 0.0, 0.0, 0.0], arclength, 0.0, force)
     return np.array([-u, -v, psi0 - psi1])
+
+
+class GivenRod(NamedTuple):
+    """A rod as users give it, dimensionless, and as plain functions of s."""
+
+    rod: Rod
+    plain: RodAlong
+
+    def in_sweep(self, side: float) -> RodAlong:
+        """The rod in the frame of a forward sweep, side 1, or of a backward one."""
+        return self.plain._replace(curvature=lambda s: side * self.plain.curvature(s))
+
+
+def given_rod(curvature=0.0, rigidity=1.0, taper: float = 0.0) -> GivenRod:
+    """Rod of properties that are numbers, functions or tables."""
+    rigidity_profile = None if rigidity == 1.0 else rigidity
+    rod = Rod(rest_curvature=curvature, rigidity_profile=rigidity_profile, taper=taper)
+    return GivenRod(rod, rod_along(curvature, rigidity, taper))
+
+
+def given_rods() -> dict[str, GivenRod]:
+    """Rods by names whose sweeps along most contours have one contact only."""
+    table = np.linspace(0.0, 1.0, 6), np.array([-0.2, -0.5, 0.1, 0.3, -0.1, 0.2])
+    stepped = np.array([0.0, 0.45, 0.55, 1.0]), np.array([1.0, 1.0, 0.3, 0.3])
+    return {
+        "arc": given_rod(0.6),
+        "other arc": given_rod(-0.6),
+        "cone": given_rod(taper=0.9),
+        "half cone": given_rod(taper=0.5),
+        "curved to its tip": given_rod(lambda s: -0.8 * s, taper=0.6),
+        "parabolic": given_rod(lambda s: 0.5 - 2.0 * s + 1.5 * s * s, taper=0.3),
+        "wavy": given_rod(lambda s: np.cos(7.0 * s), lambda s: np.exp(-2.0 * s)),
+        "tables": given_rod(table, stepped, 0.2),
+    }

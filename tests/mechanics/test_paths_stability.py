@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from helpers.integration import shoot
 from helpers.second_variation import Held, eigenvalues, held
 from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.sweep import equilibria, scan
 
 EIGENVALUE = 1e-7
@@ -23,6 +24,17 @@ FLAT_ROOF = Joined(Parabola(0.2, 0.3, 1.0), Parabola(0.2, 0.3, -1.0), x=0.0)
 HIGH_ROOF = Joined(Parabola(0.2, 0.5, 1.0), Parabola(0.2, 0.5, -1.0), x=0.0)
 SHARP_LEFT = Joined(Parabola(5.0, 0.3), Parabola(0.2, 0.3))
 EDGE_LEFT = Joined(Parabola(1.0, 0.3775, 0.15), Parabola(0.2, 0.3995, -0.05), x=0.0)
+
+RODS = {
+    "arc": (0.4, 0.0),
+    "other arc": (-0.6, 0.0),
+    "half cone": (0.0, 0.5),
+    "cone": (0.0, 0.9),
+    "curved to its tip": (lambda s: -0.8 * s, 0.6),
+    "the other way": (lambda s: 0.3 * s, 0.6),
+    "curved cone": (lambda s: 0.5 - 2.0 * s + 1.5 * s * s, 0.3),
+}
+"""Rest curvature and taper."""
 
 
 def snap_off(contour, base):
@@ -149,3 +161,42 @@ def test_at_the_vertex_of_profile_four():
         beyond = eigenvalues(Held(drive, moment, force, alpha, 1.0, arclength, False))
         assert beyond[0] < -0.1
         assert beyond[1] > FAR
+
+
+@pytest.mark.filterwarnings("ignore::tactile_bayes.errors.ClearanceWarning")
+@pytest.mark.parametrize("q", [0.5, *(pytest.param(q, marks=pytest.mark.slow) for q in (0.3, 0.7))])
+@pytest.mark.parametrize("name", RODS)
+def test_curved_and_tapered_rods_are_stable_up_to_their_snap_off(name, q):
+    """Also while the load only straightens the rod, and the contact moves outward: the drive angle grows there too."""
+    bent, taper = RODS[name]
+    rod, contour = Rod(rest_curvature=bent, taper=taper), Parabola(0.5, q)
+    along = {
+        "curvature": bent if callable(bent) else lambda s: np.full_like(s, bent),
+        "rigidity": lambda s: (1.0 - taper * s) ** 4,
+    }
+
+    def of_state(state):
+        return eigenvalues(held(contour, state, **along), terms=40)[:2]
+
+    def eigenvalue(alpha):
+        return of_state(equilibria(contour, [alpha], rod=rod).isel(slope_angle=0))[0]
+
+    swept = scan(contour, direction="forward", rod=rod, drive_step=0.02)
+    record, last = swept.record, swept.events["forward"].snap_off
+    names = ("slope_angle", "contact_phase", "contact_arclength")
+    record = record.rename({f"truth_{name}": name for name in names})
+    loaded = np.flatnonzero(record.contact_phase.values != "none")
+    way = [of_state(record.isel(sample=k)) for k in loaded[1 : -1 : max(1, loaded.size // 10)]]
+    assert np.min(way) > 1e3 * EIGENVALUE
+
+    near = 1e-3
+    before, after = eigenvalue(last.slope_angle + near), eigenvalue(last.slope_angle - near)
+    assert before > 1e3 * EIGENVALUE
+    assert after < -1e3 * EIGENVALUE
+    if last.kind == "fold":  # else it jumps where the phase changes
+        crossing = brentq(eigenvalue, last.slope_angle - near, last.slope_angle + near, xtol=1e-14)
+        assert abs(crossing - last.slope_angle) < EIGENVALUE / ((before - after) / (2 * near))
+    else:
+        assert last.kind == "corner"
+        assert eigenvalue(last.slope_angle + 1e-9) > 1e3 * EIGENVALUE
+        assert eigenvalue(last.slope_angle - 1e-9) < -1e3 * EIGENVALUE

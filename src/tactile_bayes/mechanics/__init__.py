@@ -6,9 +6,9 @@
 `branch` (one rod along one contour, from first contact to snap-off) → `readings` and `sweeps` (loads and states at
 drive angles, of many of them). All of this is scalar code that numba compiles, for any strictly convex contour, with
 friction and compliance, in both directions. `curves.Accuracy` decides whether it is exact or as accurate as noise
-requires. `elastica` (single states, and Step 2: `arc`, `chord`, `tables` and `states` for straight rods, `arc_states`
-for circular arcs) and `paths` are its interface for arrays; they load numba when they are called. `rod` is what users
-give, and `traced` a rod from points along it.
+requires. `elastica` (single states, and Step 2: `arc`, `chord`, `tables` and `states` for straight rods,
+`continuation` and `arc_states` for others) and `paths` are its interface for arrays; they load numba when they are
+called. `rod` is what users give, and `traced` a rod from points along it.
 
 Another drive enters where `branch` compares states with drive angles: no other place knows that the base turns about a
 pivot.

@@ -1,4 +1,4 @@
-"""One state of a rod whose rest shape is a circular arc: contact → base wrench, and back.
+"""Contact of a rod whose rest shape is a circular arc, from its base wrench.
 
 Quantities are dimensionless and relative to the pivot; contacts are forward ones, and the rest curvature κ0 is mirrored
 with them. A base wrench determines its contact in closed form. With A = π/4 − ψ/2 and t = s1 − s, as in `pose`, but not
@@ -16,8 +16,6 @@ Then s1 is an elliptic integral in Carlson's form. Nothing of this is singular w
 parameter m = x/y is one. The contact is the first point at which the bending moment vanishes with κ' = f cos ψ > 0. If
 m0 > 0 the moment vanishes nowhere before. If the line of force has passed the pivot, m0 < 0 and cos ψ0 < 0, as happens
 to rods that are curved at rest as a load curves them, it vanishes once before.
-
-A contact determines its wrench by continuation in the rest curvature, along which the force is positive.
 """
 
 from __future__ import annotations
@@ -26,46 +24,15 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.pose import Pose, pose, pose_and_slopes
+from tactile_bayes.mechanics.pose import pose
 
-__all__ = ["MOST_LOAD", "NOWHERE", "Found", "Start", "State", "arc_contact", "arc_state", "unloaded_arc"]
+__all__ = ["MOST_LOAD", "Found", "arc_contact", "is_moderate"]
 
 MOST_LOAD = 1e6
 """Largest load f s1² and square of the bend κ0 s1: a rod would make a hundred turns."""
 
 _CLOSE = 0.012
 """Spread of the arguments of Carlson's R_F for which eight terms of its series (DLMF 19.36.1) are exact."""
-
-_MOST_STEPS = 200
-
-_LEAST_STEP = 1e-9
-"""Share of a continuation below which it ends."""
-
-_NEAR, _SHRINKS = 0.05, 0.25
-"""Largest first step of a Newton search in a continuation, and largest ratio of its steps."""
-
-_SETTLED = 1e-8
-"""Newton step after which rounding errors are left only."""
-
-_NUDGE = 1e-6
-"""Change of the rest curvature for a derivative by it, which serves for a first guess [1/L]."""
-
-
-class State(NamedTuple):
-    """Base wrench of a contact and its derivatives; NaN where the rod cannot make the contact."""
-
-    drive_angle: float
-    holding_moment: float
-    force_x: float
-    force_y: float
-    arclength: float
-    tip_angle: float
-    by_slope: float
-    by_distance: float
-    """As in `Wrench`."""
-
-
-NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
 class Found(NamedTuple):
@@ -97,7 +64,7 @@ def _halved(s: float, c: float, d: float, x: float, y: float, gap: float) -> tup
 
 
 @compiled
-def _is_moderate(arclength: float, force: float, curvature: float) -> bool:
+def is_moderate(arclength: float, force: float, curvature: float) -> bool:
     """True if a pose can be computed."""
     bend = curvature * arclength
     return force * arclength * arclength < MOST_LOAD and bend * bend < MOST_LOAD and arclength * arclength < MOST_LOAD
@@ -162,122 +129,9 @@ def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, 
         force,
         gap,
     )
-    if not _is_moderate(arclength, force, curvature):
+    if not is_moderate(arclength, force, curvature):
         return Found(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
     here = pose(0.5 * math.pi - 2.0 * math.atan2(sin1, cos1), arclength, force, curvature)
     u, v = moment / force, here.v
     x, y = (u * fy + v * fx) / force, (v * fy - u * fx) / force
     return Found(x, y, beta - delta, arclength, phi0 - here.turn, modulus)
-
-
-class Start(NamedTuple):
-    """A state to continue from: rest curvature, ψ1 or arc length, and force."""
-
-    curvature: float
-    q: float
-    force: float
-
-
-@compiled
-def unloaded_arc(u: float, v: float, delta: float) -> Start:
-    """The arc that lies along the contour at a contact without any force."""
-    angle = math.atan2(v, u) + delta
-    distance = math.hypot(u, v)
-    sine = math.sin(angle)
-    return Start(-2.0 * sine / distance, distance * (angle / sine if sine != 0.0 else 1.0), 0.0)
-
-
-class _Slopes(NamedTuple):
-    """Pose at a point, its derivatives by (q, f), and their determinant."""
-
-    here: Pose
-    by_q: Pose
-    by_force: Pose
-    det: float
-
-
-@compiled
-def _slopes(q: float, force: float, curvature: float, delta: float, tip: bool) -> _Slopes:
-    psi1, arclength = (q, 1.0) if tip else (-delta, q)
-    here, by_q, by_force = pose_and_slopes(psi1, arclength, force, curvature, tip)
-    return _Slopes(here, by_q, by_force, by_q.u * by_force.v - by_force.u * by_q.v)
-
-
-@compiled
-def _step(at: _Slopes, du: float, dv: float) -> tuple[float, float]:
-    """Change of (q, f) for a change of (u, v)."""
-    _, by_q, by_force, det = at
-    return (du * by_force.v - dv * by_force.u) / det, (by_q.u * dv - by_q.v * du) / det
-
-
-@compiled
-def _settled(u: float, v: float, delta: float, curvature: float, tip: bool, q: float, force: float) -> Start:
-    """State near a guess by Newton's method; NaN if its steps are large or do not shrink fast."""
-    before = _NEAR / _SHRINKS
-    while force > 0.0 and _is_moderate(1.0 if tip else q, force, curvature):
-        at = _slopes(q, force, curvature, delta, tip)
-        dq, df = _step(at, u - at.here.u, v - at.here.v)
-        size = max(abs(dq), abs(df) / (1.0 + force))
-        if not size <= _SHRINKS * before:
-            break
-        q, force, before = q + dq, force + df, size
-        if size <= _SETTLED:
-            return Start(curvature, q, force)
-    return Start(math.nan, math.nan, math.nan)
-
-
-@compiled
-def _continued(u: float, v: float, delta: float, curvature: float, tip: bool, start: Start) -> Start:
-    """State with a rest curvature, continued from another one; NaN where the continuation ends before.
-
-    The start may be somewhat off the contact: it is left behind at the same time.
-    """
-    at, way, step = start, 0.0, 1.0
-    if not _is_moderate(1.0 if tip else at.q, at.force, at.curvature):
-        return Start(math.nan, math.nan, math.nan)
-    here = _slopes(start.q, start.force, start.curvature, delta, tip)
-    from_u, from_v, change = here.here.u, here.here.v, curvature - start.curvature
-    for _ in range(_MOST_STEPS):
-        psi1, arclength = (at.q, 1.0) if tip else (-delta, at.q)
-        aside = pose(psi1, arclength, at.force, at.curvature + _NUDGE)
-        by_u, by_v = (aside.u - here.here.u) / _NUDGE, (aside.v - here.here.v) / _NUDGE
-        dq, df = _step(here, u - from_u - change * by_u, v - from_v - change * by_v)
-        for _ in range(_MOST_STEPS):
-            end = min(way + step, 1.0)
-            left, gone = 1.0 - end, end - way
-            on_u, on_v, bent = u - left * (u - from_u), v - left * (v - from_v), curvature - left * change
-            new = _settled(on_u, on_v, delta, bent, tip, at.q + gone * dq, at.force + gone * df)
-            if new.force > 0.0 or not step > _LEAST_STEP:
-                break
-            step *= 0.5
-        if end == 1.0 or not new.force > 0.0:
-            return new
-        at, way, step = new, end, 2.0 * step
-        here = _slopes(at.q, at.force, at.curvature, delta, tip)
-    return Start(math.nan, math.nan, math.nan)
-
-
-@compiled
-def arc_state(x: float, y: float, alpha: float, delta: float, curvature: float, tip: bool, start: Start) -> State:
-    """State of a contact, continued from one with another rest curvature; NaN where this ends.
-
-    The derivatives follow from those of the pose: with the slope of the contour the frame of the force turns.
-    """
-    beta = alpha + delta
-    sin, cos = math.sin(beta), math.cos(beta)
-    u, v = x * cos + y * sin, y * cos - x * sin
-    _, q, force = _continued(u, v, delta, curvature, tip, start)
-    if not force > 0.0:
-        return NOWHERE
-    at = _slopes(q, force, curvature, delta, tip)
-    psi1, arclength = (q, 1.0) if tip else (-delta, q)
-    if u < 0.0 and not math.cos(psi1 + at.here.turn) < 0.0:
-        return NOWHERE
-    by_q = at.by_q.turn + (1.0 if tip else 0.0)
-    dq, df = _step(at, v, -u)
-    by_slope = 1.0 + by_q * dq + at.by_force.turn * df
-    dq, df = _step(at, u, v)
-    by_distance = 0.5 * (by_q * dq + at.by_force.turn * df) / (u * u + v * v)
-    tip_angle = beta + psi1
-    drive_angle = tip_angle + at.here.turn
-    return State(drive_angle, force * u, -force * sin, force * cos, arclength, tip_angle, by_slope, by_distance)

@@ -1,13 +1,15 @@
-"""The exact rod for arrays: contact → base wrench and base wrench → contact (`states`, `arc_states`).
+"""The exact rod for arrays: contact → base wrench and base wrench → contact (`states`).
 
 Quantities are dimensionless (length L, moment EI/L, force EI/L²), relative to the pivot, and broadcast. The formulas
 hold for forward contacts (holding moment ≥ 0); `side=-1` mirrors a backward contact in and out. The unloaded rod is
-straight, or a circular arc of any rest curvature; all is a closed form, except for the wrench of an arc.
+straight, or a circular arc of any rest curvature, or has a `Profile`. Straight rods have closed forms; wrenches of
+others are found by continuation (`continuation`), and contacts of rods with a profile by integration.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -116,7 +118,7 @@ def tangential_arclength(
     >>> tangential_arclength(0.2, 0.6, [0.1, 0.2]).round(6)
     array([1.053211, 0.976104])
     """
-    return _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, 1.0, NONE)[1][8]
+    return _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, None, 1.0, NONE)[1][8]
 
 
 def wrench_from_contact(
@@ -128,14 +130,15 @@ def wrench_from_contact(
     side: ArrayLike = 1,
     phase: ArrayLike | None = None,
     rest_curvature: ArrayLike = 0.0,
+    profile: Profile | None = None,
 ) -> Wrench:
     """Base wrench of a rod that touches a contour at a given point: Step 1 for one state.
 
     Equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, solved in closed form for a straight rod.
 
     A rod with rest curvature may have two equilibria with the same contact: one in which the load bends it as it bends
-    a straight rod, and one in which a small load has only straightened it. The first is returned, that is continued
-    from the straight rod's, or in tangential contact from the arc that lies along the contour without force.
+    a straight rod, and one in which a small load has only straightened it. The first is returned: it is continued from
+    that of the straight uniform rod, or in tangential contact from the arc that lies along the contour without force.
 
     Parameters
     ----------
@@ -151,13 +154,15 @@ def wrench_from_contact(
         The phase, if it is known; then only this one is computed, without a check.
     rest_curvature : array_like
         Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
+    profile : Profile, optional
+        Rod whose rest curvature or rigidity varies along it, in place of an arc.
 
     Returns
     -------
     Wrench
         Arrays of the broadcast shape. The phase is `TANGENTIAL` where an arc length s1 ≤ 1 suffices, else `TIP` where
         the point is within reach. It is `NONE`, and the rest is NaN, beyond reach, where the contour faces away, and
-        where the continuation to the rest curvature ends because there is no equilibrium or the force is not positive.
+        where the continuation ends because there is no equilibrium or the force is not positive.
 
     Raises
     ------
@@ -171,7 +176,7 @@ def wrench_from_contact(
     (array([1, 2], dtype=int8), array([2.901776, 2.923367]))
     """
     known = NONE if phase is None else phase
-    found, columns = _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, side, known)
+    found, columns = _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, profile, side, known)
     drive_angle, moment, force_x, force_y, arclength, tip_angle, by_slope, by_distance, tangential = columns
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
@@ -195,20 +200,28 @@ def _states(
     alpha: ArrayLike,
     delta: ArrayLike,
     curvature: ArrayLike,
+    profile: Profile | None,
     side: ArrayLike,
     phase: ArrayLike,
 ) -> tuple[NDArray[np.int8], Floats]:
     """Phases, and columns of states, of contacts mirrored to forward ones."""
-    from tactile_bayes.mechanics.states import arc_wrenches, wrenches  # numba takes a second to load
+    from tactile_bayes.mechanics.beam import varied_of  # numba takes a second to load
+    from tactile_bayes.mechanics.states import continued_wrenches, wrenches
     from tactile_bayes.mechanics.tables import tables, workspace
 
     _refuse_friction(np.asarray(delta, dtype=float))
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
-    given = np.broadcast_arrays(sign * x, y, sign * alpha, delta, sign * curvature, phase)
+    of_rods = sign * (curvature if profile is None else profile.sign)
+    given = np.broadcast_arrays(sign * x, y, sign * alpha, delta, of_rods, phase)
     shape = given[0].shape
     columns = np.stack([column.ravel() for column in given[:5]], axis=-1).astype(float)
     found, out = given[5].astype(np.int8).ravel(), np.empty((columns.shape[0], 9))
-    _solve(wrenches, arc_wrenches, columns, (tables(), workspace()), (found, out))
+    known = tables(), workspace()
+    if profile is None:
+        _solve(wrenches, partial(continued_wrenches, None, None), columns, known, (found, out))
+    else:
+        room = profile._replace(curvature=np.empty_like(profile.curvature), rigidity=np.empty_like(profile.rigidity))
+        continued_wrenches(varied_of(profile), room, columns, *known, found, out)
     return found.reshape(shape), np.ascontiguousarray(out.T).reshape(9, *shape)
 
 

@@ -23,10 +23,11 @@ from tactile_bayes.mechanics.arc import (
     chord_deficit_rate,
     chord_direction_rate,
 )
-from tactile_bayes.mechanics.arc_states import NOWHERE, Found, Start, State, arc_contact, arc_state, unloaded_arc
+from tactile_bayes.mechanics.arc_states import Found, arc_contact
 from tactile_bayes.mechanics.beam import Beam, Varied, mirrored_by
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
 from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.continuation import NOWHERE, Start, State, continued_state, unloaded_arc
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.profile_contact import contact_along
@@ -43,10 +44,10 @@ from tactile_bayes.mechanics.tables import (
 
 __all__ = [
     "arc_contacts",
-    "arc_wrenches",
     "contact",
     "contact_of",
     "contacts",
+    "continued_wrenches",
     "profile_contacts",
     "profile_shapes",
     "wrenches",
@@ -154,15 +155,32 @@ def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArra
 
 
 @cached
-def arc_wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArray[np.int8], out: Floats) -> None:
-    """Write states of arcs as `wrenches` does; the rest curvature is the last column."""
+def continued_wrenches(
+    varied: Varied | None,
+    room: Profile | None,
+    columns: Floats,
+    known: Tables,
+    workspace: Workspace,
+    phase: NDArray[np.int8],
+    out: Floats,
+) -> None:
+    """Write states of arcs, or of a rod with a profile, as `wrenches` does.
+
+    Parameters
+    ----------
+    varied, room : Varied and Profile, optional
+        The rod, and a profile of the same shape to be written to, unless the rods are arcs.
+    columns : ndarray, shape (n, 5)
+        The last column is the rest curvature of an arc; with a profile −1 for the mirrored rod, else 1.
+    """
     for i in range(columns.shape[0]):
-        x, y, alpha, delta, curvature = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4]
+        x, y, alpha, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
+        beam = mirrored_by(columns[i, 4], varied)
         sin, cos = math.sin(alpha + delta), math.cos(alpha + delta)
         u, v = x * cos + y * sin, y * cos - x * sin
         out[i] = math.nan
         if phase[i] != TIP:
-            lying = arc_state(x, y, alpha, delta, curvature, False, unloaded_arc(u, v, delta))
+            lying = continued_state(x, y, alpha, delta, beam, False, unloaded_arc(u, v, delta), room)
             out[i, 8] = lying.arclength
             if phase[i] == TANGENTIAL or lying.arclength <= 1.0:
                 _store(lying, out[i])
@@ -171,7 +189,7 @@ def arc_wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: ND
         straight = _tip_state(x, y, alpha, delta, known, workspace)
         psi1 = straight.tip_angle - alpha - delta
         start = Start(0.0, psi1, math.hypot(straight.force_x, straight.force_y))
-        ending = arc_state(x, y, alpha, delta, curvature, True, start)
+        ending = continued_state(x, y, alpha, delta, beam, True, start, room)
         if phase[i] == TIP or ending.tip_angle >= alpha:
             _store(ending, out[i])
         phase[i] = NONE if math.isnan(out[i, 4]) else TIP

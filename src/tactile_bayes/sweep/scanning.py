@@ -82,8 +82,12 @@ def equilibria(
 ) -> xr.Dataset:
     """States in which the rod touches a contour at given slope angles.
 
-    They solve equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, in closed form. Beyond snap-off they
-    are equilibria too, but unstable.
+    They solve equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, in closed form, or by continuation
+    if the rod is not straight and uniform. Beyond snap-off they are equilibria too, but unstable.
+
+    A rod that is curved toward the object, as a load does not bend it, may touch with its tip in two equilibria at one
+    slope angle. Early in a sweep the load only straightens it, and the contact moves outward, toward larger |α|; later
+    the load bends it as it bends a straight rod, and the contact comes back. The second equilibrium is returned.
 
     Parameters
     ----------
@@ -128,9 +132,17 @@ def equilibria(
     rod = Rod() if rod is None else rod
     sweep_frame = to_sweep_frame(contour, pivots[0], direction, rod)
     index = np.zeros(alpha.size, dtype=np.intp)
-    parameter = (-1.0 if sweep_frame.mirrored[0] else 1.0) * contour.parameter_of_slope(alpha)
+    side = -1.0 if sweep_frame.mirrored[0] else 1.0
+    parameter = side * contour.parameter_of_slope(alpha)
     locus = sweep_frame.locate(index, parameter)
-    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle_of(friction))
+    wrench = wrench_from_contact(
+        locus.x,
+        locus.y,
+        locus.slope_angle,
+        friction_angle_of(friction),
+        rest_curvature=side * rod.arc_curvature,
+        profile=None if rod.profile is None else rod.profile._replace(sign=side),
+    )
     states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
     columns = to_lab_frame(sweep_frame, index, states, rod)
     reached = wrench.phase != NONE
