@@ -60,6 +60,7 @@ OF_UNKNOWN_SHAPE = {
     "nuisances": (*STANDARD, "rest_curvature"),
     "priors": {"rest_curvature": stats.norm(0.0, 0.5)},
 }
+OF_UNKNOWN_TAPER = {"nuisances": (*STANDARD, "taper"), "priors": {"taper": stats.uniform(0.0, 0.9)}}
 BIASES = (0.02, 0.05, 0.05)
 OUTLIERS = {"load_cell": replace(CELL, degrees_of_freedom=2.5)}
 CASES: Mapping[str, Mapping[str, Run]] = {
@@ -88,11 +89,7 @@ CASES: Mapping[str, Mapping[str, Run]] = {
     ),
     "curved by 0.4/L": _untold({"rest_curvature": 0.4}, {}, rest_curvature_inferred=OF_UNKNOWN_SHAPE),
     "tapered by 10 %": _untold({"taper": 0.1}, {}, taper_inferred={"nuisances": (*STANDARD, "taper")}),
-    "tapered by 50 %": _untold(
-        {"taper": 0.5},
-        {},
-        taper_inferred={"nuisances": (*STANDARD, "taper"), "priors": {"taper": stats.uniform(0, 0.9)}},
-    ),
+    "tapered by 50 %": _untold({"taper": 0.5}, {}, taper_inferred=OF_UNKNOWN_TAPER),
     "drift of two noises": _untold({"drift": (0.04, 0.1, 0.1)}, {}, drift_inferred={"nuisances": (*STANDARD, "drift")}),
     "outliers (t, 2.5)": _untold(OUTLIERS, {}, told_of_them=OUTLIERS),
     **{
