@@ -13,7 +13,7 @@ from helpers.contour_posteriors import CELL, DEVIATIONS, swept, without
 from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
-from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.load_cell import LoadCell
@@ -171,6 +171,16 @@ def test_rods_that_vary_cost_no_accuracy_where_all_of_the_rig_is_inferred():
     error = SHARE[False] * np.abs(exact).max(axis=(0, 1))
     close = np.all(np.abs(loads - exact) <= error, axis=-1)
     assert np.count_nonzero(~close) <= 4  # samples so near snap-off that they are on the other side of it
+
+
+def test_rods_curved_toward_a_flat_object_touch_it_twice_with_a_table_too():
+    """Whether they do may differ for a few contours that are nearly as curved as the rod."""
+    rng, rod = np.random.default_rng(3), Rod(taper=0.3, rest_curvature=lambda s: 0.6 * s - 0.2)
+    record = swept(Parabola(0.5, 0.5), rod=rod, step=np.radians(10.0))
+    flat = PowerLaw(*rng.uniform([0.3, 2.5, 0.2, -0.2], [2.0, 4.0, 0.8, 0.2], (100, 4)).T)
+    usable = [RecordLikelihood(record, CELL, exact=exact).usable(flat) for exact in (False, True)]
+    assert 20 < np.count_nonzero(usable[1]) < 80
+    assert np.count_nonzero(usable[0] != usable[1]) <= 1
 
 
 def swept_in(rig):

@@ -62,6 +62,9 @@ _SCALE = 10.0
 
 _SPAN = math.log1p(_FORCE / _SCALE)
 
+_ACROSS = 1e-6
+"""Cosine of the angle of a chord to the rod that counts as zero."""
+
 _ROUNDING = 1e-12
 """Distance from the end of a range that counts as zero."""
 
@@ -313,7 +316,10 @@ def _sums(sheet: Floats, row: int, x: float, z: float) -> tuple[Pose, Pose, Pose
 
 @compiled
 def chord_in(sheet: Floats, mirrored: bool, reach: float, distance: float) -> RestChord:
-    """Chord of a rod or its mirror image at rest, continued beyond its tip as a straight line."""
+    """Chord of a rod or its mirror image at rest, continued beyond its tip as an arc.
+
+    There its angle to the rod is exact, and the arc length good enough for a point beside the tip.
+    """
     row = _AT_REST + 1 if mirrored else _AT_REST
     x = 2.0 * min(distance / reach, 1.0) - 1.0
     arclength, bearing, slope, to_bearing, to_slope = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -323,13 +329,17 @@ def chord_in(sheet: Floats, mirrored: bool, reach: float, distance: float) -> Re
         bearing = bearing * x + sheet[row, _TERMS + k]
         slope = slope * x + sheet[row, 2 * _TERMS + k]
     at_point = slope - bearing
+    rate = 2.0 / reach * (to_slope - to_bearing)
     if distance <= reach:
-        return RestChord(arclength, bearing, at_point, 2.0 / reach * (to_slope - to_bearing))
-    arm = reach * math.sin(at_point)
-    angle = math.asin(arm / distance)
-    cos = math.cos(angle)
-    beyond = distance * cos - reach * math.cos(at_point)
-    return RestChord(arclength + beyond, slope - angle, angle, -arm / (distance * distance * cos))
+        return RestChord(arclength, bearing, at_point, rate)
+    # The lever r sin(angle) of an arc grows by its curvature times r.
+    curvature = rate * math.cos(at_point) + math.sin(at_point) / reach
+    lever = reach * math.sin(at_point) + 0.5 * curvature * (distance * distance - reach * reach)
+    sine = min(max(lever / distance, -1.0), 1.0)
+    cos = math.sqrt((1.0 - sine) * (1.0 + sine))
+    beyond, angle = (distance - reach) / math.cos(at_point), math.asin(sine)
+    rate = (curvature - sine / distance) / cos if cos > _ACROSS else 0.0
+    return RestChord(arclength + beyond, slope + curvature * beyond - angle, angle, rate)
 
 
 @cached
