@@ -28,7 +28,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import spawn
-from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.record import make_record
 from tactile_bayes.runs.demonstration import CONTOUR as DEMONSTRATED
@@ -82,7 +82,7 @@ def main() -> None:
                 *starting(),
             ]
         )
-        print(f"\n{error_of_one}\n{error_of_two}\n{error_of_likeliest}\n{rate}\n{draws}")
+        print(f"\n{error_of_one}\n{error_of_two}\n{error_of_likeliest}\n{rate}\n{draws}\n{other_rods()}")
         print("\nTime a piece, for ever more of them:")
         print_growth("state, equilibria", (1_000, 10_000, 100_000, 1_000_000), equilibria)
         print_growth("sample, reconstruct", (1_000, 10_000, 100_000, 1_000_000), reconstruct)
@@ -209,6 +209,27 @@ def sweeps(by_hand: float) -> list[Row]:
         ),
     ]
     return [Row(f"{what}: solve_ivp and root / ours", n * by_hand, best_time(job) / of) for what, n, job, of in rows]
+
+
+def other_rods() -> str:
+    """Time log-likelihoods of double sweeps of rods that are not straight and uniform; the compilation is not timed."""
+    rng, walkers = np.random.default_rng(1), contours(64)
+    sampled = Rig(taper=rng.normal(0.0, 0.05, 64), friction=abs(rng.normal(0.0, 0.2, 64)))
+    rods = {
+        "straight": (tb.Rod(), None),
+        "arc": (tb.Rod(rest_curvature=0.5), None),
+        "curved by a function": (tb.Rod(rest_curvature=lambda s: 0.6 * s), None),
+        "tapered by half": (tb.Rod(taper=0.5), None),
+        "taper and friction sampled": (tb.Rod(taper=0.5), sampled),
+    }
+    times = {}
+    for name, (rod, rig) in rods.items():
+        measured = CELL.measure(tb.scan(CONTOUR, drive_angles=ANGLES, rod=rod).record, seed=1)
+        likelihood = RecordLikelihood(measured, CELL)
+        times[name] = best_time(lambda of=likelihood, rig=rig: of.log_likelihood(walkers, rig=rig), 50) / 64
+    straight = times.pop("straight")
+    others = ", ".join(f"{name} {taken / straight:.2f}" for name, taken in times.items())
+    return f"Log-likelihood of a double sweep, straight rod: {straight * 1e6:.0f} µs; times as long: {others}"
 
 
 def data_set() -> tuple[Row, str]:
