@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import cumulative_simpson, solve_ivp
 from scipy.stats import chi2
 
 from helpers.refusals import refused
@@ -112,3 +112,15 @@ def test_points_of_no_rod_are_refused(x, y, named):
 def test_a_scatter_that_is_none_is_refused():
     with refused(ParameterError, scatter=-1.0):
         traced_rod(S, S, scatter=-1.0)
+
+
+def test_no_terms_are_added_for_the_sake_of_scatter():
+    """Polynomials of high degree swing at the ends: their curvature there would be off by its own size."""
+    s = np.linspace(0.0, 0.1, 40)
+    slope = 2.0 * s + 20.0 * s**2
+    x, y = (cumulative_simpson(way, x=s, initial=0.0) for way in (np.cos(slope), np.sin(slope)))
+    at = np.linspace(0.0, 1.0, 21)
+    for seed in (101, *range(20)):  # the first would take nine terms by the least criterion
+        rng = np.random.default_rng(seed)
+        found = traced_rod(x + rng.normal(0.0, 1e-4, s.size), y + rng.normal(0.0, 1e-4, s.size))
+        assert np.abs(found.rest_curvature(at) - 0.1 * (2.0 + 4.0 * at)).max() < 0.4

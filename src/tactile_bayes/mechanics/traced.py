@@ -2,9 +2,9 @@
 
 The rest curvature is a Chebyshev series in the arc length. With the pivot and the direction of the base it determines
 the centreline, which is fitted to the points by least squares of their distances from it: the arc length at which a
-point belongs to the rod is that of its foot. The number of terms is one more than the Bayesian information criterion
-chooses: the standard deviation of the curvature is then that of its errors, which were 0.8 to 1.25 standard deviations
-in drawn rods, and up to three with the number of the criterion.
+point belongs to the rod is that of its foot. The number of terms is one more than the least on which, by the
+Bayesian information criterion, the next do not improve strongly: the standard deviation of the curvature is then that
+of its errors, which were 0.8 to 1.25 standard deviations in drawn rods, and up to three without the further term.
 """
 
 from __future__ import annotations
@@ -30,6 +30,10 @@ _FEWEST = 8
 """Least number of points: three for an arc, and five for their scatter."""
 
 _MOST_TERMS = 9
+
+_STRONG = 10.0
+"""Difference of the Bayesian information criterion that is very strong evidence (Kass and Raftery 1995, doi
+10.1080/01621459.1995.10476572); for less no terms are added, since polynomials of high degree swing at the ends."""
 
 _NODES = 48
 """Nodes at which slopes of the centreline are interpolated."""
@@ -125,7 +129,8 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None) -> T
     start = _start_of(points)
     scaled = (points - points[0]) / start.length
     fits = [_fitted(scaled, start, terms) for terms in range(1, min(_MOST_TERMS, points.shape[0] - 6) + 1)]
-    best = int(np.argmin([fit.criterion for fit in fits]))
+    criteria = np.array([fit.criterion for fit in fits])
+    best = _enough(criteria)
     if fits[best].criterion == math.inf:
         raise ParameterError(
             "no smooth rod can be fitted to the points: give those of one rod in order, from the base to the tip"
@@ -157,6 +162,14 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None) -> T
     ends = chebyshev.coefficients(np.array([(1.0 - nodes) * rate - value, nodes * rate + value])) / share
     covariance = (used / start.length) ** 2 * (own @ fit.covariance @ own.T + ends @ ends.T)
     return TracedRod(length, used, curvature, covariance)
+
+
+def _enough(criteria: Floats) -> int:
+    """Index of the first fit on which neither of the next two improves strongly."""
+    for best, criterion in enumerate(criteria):
+        if criterion < math.inf and not np.any(criteria[best + 1 : best + 3] < criterion - _STRONG):
+            return best
+    return 0
 
 
 def _refuse_turns(points: Floats) -> None:
