@@ -31,6 +31,10 @@ from tactile_bayes.mechanics.taylor import (
 __all__ = ["at_contact", "part_along", "pose_along", "pose_along_and_slopes"]
 
 
+_MOST_STEPS = 1000
+"""Largest number of steps: a rod that takes more is loaded beyond all reason, as in the search for an equilibrium."""
+
+
 @compiled
 def pose_along(profile: Profile, psi1: float, arclength: float, force: float, work: Floats) -> Pose:
     """Pose for ψ1, arc length s1 and force f, in rod lengths and EI(0)/L²."""
@@ -47,10 +51,12 @@ def at_contact(profile: Profile, psi1: float, arclength: float) -> March:
 @compiled
 def part_along(profile: Profile, march: March, until: float, force: float, work: Floats) -> March:
     """March on toward the pivot, to an arc length."""
-    while march.at > until:
+    steps = 0
+    while march.at > until and steps < _MOST_STEPS:
+        steps += 1
         _, march = advance(profile, march, BACKWARD, until, force, work)
     # NaN of the arc length is that of series that overflow.
-    return march
+    return March(math.nan, march.cell, State(math.nan, math.nan, math.nan, math.nan)) if march.at > until else march
 
 
 @compiled
@@ -63,7 +69,9 @@ def pose_along_and_slopes(
     by_psi1, by_force = Slope(1.0, 0.0, 0.0), Slope(0.0, 0.0, 0.0)
     # A longer rod passes its former contact unloaded.
     by_arclength = Slope(-rest_curvature_at(profile, cell, at), math.cos(psi1), math.sin(psi1))
-    while at > 0.0:
+    steps = 0
+    while at > 0.0 and steps < _MOST_STEPS:
+        steps += 1
         length = at - profile.edges[cell]
         step = slope_series(profile, cell, at, length, force, state, by_psi1, by_arclength, by_force, work)
         state = moved(state, force, step, step.share, work)
@@ -72,7 +80,7 @@ def pose_along_and_slopes(
         if step.share == 1.0:
             at = profile.edges[cell]
             cell -= 1
-    u, v = state.u, state.v
+    u, v = (math.nan, math.nan) if at > 0.0 else (state.u, state.v)
     v_1 = u * by_psi1.psi - force * (by_psi1.u * by_force.psi - by_force.u * by_psi1.psi)
     v_s = math.sin(psi1) + u * by_arclength.psi
     v_s -= force * (by_arclength.u * by_force.psi - by_force.u * by_arclength.psi)
