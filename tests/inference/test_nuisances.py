@@ -312,12 +312,6 @@ def test_the_taper_is_inferred_about_the_stated_one():
             np.testing.assert_allclose(model.loads(point)[0], loads, atol=1e-6 * np.abs(loads).max())
 
 
-def test_the_taper_of_a_rod_with_a_diameter_is_not_inferred():
-    record = CELL.measure(scan(Parabola(0.5, 0.5), rod=Rod(diameter=0.02), drive_step=0.1).record, seed=1)
-    with refused(ParameterError, "taper cannot be inferred", "diameter"):
-        nuisances_of(record, ["taper"], {}, CELL, 0.0)
-
-
 @pytest.mark.parametrize("rod", [Rod(), SI], ids=["dimensionless", "SI"])
 def test_gains_biases_drifts_and_rigidity_change_what_is_sensed_as_they_say(rod):
     names = ["rigidity_scale", "moment_gain", "force_y_gain", "lever", "bias", "force_y_drift"]

@@ -12,7 +12,7 @@ from tactile_bayes.mechanics.elastica import contact_from_wrench
 from tactile_bayes.record import CHANNELS
 
 RODS = {
-    "tapered": tb.Rod(taper=0.5),
+    "tapered": tb.Rod(diameter=0.04, taper=0.5),
     "tapered and curved": tb.Rod(taper=0.9, rest_curvature=-0.4),
     "curved along it": tb.Rod(rest_curvature=lambda s: 0.8 * s - 0.5),
     "measured": tb.Rod(

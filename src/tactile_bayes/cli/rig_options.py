@@ -59,7 +59,7 @@ class RodOptions:
         typer.Option(help="Rod length [m], if no file states it; by default all is in units of the rod."),
     ] = None
     flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], with --length.")] = None
-    diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0
+    diameter: Annotated[float, typer.Option(help="Rod diameter [m], at the base.")] = 0.0
     rest_curvature: Annotated[
         float,
         typer.Option(help="Curvature of the unloaded rod, an arc [1/m, or 1/L]; > 0 counter-clockwise from the base."),
@@ -88,10 +88,10 @@ class RodOptions:
         from tactile_bayes.mechanics.rod import Rod
 
         if self.rod_shape is not None:
-            if self.length is not None or self.rest_curvature or self.diameter:
+            if self.length is not None or self.rest_curvature:
                 raise ParameterError("--rod-shape gives length and rest curvature: leave out the options of these")
             x, y = points_in(self.rod_shape)
-            return Rod.from_shape(x, y, self.flexural_rigidity, taper=self.taper)
+            return Rod.from_shape(x, y, self.flexural_rigidity, diameter=self.diameter, taper=self.taper)
         if (self.length is None) != (self.flexural_rigidity is None):
             raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
         if self.diameter and self.length is None:

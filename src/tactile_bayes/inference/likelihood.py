@@ -225,12 +225,11 @@ class RecordLikelihood:
             return NO_TABLE
         varied = bool(np.any(rig.taper)), bool(np.any(rig.rest_curvature)), bool(np.any(rig.friction != self.friction))
         if varied not in self._tables:
-            taper, angle = self.rod.taper, float(np.arctan(self.friction))
-            box = Box(
-                (max(taper - _TAPER, 0.0), min(taper + _TAPER, STEEPEST_TAPER)) if varied[0] else (taper, taper),
-                (-_BEND, _BEND) if varied[1] else (0.0, 0.0),
-                _FRICTION_ANGLE if varied[2] else (angle, angle),
-            )
+            taper, angle, surface = self.rod.taper, float(np.arctan(self.friction)), self.rod.surface
+            tapers = (max(taper - _TAPER, 0.0), min(taper + _TAPER, STEEPEST_TAPER)) if varied[0] else (taper, taper)
+            least, most = (surface._replace(taper=end).half_angle for end in tapers)
+            low, high = _FRICTION_ANGLE if varied[2] else (angle, angle)
+            box = Box(tapers, (-_BEND, _BEND) if varied[1] else (0.0, 0.0), (low - most, high - least))
             self._tables[varied] = forward_table(profile, box)
         return self._tables[varied]
 

@@ -277,11 +277,6 @@ def _unidentifiable(measured: xr.Dataset) -> dict[str, str]:
             f"every sweep is {only}, and in one direction it cannot be distinguished from drive_angle_offset; "
             "infer that"
         )
-    if rod_of(measured).diameter:
-        reasons["taper"] = (
-            "the rod has a diameter, and contact beside the centreline of a tapered rod is not modelled; state the rod "
-            "without it"
-        )
     return reasons
 
 

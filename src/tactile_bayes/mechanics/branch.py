@@ -42,6 +42,7 @@ from tactile_bayes.mechanics.equilibrium import (
     nowhere,
     settle,
     settle_at,
+    tangential_psi1,
 )
 from tactile_bayes.mechanics.leg import (
     NUDGE,
@@ -57,7 +58,7 @@ from tactile_bayes.mechanics.leg import (
     shortened,
 )
 from tactile_bayes.mechanics.limits import approach
-from tactile_bayes.mechanics.outline import ends, is_inside, place
+from tactile_bayes.mechanics.outline import Place, ends, is_inside, narrower, place
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import (
     Asked,
@@ -192,11 +193,11 @@ def _excess(accuracy: Accuracy, tolerance: Floats, dips: bool, work: LegCurves) 
 
 
 @compiled
-def _change(leg: Leg, delta: float, accuracy: Accuracy, work: LegCurves) -> float:
+def _change(leg: Leg, psi1: float, accuracy: Accuracy, work: LegCurves) -> float:
     """Position at which the phase changes; above 1 if it does not."""
     curves, limit, sign = work.curves, 1.0, 1.0
     if leg.tip:
-        limit, sign = -delta, -1.0
+        limit, sign = psi1, -1.0
     on, rest = curves.on, curves.series[REST]
     weighted(on.on_grid, rest, curves.on_grid)
     for cell in range(1, on.grid.size):
@@ -287,13 +288,13 @@ def follow_branch(
     near = approach(scene.outline, scene.beam, accuracy.first_step)
     if near.reach != _TOUCHES:
         return _nothing(near.reach, near.distance, math.nan)
-    low, delta = near.low, rig.friction_angle
+    low, psi1 = near.low, tangential_psi1(scene)
     loaded = in_phase(scene, near.tip_first)
     z = first_equilibrium(loaded, near)
     begin = balance(loaded, z)[0]
     first = begin.drive_angle
     onward_from, nothing = Equilibrium(0.0, 0.0, 1.0), nowhere()
-    if loaded.tip and z.q + delta < 0.0:
+    if loaded.tip and z.q < psi1:
         return _nothing(_TOUCHES_TWICE, near.distance, z.p)
     behind_begin, length, known = nothing, _FIRST, 0.0
     settled, power = max(SETTLED, 0.1 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
@@ -330,9 +331,9 @@ def follow_branch(
         if not sound:
             break
         excess_before = math.inf
-        change, at_change = _change(leg, delta, accuracy, work), begin
+        change, at_change = _change(leg, psi1, accuracy, work), begin
         if change <= 1.0:
-            limit = Equilibrium(0.0, -delta if leg.tip else 1.0, 0.0)
+            limit = Equilibrium(0.0, psi1 if leg.tip else 1.0, 0.0)
             at_change = settle(loaded, guess(work, change), limit, _BY_Q, 0.0, SETTLED)
             change = min(max(_share(leg, at_change), 0.0), 1.0)
         last, behind = min(change, 1.0), -1.0
@@ -386,7 +387,7 @@ def follow_branch(
             onward_from = begin.tangent
         elif change <= 1.0:
             loaded = in_phase(scene, not leg.tip)
-            begin = balance(loaded, Equilibrium(at_change.at.p, 1.0 if leg.tip else -delta, at_change.at.force))[0]
+            begin = balance(loaded, Equilibrium(at_change.at.p, 1.0 if leg.tip else psi1, at_change.at.force))[0]
             onward_from = Equilibrium(0.0, -1.0 if leg.tip else 1.0, 0.0)
         elif math.isnan(knot):
             behind_begin = last_before
@@ -442,30 +443,38 @@ def _second_contact(scene: Scene, leg: Leg, goes_on: bool, stop: float, work: Le
         if k > 0 and work.nodes[k] > stop:
             break
         p, q = work.at_nodes[PLACE, k], work.at_nodes[REST, k]
-        spot = place(outline, p)
+        spot = narrower(outline, place(outline, p), 1.0 if leg.tip else q)
         if not leg.tip and spot.bend <= rest_curvature(beam, q) * spot.speed:
             return p
         if not scene.exact and 0 < k < work.nodes.size - 1 and work.nodes[k + 1] <= stop:
             continue
         if leg.tip:
-            turned = q + scene.rig.friction_angle
+            turned = q - tangential_psi1(scene)
             if 0.5 * beam.most_curvature <= turned <= _ACROSS:  # the rod is bent toward the object no more than at rest
                 continue
             force, part = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k]), from_tip(beam, q)
             for j in range(1, _BODY):
-                part, delta = loaded_part(beam, q, force, j / _BODY, part), scene.rig.friction_angle
-                cos = spot.cos * math.cos(delta) - spot.sin * math.sin(delta)
-                sin = spot.sin * math.cos(delta) + spot.cos * math.sin(delta)
+                part = loaded_part(beam, q, force, j / _BODY, part)
+                cos, sin = _along(spot, scene.rig.friction_angle)
                 u, v = part.state.u, part.state.v
                 x, y = -u * cos + v * sin, -u * sin - v * cos
-                if y * spot.cos > x * spot.sin and is_inside(outline, spot.x + x, spot.y + y, low, high):
+                beside = 1.0 - j / _BODY
+                if y * spot.cos > x * spot.sin and is_inside(outline, beside, spot.x + x, spot.y + y, low, high):
                     return p
         elif q < 1.0:
             along, across = free_end(beam, q, 1.0)
-            x, y = along * spot.cos - across * spot.sin, along * spot.sin + across * spot.cos
-            if is_inside(outline, spot.x + x, spot.y + y, low, high):
+            cos, sin = _along(spot, outline.half_angle)
+            x, y = along * cos - across * sin, along * sin + across * cos
+            if is_inside(outline, 1.0, spot.x + x, spot.y + y, low, high):
                 return p
     return math.nan
+
+
+@compiled
+def _along(spot: Place, turn: float) -> tuple[float, float]:
+    """Direction turned from that of the contour."""
+    cos, sin = math.cos(turn), math.sin(turn)
+    return spot.cos * cos - spot.sin * sin, spot.sin * cos + spot.cos * sin
 
 
 @compiled

@@ -76,12 +76,12 @@ class Contact(NamedTuple):
     """Parameter m of the elliptic integrals; the curvature of the whole elastica has a zero if and only if m < 1."""
 
 
-def _refuse_friction(friction_angle: Floats) -> None:
-    bad = ~((friction_angle >= 0.0) & (friction_angle <= MAX_FRICTION_ANGLE))
+def _refuse_friction(friction_angle: Floats, least: float = 0.0) -> None:
+    bad = ~((friction_angle >= least) & (friction_angle <= MAX_FRICTION_ANGLE))
     if np.any(bad):
         found = float(friction_angle[bad].flat[0])
         raise ParameterError(
-            f"the friction angle is {found:g} rad: give one between 0 and "
+            f"the friction angle is {found:g} rad: give one between {least:g} and "
             f"{MAX_FRICTION_ANGLE} (coefficient {np.tan(MAX_FRICTION_ANGLE):.2f}); beyond, a rod would loop before it "
             "slides"
         )
@@ -209,7 +209,7 @@ def _states(
     from tactile_bayes.mechanics.states import continued_wrenches, wrenches
     from tactile_bayes.mechanics.tables import tables, workspace
 
-    _refuse_friction(np.asarray(delta, dtype=float))
+    _refuse_friction(np.asarray(delta, dtype=float), 0.0 if profile is None else -MAX_FRICTION_ANGLE)
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
     of_rods = sign * (curvature if profile is None else profile.sign)
     given = np.broadcast_arrays(sign * x, y, sign * alpha, delta, of_rods, phase)
@@ -299,7 +299,7 @@ def contact_from_wrench(
     if side is None:
         side = np.where(moment < 0.0, -1.0, 1.0)
     delta = np.asarray(friction_angle, dtype=float)
-    _refuse_friction(delta)
+    _refuse_friction(delta, 0.0 if profile is None else -MAX_FRICTION_ANGLE)
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
     phi0 = np.where(mirrored, np.pi - np.asarray(drive_angle), drive_angle)

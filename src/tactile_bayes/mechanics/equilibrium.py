@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from tactile_bayes.mechanics.beam import Beam, beam_pose
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.outline import Outline, place
+from tactile_bayes.mechanics.outline import Outline, narrower, place
 
 __all__ = [
     "SETTLED",
@@ -35,6 +35,7 @@ __all__ = [
     "nowhere",
     "settle",
     "settle_at",
+    "tangential_psi1",
     "times",
 ]
 
@@ -63,6 +64,8 @@ class Loaded(NamedTuple):
     friction_angle: float
     compliance: float
     tip: bool
+    psi1: float
+    """ψ1 in tangential contact [rad]."""
 
 
 class Rig(NamedTuple):
@@ -116,6 +119,7 @@ class _Equations(NamedTuple):
     by_u: Equilibrium
     by_v: Equilibrium
     angle_by: Equilibrium
+    lever_by_q: float
     bend: float
 
 
@@ -123,25 +127,33 @@ class _Equations(NamedTuple):
 def in_phase(scene: Scene, tip: bool) -> Loaded:
     """Rod in one phase of contact."""
     rig = scene.rig
-    return Loaded(scene.outline, scene.beam, rig.friction_angle, rig.compliance, tip)
+    return Loaded(scene.outline, scene.beam, rig.friction_angle, rig.compliance, tip, tangential_psi1(scene))
+
+
+@compiled
+def tangential_psi1(scene: Scene) -> float:
+    """ψ1 of a rod that lies along the contour with its surface [rad]."""
+    return scene.outline.half_angle - scene.rig.friction_angle
 
 
 @compiled
 def balance(loaded: Loaded, at: Equilibrium) -> tuple[Balance, _Equations]:
     """Loads and tangent at a point near the branch."""
     delta, p, q, force = loaded.friction_angle, at.p, at.q, max(at.force, 0.0)
-    spot = place(loaded.outline, p)
+    psi1, length = (q, 1.0) if loaded.tip else (loaded.psi1, q)
+    spot = narrower(loaded.outline, place(loaded.outline, p), length)
     sin_delta, cos_delta = math.sin(delta), math.cos(delta)
     sin, cos = spot.sin * cos_delta + spot.cos * sin_delta, spot.cos * cos_delta - spot.sin * sin_delta
     along, across = spot.x * cos + spot.y * sin, spot.y * cos - spot.x * sin
-    psi1, length = (q, 1.0) if loaded.tip else (-delta, q)
     here, by_q, by_force = beam_pose(loaded.beam, psi1, length, force, loaded.tip)
-    by_u = Equilibrium(spot.speed * cos_delta + spot.bend * across, -by_q.u, -by_force.u)
-    by_v = Equilibrium(-spot.speed * sin_delta - spot.bend * along, -by_q.v, -by_force.v)
+    closer = 0.0 if loaded.tip else loaded.outline.narrowing
+    lever_by_q = closer * sin_delta
+    by_u = Equilibrium(spot.speed * cos_delta + spot.bend * across, lever_by_q - by_q.u, -by_force.u)
+    by_v = Equilibrium(-spot.speed * sin_delta - spot.bend * along, closer * cos_delta - by_q.v, -by_force.v)
     moment, compliance = force * along, loaded.compliance
     angle_by = Equilibrium(
         spot.bend + compliance * force * by_u.p,
-        by_q.turn + (1.0 if loaded.tip else 0.0),
+        by_q.turn + (1.0 if loaded.tip else 0.0) + compliance * force * lever_by_q,
         by_force.turn + compliance * along,
     )
     angle = math.atan2(sin, cos) + psi1 + here.turn + compliance * moment
@@ -155,11 +167,11 @@ def balance(loaded: Loaded, at: Equilibrium) -> tuple[Balance, _Equations]:
         force * cos,
         tangent,
         dot(angle_by, tangent),
-        force * by_u.p * tangent.p + along * tangent.force,
+        force * (by_u.p * tangent.p + lever_by_q * tangent.q) + along * tangent.force,
         -sin * tangent.force - cos * turning,
         cos * tangent.force - sin * turning,
     )
-    return found, _Equations(along - here.u, across - here.v, by_u, by_v, angle_by, spot.bend)
+    return found, _Equations(along - here.u, across - here.v, by_u, by_v, angle_by, lever_by_q, spot.bend)
 
 
 @compiled
@@ -174,7 +186,7 @@ def settle(
     at = start
     for _ in range(_MOST_STEPS):
         found, equations = balance(loaded, at)
-        miss_u, miss_v, by_u, by_v, angle_by, bend = equations
+        miss_u, miss_v, by_u, by_v, angle_by, lever_by_q, bend = equations
         off = dot(normal, less(at, origin)) - level
         det = dot(normal, found.tangent)
         first, second, third = _cross(by_v, normal), _cross(normal, by_u), found.tangent
@@ -190,7 +202,7 @@ def settle(
             angle = found.drive_angle - dot(angle_by, Equilibrium(dp, dq, df))
             before = found.at.force
             lever = found.holding_moment / before if before > 0.0 else 0.0
-            moment = found.holding_moment - df * lever - before * by_u.p * dp
+            moment = found.holding_moment - df * lever - before * (by_u.p * dp + lever_by_q * dq)
             share, turn = (-df / before if before > 0.0 else 0.0), -bend * dp
             force_x = found.force_x + share * found.force_x - turn * found.force_y
             force_y = found.force_y + share * found.force_y + turn * found.force_x

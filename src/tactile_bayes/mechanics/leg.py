@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.beam import chord_to
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, REST, Curves, curves_of
 from tactile_bayes.mechanics.equilibrium import Balance, Equilibrium, Loaded, dot, less, settle, times
-from tactile_bayes.mechanics.limits import Approach
+from tactile_bayes.mechanics.limits import Approach, touch
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.series import value_and_slope, weighted
 from tactile_bayes.numerics import chebyshev
@@ -102,8 +101,7 @@ def _onward(nodes: Floats) -> Floats:
 @compiled
 def first_equilibrium(loaded: Loaded, found: Approach) -> Equilibrium:
     """Equilibrium without force at first contact."""
-    at = place(loaded.outline, found.begin)
-    chord = chord_to(loaded.beam, math.hypot(at.x, at.y))
+    at, chord = touch(loaded.outline, loaded.beam, found.begin, found.tip_first)
     if found.tip_first:
         psi1 = math.atan2(at.y, at.x) + chord.at_point - math.atan2(at.sin, at.cos) - loaded.friction_angle
         return Equilibrium(found.begin, psi1, 0.0)

@@ -9,13 +9,13 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from tactile_bayes.mechanics.beam import Beam, chord_to, mirrored_beam
+from tactile_bayes.mechanics.beam import Beam, Chord, chord_to, mirrored_beam
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
-from tactile_bayes.mechanics.outline import Outline, ends, frame, mirrored, place
+from tactile_bayes.mechanics.outline import Outline, Place, ends, frame, mirrored, narrower, place
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
-__all__ = ["Approach", "approach", "clear_angle"]
+__all__ = ["Approach", "approach", "clear_angle", "touch"]
 
 
 class _Sought(IntEnum):
@@ -32,6 +32,9 @@ class _Sought(IntEnum):
 _TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reachability.TOUCHES), int(Reachability.TOO_FAR), int(Reachability.CUTS_PIVOT)
 _ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reachability.ENDS), int(Reachability.TOO_CLOSE), int(Reachability.RUNS_OUT)
 _CLEARANCE = CLEARANCE
+
+_MOST_MOVES = 50
+"""Largest number of corrections of a standoff. Each reduces the error to a share of the order of the cone's angle."""
 
 _ROUNDING = 1e-14
 """Distance from the end of the rod's reach [L] that counts as zero."""
@@ -53,20 +56,39 @@ class Approach(NamedTuple):
 
 
 @compiled
+def touch(outline: Outline, beam: Beam, p: float, tip: bool) -> tuple[Place, Chord]:
+    """Point beside which the unloaded rod lies at a contact, and the chord to it."""
+    at = place(outline, p)
+    narrow = narrower(outline, at, 1.0)
+    chord = chord_to(beam, math.hypot(narrow.x, narrow.y))
+    if tip or outline.narrowing == 0.0:
+        return narrow, chord
+    for _ in range(_MOST_MOVES):
+        before = chord.arclength
+        narrow = narrower(outline, at, before)
+        chord = chord_to(beam, math.hypot(narrow.x, narrow.y))
+        if not abs(chord.arclength - before) > _ROUNDING:
+            break
+    return narrow, chord
+
+
+@compiled
 def _missing(outline: Outline, beam: Beam, what: _Sought, p: float) -> tuple[float, float]:
     """Function whose root is sought, and its derivative."""
     at = place(outline, p)
-    along, facing = frame(at)
     if what == _Sought.LEVER:
+        along, facing = frame(at)
         return along, at.speed + facing * at.bend
     if what == _Sought.WITHIN:
+        at = narrower(outline, at, 1.0)
+        along = frame(at)[0]
         return beam.reach * beam.reach - at.x * at.x - at.y * at.y, -2.0 * along * at.speed
     # The angle between the line from the pivot and the contour's direction grows to the left as long as the contour
     # faces the pivot. It jumps below the pivot, where no contour is.
-    bearing = math.atan2(-at.x, at.y) + 0.5 * math.pi
-    distance = math.hypot(at.x, at.y)
-    chord = chord_to(beam, distance)
-    angle = bearing - math.atan2(at.sin, at.cos) + chord.at_point
+    at, chord = touch(outline, beam, p, False)
+    along, facing = frame(at)
+    bearing, distance = math.atan2(-at.x, at.y) + 0.5 * math.pi, math.hypot(at.x, at.y)
+    angle = bearing - math.atan2(at.sin, at.cos) + chord.at_point - outline.half_angle
     return -angle, facing * at.speed / (distance * distance) + at.bend - chord.rate * along * at.speed / distance
 
 
@@ -99,7 +121,7 @@ def _nearest(outline: Outline, beam: Beam, low: float, high: float, last_step: f
 
 @compiled
 def _is_out(outline: Outline, beam: Beam, p: float) -> bool:
-    at = place(outline, p)
+    at = narrower(outline, place(outline, p), 1.0)
     return math.hypot(at.x, at.y) > beam.reach
 
 
@@ -119,15 +141,16 @@ def approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
     nearest, beyond_high, beyond_low = _nearest(outline, beam, low, high, last_step)
     at = place(outline, nearest)
     distance, below = math.hypot(at.x, at.y), frame(at)[1] > 0.0
+    at_tip = narrower(outline, at, 1.0)
     begin, tip_first = _first(outline, beam, high, nearest, last_step)
-    at_high = place(outline, high)
+    at_high = narrower(outline, place(outline, high), 1.0)
     open_end = frame(at_high)[1] > 0.0 and math.hypot(at_high.x, at_high.y) <= beam.reach
     reach = _TOUCHES
     if not below:
         reach = _RUNS_OUT if beyond_low and not beyond_high else _CUTS_PIVOT
     elif distance < _CLEARANCE:
         reach = _TOO_CLOSE
-    elif distance >= beam.reach - _ROUNDING:
+    elif math.hypot(at_tip.x, at_tip.y) >= beam.reach - _ROUNDING:
         reach = _TOO_FAR
     elif beyond_high or open_end:
         reach = _ENDS
@@ -140,6 +163,6 @@ def clear_angle(outline: Outline, beam: Beam, last_step: float) -> float:
     opposite, of_opposite = mirrored(outline), mirrored_beam(beam)
     low, high = ends(opposite)
     nearest = _nearest(opposite, of_opposite, low, high, last_step)[0]
-    begin, _ = _first(opposite, of_opposite, high, nearest, last_step)
-    at = place(opposite, begin)
-    return math.pi - (math.atan2(at.y, at.x) - chord_to(of_opposite, math.hypot(at.x, at.y)).at_base)
+    begin, tip_first = _first(opposite, of_opposite, high, nearest, last_step)
+    at, chord = touch(opposite, of_opposite, begin, tip_first)
+    return math.pi - (math.atan2(at.y, at.x) - chord.at_base)

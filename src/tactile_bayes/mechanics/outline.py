@@ -1,7 +1,9 @@
 """One contour in the sweep frame: relative to the pivot, in rod lengths, mirrored for a backward sweep.
 
 An outline consists of two halves of families with a formula, from a common vertex, or of a table. The rod's centreline
-stays half the rod's diameter outside the object: it traces the parallel curve, which is strictly convex too.
+stays half the rod's diameter outside the object: it traces the parallel curve, which is strictly convex too. A tapered
+rod is a cone of half angle ε. Its contact is stated by the arc length s at which the normal of its surface meets the
+centreline; there the centreline is (d/2 − s tan ε) cos ε from the object, with the diameter d at the base.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = ["Half", "Outline", "Place", "ends", "frame", "is_inside", "mirrored", "place"]
+__all__ = ["Half", "Outline", "Place", "ends", "frame", "is_inside", "mirrored", "narrower", "on_object", "place"]
 
 _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3
@@ -49,6 +51,11 @@ class Outline(NamedTuple):
     y: float
     """Vertex."""
     standoff: float
+    """Distance of the centreline at the base of the rod."""
+    half_angle: float
+    """Half angle ε of the cone [rad]."""
+    narrowing: float
+    """Distance less per arc length, sin ε."""
     table: Floats
     """In rod lengths."""
 
@@ -70,13 +77,13 @@ class Place(NamedTuple):
 @compiled
 def mirrored(outline: Outline) -> Outline:
     """Outline in the frame of the opposite sweep."""
-    left, right, low, high, sign, x, y, standoff, table = outline
-    return Outline(right, left, -high, -low, -sign, -x, y, standoff, table)
+    left, right, low, high, sign, x, y, standoff, half_angle, narrowing, table = outline
+    return Outline(right, left, -high, -low, -sign, -x, y, standoff, half_angle, narrowing, table)
 
 
 @compiled
 def place(outline: Outline, p: float) -> Place:
-    """Point at a parameter."""
+    """Point at a parameter, beside which the base of the rod would lie."""
     kind, size, shape, unit = outline.left if p < 0.0 else outline.right
     if kind == PARABOLA:
         t = math.tan(p)
@@ -111,6 +118,19 @@ def place(outline: Outline, p: float) -> Place:
         sin, cos = math.sin(outline.sign * alpha), math.cos(alpha)
     d = outline.standoff
     return Place(outline.x + x + d * sin, outline.y + y - d * cos, sin, cos, speed + d * bend, bend)
+
+
+@compiled
+def narrower(outline: Outline, at: Place, arclength: float) -> Place:
+    """Point beside which the rod lies with an arc length, from that of its base."""
+    d = outline.narrowing * arclength
+    return Place(at.x - d * at.sin, at.y + d * at.cos, at.sin, at.cos, at.speed - d * at.bend, at.bend)
+
+
+@compiled
+def on_object(outline: Outline, at: Place) -> tuple[float, float]:
+    """Point of the object itself, from that of the base."""
+    return at.x - outline.standoff * at.sin, at.y + outline.standoff * at.cos
 
 
 @compiled
@@ -179,18 +199,24 @@ def frame(at: Place) -> tuple[float, float]:
 
 
 @compiled
-def is_inside(outline: Outline, x: float, y: float, low: float, high: float) -> bool:
-    """Whether a point is within the object as far as it is known: between contour and chord of two of its points."""
-    left, right = place(outline, low), place(outline, high)
+def is_inside(outline: Outline, arclength: float, x: float, y: float, low: float, high: float) -> bool:
+    """Whether the rod at an arc length is within the object as far as it is known: between contour and chord of two of
+    its points."""
+    left, right = _beside(outline, low, arclength), _beside(outline, high, arclength)
     if not (left.x < x < right.x and (y - left.y) * (right.x - left.x) < (x - left.x) * (right.y - left.y)):
         return False
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if place(outline, middle).x < x:
+        if _beside(outline, middle, arclength).x < x:
             low = middle
         else:
             high = middle
-    return y > place(outline, high).y
+    return y > _beside(outline, high, arclength).y
+
+
+@compiled
+def _beside(outline: Outline, p: float, arclength: float) -> Place:
+    return narrower(outline, place(outline, p), arclength)
 
 
 @compiled

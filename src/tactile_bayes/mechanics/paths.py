@@ -32,7 +32,7 @@ class States(NamedTuple):
     """Parameter of the contour in the sweep frame."""
     x: Floats
     y: Floats
-    """Point of the rod's centreline at the contact."""
+    """Contact point on the object."""
     slope_angle: Floats
     wrench: Wrench
 

@@ -63,7 +63,7 @@ class Bending(NamedTuple):
     at: float
     """Arc length at which it is found [L]."""
     strain: float
-    """Largest such difference times the diameter, over that at the base, of a rod of round cross-section [1/L]."""
+    """Largest such difference times the diameter, over that at the base [1/L]."""
     strain_at: float
 
 
@@ -179,11 +179,11 @@ def largest_bending_along(
         for k in range(_SAMPLES + 1):
             x = step.share * k / _SAMPLES
             here = before.at + x * step.length
-            bending, rigidity = bending_at(step, moved(before.state, force, step, x, work).load, x, work)
+            bending, _ = bending_at(step, moved(before.state, force, step, x, work).load, x, work)
             bent = abs(bending)
             if bent > curvature:
                 curvature, at = bent, here
-            bent *= math.sqrt(math.sqrt(rigidity))
+            bent *= 1.0 - profile.taper * here
             if bent > strain:
                 strain, strain_at = bent, here
     return Bending(curvature, at, strain, strain_at)

@@ -12,7 +12,7 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, REST, WAY, Accuracy, Course, Curves, lay_over_angle, left_of
 from tactile_bayes.mechanics.equilibrium import SETTLED, Balance, Scene, in_phase
 from tactile_bayes.mechanics.leg import Leg, LegCurves, guess, settle_on
-from tactile_bayes.mechanics.outline import place
+from tactile_bayes.mechanics.outline import on_object, place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
 
@@ -189,8 +189,10 @@ def _write_place(p: float, q: float, tip: bool, scene: Scene, states: Floats) ->
     at = place(scene.outline, p)
     alpha = math.atan2(at.sin, at.cos)
     states[0] = TIP if tip else TANGENTIAL
-    states[1], states[2], states[3], states[4] = p, at.x, at.y, alpha
-    states[9], states[10] = (1.0, alpha + scene.rig.friction_angle + q) if tip else (q, alpha)
+    states[1], states[4] = p, alpha
+    states[2], states[3] = on_object(scene.outline, at)
+    tip_angle = alpha + (scene.rig.friction_angle + q if tip else scene.outline.half_angle)
+    states[9], states[10] = 1.0 if tip else q, tip_angle
     states[11], states[12] = math.nan, math.nan
 
 

@@ -15,6 +15,7 @@ from tactile_bayes.checks import check_number, check_positive
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.along import Along, along
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile, Rods, profile_of
+from tactile_bayes.mechanics.surface import Surface
 
 __all__ = ["LARGEST_STRAIN", "Rod"]
 
@@ -45,8 +46,8 @@ class Rod:
     flexural_rigidity : float
         Young's modulus times second moment of area, EI, at the base [N m²].
     diameter : float
-        Diameter of a rod of circular cross-section [m]. The rod touches with its surface, half a diameter beside
-        its centreline; 0 (the default) stands for a rod without thickness.
+        Diameter of a rod of circular cross-section [m], at the base if it is tapered. The rod touches with its surface,
+        half a diameter beside its centreline; 0 (the default) stands for a rod without thickness.
     elastic_strain : float, optional
         Largest bending strain without permanent deformation: about 0.002 for mild steel, 0.005 for spring steel, 0.05
         for nitinol. `scan` warns if a rod with a diameter is bent beyond it. Records do not state it.
@@ -58,7 +59,7 @@ class Rod:
         The diameter falls linearly to (1 − taper) of that at the base, and the flexural rigidity with its fourth power.
     rigidity_profile : callable or (s, EI/EI0), optional
         Flexural rigidity along the rod over that at the base, as a function or arrays like the rest curvature; by
-        default constant. A taper comes on top of it.
+        default constant. A taper comes on top of it, and alone changes the diameter.
     rest_curvature_deviation : float
         Standard deviation of the mean rest curvature [1/m], if it was measured (`from_shape`): that of the nuisance
         parameter `rest_curvature` in its default prior.
@@ -68,8 +69,7 @@ class Rod:
     ParameterError
         If length or flexural rigidity is not positive and finite, the diameter is negative or larger than the length,
         the elastic strain is not positive, a taper is not from 0 to 0.95, a property along the rod is invalid, or the
-        rod at rest curls back toward its base, as an arc of more than a half circle does. A rod that is tapered, or has
-        a rigidity profile, cannot have a diameter: contact is then on its centreline.
+        rod at rest curls back toward its base, as an arc of more than a half circle does.
 
     Examples
     --------
@@ -112,11 +112,6 @@ class Rod:
         correction = "give zero, for an unknown one, or a positive number [1/m]"
         check_number("the rod's rest_curvature_deviation", self.rest_curvature_deviation, correction, least=0.0)
         self._refuse_curl()
-        if self.diameter and not self.is_uniform:
-            raise ParameterError(
-                f"the rod has the diameter {self.diameter!r} and is not uniform: contact beside the centreline of a "
-                "tapered rod is not modelled; leave the diameter out, which puts the contact on the centreline"
-            )
         square = float(self.length) * float(self.length)
         if not (square > 0.0 and 0.0 < float(self.flexural_rigidity) / square < math.inf):
             raise ParameterError(
@@ -163,17 +158,18 @@ class Rod:
         diameter: float,
         youngs_modulus: float,
         elastic_strain: float | None = None,
-        rest_curvature: float = 0.0,
+        rest_curvature: Any = 0.0,
+        taper: float = 0.0,
     ) -> Rod:
         """Rod of solid circular cross-section: EI = E π d⁴ / 64.
 
         Parameters
         ----------
         length, diameter : float
-            Length and diameter [m].
+            Length, and diameter at the base [m].
         youngs_modulus : float
             Young's modulus E [Pa].
-        elastic_strain, rest_curvature : float, optional
+        elastic_strain, rest_curvature, taper
             As in `Rod`.
 
         Returns
@@ -194,7 +190,7 @@ class Rod:
         for name, value in (("diameter", diameter), ("youngs_modulus", youngs_modulus)):
             check_positive(f"the rod's {name}", value)
         fourth = float(diameter) ** 4 if diameter < _THICKEST else math.inf
-        return cls(length, youngs_modulus * math.pi * fourth / 64, diameter, elastic_strain, rest_curvature)
+        return cls(length, youngs_modulus * math.pi * fourth / 64, diameter, elastic_strain, rest_curvature, taper)
 
     @classmethod
     def from_shape(
@@ -204,6 +200,7 @@ class Rod:
         flexural_rigidity: float | None = None,
         *,
         scatter: float | None = None,
+        diameter: float = 0.0,
         taper: float = 0.0,
         rigidity_profile: Any = None,
     ) -> Rod:
@@ -222,6 +219,8 @@ class Rod:
             EI at the base [N m²]. By default the rod is dimensionless, and the points are in any unit of length.
         scatter : float, optional
             Standard deviation of each coordinate, in the unit of the points; estimated from them by default.
+        diameter : float
+            As in `Rod`, in the unit of the points.
         taper, rigidity_profile
             As in `Rod`.
 
@@ -250,6 +249,7 @@ class Rod:
         return cls(
             length,
             rigidity,
+            diameter * length / traced.length,
             rest_curvature=lambda s: traced.rest_curvature(s / length) / length,
             taper=taper,
             rigidity_profile=rigidity_profile,
@@ -326,6 +326,11 @@ class Rod:
         """Return rest curvature and rigidity along the rod, dimensionless, of an arc too."""
         own = self.in_lengths()
         return profile_of(own.rest_curvature, 1.0 if own.rigidity_profile is None else own.rigidity_profile, own.taper)
+
+    @property
+    def surface(self) -> Surface:
+        """Surface of the rod, dimensionless."""
+        return Surface(0.5 * self.diameter / self.length, self.taper)
 
     @property
     def is_dimensionless(self) -> bool:

@@ -160,7 +160,10 @@ def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
                 table[r, k] = shapes.tables[c, r, k] / (length if begin <= k < end else 1.0)
     x, y = (of[4] - sweep.base_x) / length, (of[5] - sweep.base_y) / length
     low = -left.size if kind == SLOPES else left.size
-    outline = Outline(left, right, low, right.size, 1.0, x, y, sweep.standoff / length, table)
+    standoff = sweep.standoff / length
+    half_angle = math.atan(standoff * sweep.taper)
+    sin, cos = math.sin(half_angle), math.cos(half_angle)
+    outline = Outline(left, right, low, right.size, 1.0, x, y, standoff * cos, half_angle, sin, table)
     return mirrored(outline) if sweep.backward else outline
 
 
@@ -169,17 +172,19 @@ def _scene(shapes: Shapes, varied: Varied | None, known: ForwardTable, sweep: An
     """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
     sign = -1.0 if sweep.backward else 1.0
     rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
-    return Scene(_outline(shapes, sweep, table), _beam(varied, known, sweep, sign), rig, exact)
+    outline = _outline(shapes, sweep, table)
+    beam = _beam(varied, known, sweep, sign, sweep.friction_angle - outline.half_angle)
+    return Scene(outline, beam, rig, exact)
 
 
 @compiled
-def _beam(varied: Varied | None, table: ForwardTable, sweep: Any, sign: float) -> Beam:
-    """Rod of a sweep."""
+def _beam(varied: Varied | None, table: ForwardTable, sweep: Any, sign: float, lean: float) -> Beam:
+    """Rod of a sweep; −ψ1 in tangential contact is wanted from its table."""
     if varied is None:
         return beam_of(sign * sweep.rest_curvature, varied)
     edges, curvature, rigidity, _, bend, _ = varied.profile
     of_sweep = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
-    slenderness = table.slenderness if prepare(table, of_sweep, sweep.friction_angle, varied.sheet) else 0.0
+    slenderness = table.slenderness if prepare(table, of_sweep, lean, varied.sheet) else 0.0
     return beam_of(0.0, Varied(of_sweep, varied.work, varied.sheet, slenderness, sign))
 
 

@@ -18,6 +18,7 @@ from tactile_bayes.mechanics.contact_coordinates import (
     place_by_wrench,
 )
 from tactile_bayes.mechanics.profile import Rods
+from tactile_bayes.mechanics.surface import Surface
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.record.frame import to_fixed_axes
@@ -108,7 +109,7 @@ def amplification(plan: Plan) -> xr.Dataset:
     contacts, delta = _forward(refined, record, loaded), float(np.arctan(plan.taken_friction))
     of_angle = plan.cell.drive_angle_deviation
     gains = (_raw(contacts), _constrained(contacts, delta, of_angle))
-    both = [_along_and_across(contacts, gain, 0.5 * rod.diameter / rod.length) for gain in gains]
+    both = [_along_and_across(contacts, gain, rod.surface) for gain in gains]
     deviations = [[_deviation(gain, contacts, of_angle) for gain in of_method] for of_method in both]
     # Readings are in the units of the record, not in EI/L or EI/L².
     per_unit = rod.length / np.array([*rod.load_units, 1.0])
@@ -184,7 +185,7 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
     coordinates = np.stack(
         [
             np.hypot(loads[:, 1], loads[:, 2]),
-            np.where(tip, tip_angle - slope - delta, -delta),
+            np.where(tip, tip_angle - slope - delta, -rod.surface.friction_angle(delta)),
             np.where(tip, 1.0, record.truth_contact_arclength.values / rod.length),
             np.where(side < 0.0, np.pi - angle, angle),
         ],
@@ -233,11 +234,12 @@ def _constrained(contacts: _Forward, delta: float, angle_deviation: float) -> Fl
     return gains
 
 
-def _along_and_across(contacts: _Forward, gain: Floats, radius: float) -> tuple[Floats, Floats]:
+def _along_and_across(contacts: _Forward, gain: Floats, surface: Surface) -> tuple[Floats, Floats]:
     """Return derivatives of the contact along and across the contour, in the laboratory frame, shape (n, 4) each."""
     cos, sin = np.cos(contacts.slope_angle)[:, None], np.sin(contacts.slope_angle)[:, None]
-    along = cos * gain[:, 0] + sin * gain[:, 1] - radius * gain[:, 2]  # the surface turns with the slope
-    return contacts.side[:, None] * along, cos * gain[:, 1] - sin * gain[:, 0]
+    standoff, closer = surface.standoff(contacts.coordinates[:, ARCLENGTH])[:, None], np.sin(surface.half_angle)
+    along = cos * gain[:, 0] + sin * gain[:, 1] - standoff * gain[:, 2]  # the surface turns with the slope
+    return contacts.side[:, None] * along, cos * gain[:, 1] - sin * gain[:, 0] - closer * gain[:, 3]
 
 
 def _deviation(gain: Floats, contacts: _Forward, angle_deviation: float) -> Floats:

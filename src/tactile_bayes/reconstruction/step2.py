@@ -16,6 +16,7 @@ from tactile_bayes.mechanics.contact_coordinates import PLACE
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
 from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.surface import Surface
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
 from tactile_bayes.reconstruction.raw import raw_estimate
@@ -163,7 +164,7 @@ def reconstruct(
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     measured, doubtful = _with_likelier_sides(measured, cell, suspension_compliance, friction)
     samples = samples_of(measured, cell, suspension_compliance)
-    estimate = _METHODS[method](samples, np.full(samples.side.size, np.arctan(friction)))
+    estimate = _METHODS[method](samples, _friction_angles(samples, friction))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
     return kept.assign(_variables(estimate, samples, measured)).assign_attrs(
         method=method,
@@ -192,7 +193,7 @@ def _with_likelier_sides(
             samples = samples_of(with_sides(part, {sweep: side}), cell, suspension_compliance)
             if not are_weighed(samples):
                 break
-            found = constrained_estimate(samples, np.full(samples.side.size, np.arctan(friction))).misfit
+            found = constrained_estimate(samples, _friction_angles(samples, friction)).misfit
             none = np.nan if found is None else found
             misfits.append(float(np.minimum(np.nan_to_num(none, nan=_NO_CONTACT), _NO_CONTACT)[samples.loaded].sum()))
         fits_better = len(misfits) == 2 and misfits[1] < misfits[0] - _TWENTY_TO_ONE
@@ -208,12 +209,11 @@ def _in_channels(measured: xr.Dataset, cell: LoadCell) -> xr.Dataset:
 def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> dict[str, tuple[str, object, object]]:
     """Columns of the result, in the laboratory frame and the record's units."""
     rod, side = samples.rod, samples.side
-    radius = 0.5 * rod.diameter / rod.length_unit
-    place = _in_lab_frame(estimate.place, side, radius)
+    place = _in_lab_frame(estimate.place, side, rod.surface)
     nothing = np.full(side.size, np.nan)
     spread, tangent, normal, correlation = [nothing] * 4, nothing, nothing, nothing
     if estimate.covariance is not None:
-        covariance = _covariance_in_lab_frame(estimate.place, estimate.covariance, side, radius)
+        covariance = _covariance_in_lab_frame(estimate.place, estimate.covariance, side, rod.surface)
         spread = list(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).T)
         tangent, normal = spread_across(covariance, place[:, 2])
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -252,19 +252,21 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
     return variables
 
 
-def _in_lab_frame(place: Floats, side: Floats, radius: float) -> Floats:
+def _friction_angles(samples: Samples, friction: float) -> Floats:
+    """Friction angles with which the centreline touches, shape (n,)."""
+    return np.full(samples.side.size, samples.rod.surface.friction_angle(float(np.arctan(friction))))
+
+
+def _in_lab_frame(place: Floats, side: Floats, surface: Surface) -> Floats:
     """Places on the object's surface in the laboratory frame."""
-    x, y, alpha, arclength = place.T
-    if radius:
-        x, y = x - radius * np.sin(alpha), y + radius * np.cos(alpha)
+    x, y, alpha, arclength = surface.on_object(place.T)
     return np.stack([side * x, y, side * alpha, arclength], axis=-1)
 
 
-def _covariance_in_lab_frame(place: Floats, covariance: Floats, side: Floats, radius: float) -> Floats:
+def _covariance_in_lab_frame(place: Floats, covariance: Floats, side: Floats, surface: Surface) -> Floats:
     """Covariance of places on the object's surface in the laboratory frame."""
-    if radius:
-        shift = np.broadcast_to(np.eye(4), covariance.shape).copy()
-        shift[:, 0, 2], shift[:, 1, 2] = -radius * np.cos(place[:, 2]), -radius * np.sin(place[:, 2])
+    if surface.radius:
+        shift = np.moveaxis(surface.slopes_on_object(place.T), -1, 0)
         covariance = shift @ covariance @ np.swapaxes(shift, 1, 2)
     covariance = covariance.copy()
     covariance[side < 0.0] *= np.outer(_MIRROR, _MIRROR)

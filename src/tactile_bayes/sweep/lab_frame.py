@@ -26,7 +26,7 @@ class RodUnits(Protocol):
 
 
 def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
-    """Convert states to the laboratory frame, with units; the contact point is that on the object's surface.
+    """Convert states to the laboratory frame, with units.
 
     Parameters
     ----------
@@ -46,13 +46,6 @@ def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: Rod
     mirrored = sweep_frame.mirrored[index]
     sign = np.where(mirrored, -1.0, 1.0)
     wrench = states.wrench
-    length, standoff = (
-        v[index] if isinstance(v, np.ndarray) else v for v in (sweep_frame.length, sweep_frame.standoff)
-    )
-    x, y = states.x, states.y
-    if np.any(standoff):
-        x = x - standoff / length * np.sin(states.slope_angle)
-        y = y + standoff / length * np.cos(states.slope_angle)
 
     def turned(angle: Floats) -> Floats:
         return np.where(mirrored, np.pi - angle, angle)
@@ -64,8 +57,8 @@ def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: Rod
         "force_y": wrench.force_y * rod.force_unit,
         "contact_arclength": wrench.contact_arclength * rod.length_unit,
         "contact_phase": wrench.phase,
-        "contact_x": sweep_frame.base_x[index] + sign * x * rod.length_unit,
-        "contact_y": sweep_frame.base_y[index] + y * rod.length_unit,
+        "contact_x": sweep_frame.base_x[index] + sign * states.x * rod.length_unit,
+        "contact_y": sweep_frame.base_y[index] + states.y * rod.length_unit,
         "tip_angle": turned(wrench.tip_angle),
         "slope_angle": sign * states.slope_angle,
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
 
@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_numbers, check_choice, check_number, check_pivots
-from tactile_bayes.contours.base import Contour
+from tactile_bayes.contours.base import Contour, Locus
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
-from tactile_bayes.mechanics.elastica import wrench_from_contact
+from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.mechanics.rod import LARGEST_STRAIN, Rod
@@ -30,6 +30,9 @@ __all__ = ["Scan", "equilibria", "scan"]
 
 _MARGIN = 15
 """Number of drive steps before first contact and after snap-off."""
+
+_MOST_MOVES, _SETTLED = 50, 1e-15
+"""Largest number of corrections of a tapered rod's standoff, and the last change of the arc length [L]."""
 
 _FINEST = 1e-6
 """Least step of the drive [rad]; smaller ones would give millions of samples."""
@@ -134,16 +137,9 @@ def equilibria(
     index = np.zeros(alpha.size, dtype=np.intp)
     side = -1.0 if sweep_frame.mirrored[0] else 1.0
     parameter = side * contour.parameter_of_slope(alpha)
-    locus = sweep_frame.locate(index, parameter)
-    wrench = wrench_from_contact(
-        locus.x,
-        locus.y,
-        locus.slope_angle,
-        friction_angle_of(friction),
-        rest_curvature=side * rod.arc_curvature,
-        profile=None if rod.profile is None else rod.profile._replace(sign=side),
-    )
-    states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
+    locus = replace(sweep_frame, standoff=0.0).locate(index, parameter)
+    states = States(parameter, locus.x, locus.y, locus.slope_angle, _wrench(locus, rod, friction, side))
+    wrench = states.wrench
     columns = to_lab_frame(sweep_frame, index, states, rod)
     reached = wrench.phase != NONE
     columns["contact_phase"] = np.array(PHASE_NAMES)[wrench.phase]
@@ -155,6 +151,27 @@ def equilibria(
             values = np.where(reached, values, np.nan)
         data[name] = ("slope_angle", values, column_attributes(name, units))
     return xr.Dataset(data, coords={"slope_angle": ("slope_angle", alpha, column_attributes("slope_angle", units))})
+
+
+def _wrench(locus: Locus, rod: Rod, friction: float, side: float) -> Wrench:
+    """Base wrench in the sweep frame, for points of the object."""
+    surface, alpha = rod.surface, locus.slope_angle
+    arclength = np.ones(alpha.shape)
+    for _ in range(_MOST_MOVES if surface.half_angle else 1):
+        d = surface.standoff(arclength)
+        wrench = wrench_from_contact(
+            locus.x + d * np.sin(alpha),
+            locus.y - d * np.cos(alpha),
+            alpha + surface.half_angle,
+            surface.friction_angle(friction_angle_of(friction)),
+            rest_curvature=side * rod.arc_curvature,
+            profile=None if rod.profile is None else rod.profile._replace(sign=side),
+        )
+        moved = np.abs(np.where(wrench.phase == NONE, arclength, wrench.contact_arclength) - arclength)
+        if np.all(moved <= _SETTLED):
+            break
+        arclength = arclength + np.where(wrench.phase == NONE, 0.0, wrench.contact_arclength - arclength)
+    return wrench
 
 
 def scan(

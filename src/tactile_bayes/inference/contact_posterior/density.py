@@ -22,6 +22,7 @@ from tactile_bayes.mechanics.contact_coordinates import (
 )
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.profile import Rods
+from tactile_bayes.mechanics.surface import Surface
 from tactile_bayes.reconstruction import Samples
 from tactile_bayes.record import turned
 
@@ -57,7 +58,7 @@ class ContactDensity:
     turning : bool
         True if the cell turns with the drive.
     delta : float
-        Friction angle [rad].
+        Friction angle of the centreline, as in `Surface` [rad].
     prior : "flat", "polar" or callable
         Prior of contact point and slope angle; see `infer_contacts`.
 
@@ -111,7 +112,8 @@ class ContactDensity:
         alpha, arclength = rod.place[2:]
         with np.errstate(divide="ignore", invalid="ignore"):
             volume = np.log(np.where(tip, rod.volume_tip, rod.volume_tangential))
-            possible = (flat[:, PSI1] >= -self.delta) & (arclength <= 1.0) & (np.abs(alpha) < 0.5 * np.pi)
+            facing = np.abs(alpha - self._surface.half_angle) < 0.5 * np.pi
+            possible = (flat[:, PSI1] >= -self.delta) & (arclength <= 1.0) & facing
             possible &= np.isfinite(volume)
             density = volume.reshape(shape) + self._readings.log_density(loads) + self._log_prior(rod.place, shape)
             if self.has_free_angle:
@@ -133,11 +135,15 @@ class ContactDensity:
 
     def to_lab_frame(self, contact: Floats) -> Floats:
         """Return contacts on the object's surface, in the laboratory frame and the record's units, (4, ..., n)."""
-        rod, side = self.samples.rod, self.samples.side
-        x, y, alpha, arclength = contact
-        radius, length = 0.5 * rod.diameter, rod.length_unit
-        x, y = x * length - radius * np.sin(alpha), y * length + radius * np.cos(alpha)
-        return np.stack([self.base[:, 0] + side * x, self.base[:, 1] + y, side * alpha, arclength * length])
+        length, side = self.samples.rod.length_unit, self.samples.side
+        x, y, alpha, arclength = self._surface.on_object(contact)
+        return np.stack(
+            [self.base[:, 0] + side * x * length, self.base[:, 1] + y * length, side * alpha, arclength * length]
+        )
+
+    @property
+    def _surface(self) -> Surface:
+        return self.samples.rod.surface
 
     def _log_prior(self, contact: Floats, shape: tuple[int, ...]) -> Floats | float:
         if self._prior == "flat":

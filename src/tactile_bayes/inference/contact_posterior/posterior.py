@@ -209,6 +209,7 @@ def _density(measured: xr.Dataset, cell: LoadCell, delta: float, prior: ContactP
     base = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
     turning = frame_of(measured) == "turning"
     loaded = np.flatnonzero(samples.loaded & ~samples.cut_off)
+    delta = rod.surface.friction_angle(delta)
     return ContactDensity(samples, readings, base, turning=turning, delta=delta, prior=prior).take(loaded), loaded
 
 
