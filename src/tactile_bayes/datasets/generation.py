@@ -81,6 +81,7 @@ _CORRECTIONS = {
     "too close to the pivot": _HIGHER,
     "still touched at its other end": _WIDER,
     "touched twice": "give rods that are less curved, or contours that are more so where rods touch them",
+    "slips off at once": "give rods that are less curved, or bring contours and pivots closer to one another",
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the unloaded rod would still cut the object",
     _NO_CONTOUR: "change the distribution of that parameter",
