@@ -66,6 +66,17 @@ RIGS = {
         "circle",
         rod={"length": 1.1, "flexural_rigidity": 1e-3, "diameter": 1e-3, "rest_curvature": {"normal": [0.2, 0.1]}},
     ),
+    "tapered": drawn_from("circle", rod={"taper": {"uniform": [0.0, 0.95]}}, seed=1),
+    "tapered arcs in SI": drawn_from(
+        "shape-free",
+        scan={"samples": 30, "friction": 0.2},
+        rod={
+            "length": {"uniform": [1.0, 1.2]},
+            "flexural_rigidity": 1e-3,
+            "rest_curvature": {"normal": [0.0, 0.2]},
+            "taper": {"choice": [0.3, 0.7]},
+        },
+    ),
 }
 
 
@@ -438,6 +449,27 @@ def test_every_record_states_the_rest_curvature_that_was_drawn():
     drawn = generated(RIGS["arcs"])["rod_rest_curvature"].values
     assert np.unique(drawn).size == spec.records
     assert [rod_of(record(spec, i)).rest_curvature for i in range(spec.records)] == drawn.tolist()
+
+
+@pytest.mark.parametrize("name", ["tapered", "tapered arcs in SI"])
+def test_every_record_states_the_taper_that_was_drawn(name):
+    spec = read_specification(RIGS[name])
+    drawn = generated(RIGS[name])["rod_taper"].values
+    assert np.unique(drawn).size > 1
+    assert [rod_of(record(spec, i)).taper for i in range(spec.records)] == drawn.tolist()
+
+
+def test_tapers_of_zero_beside_others_give_the_records_of_uniform_rods():
+    """The same objects, to the accuracy of states from series: 1e-8."""
+    rod, each = {"rest_curvature": {"uniform": [-0.5, 0.5]}}, {"each": [0.0, 0.6]}
+    uniform, tapered = (generated(drawn_from("circle", rod=of)) for of in (rod, rod | {"taper": each}))
+    for name in (*CHANNELS, *(f"truth_{name}" for name in CONTACT)):
+        theirs, mine = (one[name].values[::2] for one in (uniform, tapered))
+        np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-8 * np.nanmax(np.abs(theirs)))
+    assert np.abs(tapered["holding_moment"] - uniform["holding_moment"]).values[1::2].max() > 0.1
+    stated = generated(drawn_from("circle", rod=rod | {"taper": 0.0}))
+    for name in CHANNELS:
+        np.testing.assert_array_equal(stated[name], uniform[name])
 
 
 def test_a_rod_without_thickness_is_not_strained():

@@ -77,6 +77,19 @@ def test_neither_workers_nor_order_change_a_byte(tmp_path):
     assert one == hashes(tmp_path / "2")
 
 
+def test_tapered_rods_are_resumed_and_verified_like_others(tmp_path):
+    spec = changed(PLAIN, rod={"taper": {"uniform": [0.2, 0.8]}})
+    generate(spec, tmp_path, workers=1)
+    made = hashes(tmp_path)
+    (tmp_path / "shard-000001.nc").unlink()
+    generate(spec, tmp_path, workers=1)
+    assert hashes(tmp_path) == made
+    assert verify(tmp_path, regenerate=1).records == spec["records"]
+    assert "| rod: taper | uniform from 0.2 to 0.8 |" in (tmp_path / "README.md").read_text()
+    with refused(SpecificationError, "rod.taper"):
+        generate(changed(PLAIN, rod={"taper": {"uniform": [0.2, 0.9]}}), tmp_path)
+
+
 @pytest.mark.slow
 def test_order_does_not_change_a_byte(many, tmp_path, monkeypatch):
     def backwards(function, tasks, **options):

@@ -88,6 +88,13 @@ class Distribution:
         return self.numbers[0] if self.kind in ("normal", "log_normal") else min(self.numbers)
 
     @property
+    def greatest(self) -> float:
+        """Greatest possible number."""
+        if self.kind in ("normal", "log_normal"):
+            return math.inf if self.numbers[1] else self.numbers[0]
+        return max(self.numbers)
+
+    @property
     def text(self) -> str:
         """Description of the distribution."""
         numbers = [f"{number:g}" for number in self.numbers]

@@ -21,6 +21,7 @@ from tactile_bayes.datasets.specification_reading import rule_of
 from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.paths import Paths, trace
+from tactile_bayes.mechanics.profile import profile_of
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rod import LARGEST_STRAIN
 from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
@@ -80,6 +81,7 @@ _CORRECTIONS = {
     "too close to the pivot": _HIGHER,
     "still touched at its other end": _WIDER,
     "touched twice": "give rods that are less curved, or contours that are more so where rods touch them",
+    "slips off at once": "give rods that are less curved, or bring contours and pivots closer to one another",
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the unloaded rod would still cut the object",
     _NO_CONTOUR: "change the distribution of that parameter",
@@ -258,7 +260,9 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
     backward = np.tile([direction == "backward" for _, direction in spec.sweeps], candidate.size)
     of_rod = {name: values[f"rod.{name}"][place] for name in spec.rod}
     length, rigidity = (of_rod.get(name, np.ones(place.size)) for name in ("length", "flexural_rigidity"))
-    diameter, curvature = (of_rod.get(name, np.zeros(place.size)) for name in ("diameter", "rest_curvature"))
+    diameter, curvature, taper = (
+        of_rod.get(name, np.zeros(place.size)) for name in ("diameter", "rest_curvature", "taper")
+    )
     units = ManyUnits(length, rigidity / length, rigidity / length**2)
     drive, way = spec.drive, np.linspace(0.0, 1.0, spec.drive.samples)
     if drive.begin is None or drive.end is None:
@@ -267,8 +271,9 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
         forward = drive.begin + (drive.end - drive.begin) * way
         as_seen = np.where(backward[:, None], np.pi - forward[::-1], forward)
     paths = trace(
-        SweepFrame(contours.take(place), base_x, base_y, length, 0.5 * diameter, backward, curvature * length),
+        SweepFrame(contours.take(place), base_x, base_y, length, 0.5 * diameter, backward, curvature * length, taper),
         friction_angle=float(np.arctan(spec.friction)),
+        profile=profile_of() if spec.has_taper else None,
         drive_angles=as_seen,
         relative=as_seen.ndim == 1,
         polished=False,

@@ -70,8 +70,8 @@ class Specification:
     each_group : bool
         Whether the groups are used in turn, and not drawn.
     rod : mapping of str to Distribution
-        length [m], flexural_rigidity [N m²], diameter [m] and rest_curvature [1/m]; of a dimensionless data set only
-        diameter and rest_curvature [L, 1/L], or nothing.
+        length [m], flexural_rigidity [N m²], diameter [m], rest_curvature [1/m] and taper; of a dimensionless data set
+        only diameter, rest_curvature [L, 1/L] and taper, or nothing.
     bases : tuple of (Distribution, Distribution)
         Pivots (x, y) [m, or rod lengths].
     directions : tuple of str
@@ -118,8 +118,17 @@ class Specification:
     @property
     def has_thickness(self) -> bool:
         """True if the rod has, or may have, a diameter."""
-        diameter = self.rod.get("diameter")
-        return diameter is not None and (diameter.is_drawn or any(diameter.numbers))
+        return self._may_have("diameter")
+
+    @property
+    def has_taper(self) -> bool:
+        """True if the rod is, or may be, tapered."""
+        return self._may_have("taper")
+
+    def _may_have(self, name: str) -> bool:
+        """Return whether a quantity of the rod may differ from zero."""
+        distribution = self.rod.get(name)
+        return distribution is not None and (distribution.is_drawn or any(distribution.numbers))
 
     @property
     def shards(self) -> int:

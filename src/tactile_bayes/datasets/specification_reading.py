@@ -21,6 +21,7 @@ from tactile_bayes.datasets.specification import Drive, Group, Specification
 from tactile_bayes.datasets.specification_text import DEFAULTS, SCAN, left_out, toml_of
 from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
+from tactile_bayes.mechanics.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
 
@@ -34,7 +35,7 @@ _LARGEST_SEED = 2**63 - 1
 
 _TABLES: Mapping[str, Iterable[str]] = {
     "": ("name", "description", "records", "seed", "shard_records", "precision", "each_contour"),
-    "rod.": ("length", "flexural_rigidity", "diameter", "rest_curvature"),
+    "rod.": ("length", "flexural_rigidity", "diameter", "rest_curvature", "taper"),
     "scan.": ("bases", "directions", "samples", "from_degrees", "to_degrees", "margin", "friction"),
     "load_cell.": ("frame", *LOAD_CELL_UNITS),
 }
@@ -218,13 +219,33 @@ def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
         )
     given = {"diameter": 0.0, **rod} if "length" in rod else rod
     distributions = {name: distribution_of(given[name], f"rod.{name}") for name in _TABLES["rod."] if name in given}
-    signed = {"rest_curvature"}
+    signed = {"rest_curvature", "taper"}
     _refuse_negative({name: of for name, of in distributions.items() if name not in signed}, "rod.", {"diameter"})
+    if "taper" in distributions:
+        _refuse_taper(distributions)
     try:
         Rod(**_at_share(distributions, 0.5))
     except ParameterError as error:
         raise SpecificationError(f"rod: {error}") from error
     return distributions
+
+
+def _refuse_taper(rod: Mapping[str, Distribution]) -> None:
+    """Refuse tapers out of range, and beside a diameter."""
+    taper, diameter = rod["taper"], rod.get("diameter")
+    least, greatest = taper.least, taper.greatest
+    if not 0.0 <= least <= greatest <= STEEPEST_TAPER:
+        worst = least if least < 0.0 else greatest
+        verb, what = "is" if least == greatest else "may be", f"{worst:g}" if math.isfinite(worst) else "unbounded"
+        raise SpecificationError(
+            f"rod.taper {verb} {what}: give a number from 0, for none, to {STEEPEST_TAPER}, or a distribution within "
+            "these limits, as { uniform = [0.3, 0.7] }"
+        )
+    if greatest > 0.0 and diameter is not None and diameter.greatest > 0.0:
+        raise SpecificationError(
+            "rod.taper and rod.diameter: contact beside the centreline of a tapered rod is not modelled; leave the "
+            "diameter out, which puts the contact on the centreline"
+        )
 
 
 def _load_cell(table: Mapping[str, Any]) -> dict[str, Distribution]:

@@ -113,7 +113,7 @@ _ROUNDING = 1e-14
 """Tail of the series of a drive angle that its rounding leaves [rad]."""
 
 _TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_OUT), int(Reachability.GRAZES)
-_TOUCHES_TWICE = int(Reachability.TOUCHES_TWICE)
+_TOUCHES_TWICE, _SLIPS_OFF = int(Reachability.TOUCHES_TWICE), int(Reachability.SLIPS_OFF)
 _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
 
 _BODY = 8
@@ -296,6 +296,7 @@ def follow_branch(
     onward_from, nothing = Equilibrium(0.0, 0.0, 1.0), nowhere()
     if loaded.tip and z.q < psi1:
         return _nothing(_TOUCHES_TWICE, near.distance, z.p)
+    grazes = _SLIPS_OFF if loaded.tip and z.q > _ACROSS else _GRAZES
     behind_begin, length, known = nothing, _FIRST, 0.0
     settled, power = max(SETTLED, 0.1 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
     shortest, excess_before = _LONGEST * 0.5**accuracy.halvings, math.inf
@@ -401,9 +402,9 @@ def follow_branch(
         if not math.isfinite(begin.at.p):
             break
     if fate == _NEVER:
-        return _nothing(_RUNS_OUT if runs_out else _GRAZES, near.distance, math.nan)
+        return _nothing(_RUNS_OUT if runs_out else grazes, near.distance, math.nan)
     if not begin_angle > first:
-        return _nothing(_GRAZES, near.distance, math.nan)
+        return _nothing(grazes, near.distance, math.nan)
     if wants_states:
         _note_event(last_at, last_tip, found.changes[changes])
     if samples.relative:

@@ -29,6 +29,8 @@ class Reachability(IntEnum):
     """Contact is so weak that rounding hides how it ends."""
     TOUCHES_TWICE = 7
     """A rod that is curved toward the object would touch it at two points."""
+    SLIPS_OFF = 8
+    """At first contact the tip is turned beyond the normal of the contour, so that any force pushes it off."""
 
     @property
     def message(self) -> str:
@@ -45,6 +47,7 @@ _MESSAGES = {
     Reachability.RUNS_OUT: "still touched at its other end",
     Reachability.GRAZES: "hardly touched",
     Reachability.TOUCHES_TWICE: "touched twice",
+    Reachability.SLIPS_OFF: "slips off at once",
 }
 
 

@@ -75,6 +75,12 @@ def sweep_paths(
                 f"{sweep} the rod touches the contour so slightly that rounding hides where contact ends: bring "
                 "contour and pivot closer together (are contour, pivot and rod in one unit?)"
             )
+        case Reachability.SLIPS_OFF:
+            raise ReachError(
+                f"{sweep} the rod's tip slips off the contour as soon as it touches it: it is turned beyond the normal "
+                "of the contour there, so that any load pushes it on; sweep in the other direction, move the pivot, or "
+                "take a rod that is less curved"
+            )
         case Reachability.TOUCHES_TWICE:
             raise ContourError(
                 f"{sweep} the rod would touch the contour twice: in contact at {_point(paths)} it is curved toward "
