@@ -74,6 +74,7 @@ RIGS = {
             "length": {"uniform": [1.0, 1.2]},
             "flexural_rigidity": 1e-3,
             "rest_curvature": {"normal": [0.0, 0.2]},
+            "diameter": 0.02,
             "taper": {"choice": [0.3, 0.7]},
         },
     ),

@@ -202,10 +202,6 @@ REFUSED = [
     ({"rod": {"taper": {"log_normal": [0.5, 0.1]}}}, ["rod.taper may be unbounded"]),
     ({"rod": {"taper": {"normal": [0.5, 0.1]}}}, ["rod.taper may be unbounded"]),
     ({"rod": {"taper": "some"}}, ["rod.taper is 'some'"]),
-    (
-        {"rod": {"diameter": 0.01, "taper": {"each": [0.0, 0.5]}}},
-        ["rod.taper and rod.diameter", "leave the diameter out"],
-    ),
     ({"rod": {"length": 0.1, "flexural_rigidity": 0.0}}, ["rod.flexural_rigidity may be 0"]),
     ({"rod": {"length": 0.1, "flexural_rigidity": 1.0, "diameter": -1.0}}, ["rod.diameter may be negative"]),
     ({"scan": "all"}, ["scan is 'all'"]),

@@ -222,7 +222,7 @@ def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
     signed = {"rest_curvature", "taper"}
     _refuse_negative({name: of for name, of in distributions.items() if name not in signed}, "rod.", {"diameter"})
     if "taper" in distributions:
-        _refuse_taper(distributions)
+        _refuse_taper(distributions["taper"])
     try:
         Rod(**_at_share(distributions, 0.5))
     except ParameterError as error:
@@ -230,9 +230,8 @@ def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
     return distributions
 
 
-def _refuse_taper(rod: Mapping[str, Distribution]) -> None:
-    """Refuse tapers out of range, and beside a diameter."""
-    taper, diameter = rod["taper"], rod.get("diameter")
+def _refuse_taper(taper: Distribution) -> None:
+    """Refuse tapers out of range."""
     least, greatest = taper.least, taper.greatest
     if not 0.0 <= least <= greatest <= STEEPEST_TAPER:
         worst = least if least < 0.0 else greatest
@@ -240,11 +239,6 @@ def _refuse_taper(rod: Mapping[str, Distribution]) -> None:
         raise SpecificationError(
             f"rod.taper {verb} {what}: give a number from 0, for none, to {STEEPEST_TAPER}, or a distribution within "
             "these limits, as { uniform = [0.3, 0.7] }"
-        )
-    if greatest > 0.0 and diameter is not None and diameter.greatest > 0.0:
-        raise SpecificationError(
-            "rod.taper and rod.diameter: contact beside the centreline of a tapered rod is not modelled; leave the "
-            "diameter out, which puts the contact on the centreline"
         )
 
 
