@@ -430,3 +430,37 @@ def test_interpolation_is_not_felt_at_the_truth(noise, family, count):
 
 def test_interpolation_is_not_felt_where_the_tip_touches_for_a_millionth_of_the_path():
     assert off_at_the_truth(0.01, "parabola", [610]).max() < 0.05
+
+
+VARIED = {
+    "taper of a half": (Rod(taper=0.5), 0.3, False),
+    "taper of nine tenths": (Rod(taper=0.9), 0.0, False),
+    "tapered arc": (Rod(rest_curvature=-0.4, taper=0.4), 0.2, False),
+    "all of the rig inferred": (Rod(taper=0.5), 0.0, True),
+}
+"""Rods, friction coefficients, and whether taper, rest curvature and friction vary from one contour to the next."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", VARIED)
+def test_loads_of_rods_that_vary_are_within_1e_5_of_the_largest(name):
+    """Beyond what an error of 1e-6 rad of the drive angle explains, which is large just before a fold."""
+    rod, friction, inferred = VARIED[name]
+    rng, count, turn = np.random.default_rng(7), 150, 1e-7
+    record = with_rod(swept(Parabola(0.5, 0.6), step=np.radians(1.0)), rod)
+    drawn = Parabola(*rng.uniform([0.2, 0.3, -0.15], [1.0, 0.8, 0.15], (count, 3)).T)
+    rig = Rig(friction=friction)
+    if inferred:
+        taper, bend = rng.uniform(-0.14, 0.14, count), rng.uniform(-0.19, 0.19, count)
+        rig = Rig(friction=np.abs(rng.normal(0.0, 0.2, count)), taper=taper, rest_curvature=bend)
+    by_table, exactly = (RecordLikelihood(record, CELL, friction, exact) for exact in (False, True))
+    loads, usable = by_table.predict(drawn, rig)
+    exact, usable_exactly = exactly.predict(drawn, rig)
+    turned = exactly.predict(drawn, rig._replace(drive_angle_offset=turn))[0]
+    assert np.count_nonzero(usable != usable_exactly) <= 2
+    both = np.all([np.any(found != 0.0, axis=-1) for found in (loads, exact, turned)], axis=0)
+    sample = exactly.segment_of_sample
+    largest = np.stack([np.abs(exact[:, sample == k]).max(axis=1) for k in np.unique(sample)], axis=1)[:, sample]
+    slack = 1e-5 * largest + 1e-6 / turn * np.abs(turned - exact)
+    assert np.count_nonzero(both) > 5_000
+    assert np.all((np.abs(loads - exact) <= slack)[both])

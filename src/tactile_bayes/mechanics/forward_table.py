@@ -47,9 +47,8 @@ _OUTER = 5, 5, 7
 
 _MOST = max(_OUTER)
 
-_NEGLIGIBLE, _AT_ONSET, _BLUNT = 2e-7, 100.0, 100.0
-"""Size of terms in these that are left out; how much smaller it is without a force, and how much larger beyond the
-tip."""
+_NEGLIGIBLE, _AT_ONSET = 2e-7, 100.0
+"""Size of terms in these that are left out, and how much smaller it is without a force."""
 
 _PSI1, _FORCE, _BEYOND = (-1.0, 1.4), 36.0, 0.6
 """Range of ψ1, largest f Λ², and largest Λ beyond the tip, over Λ(1)."""
@@ -156,7 +155,7 @@ def _tabulated(profile: Profile, box: Box) -> ForwardTable:
     return ForwardTable(
         _terms(tip[:, :, :, None], felt, *inner),
         _terms(tangential[..., 0, :, :, :], felt, *inner),
-        _terms(tangential[..., 1, :, :, :], felt / _BLUNT, *inner),
+        _terms(tangential[..., 1, :, :, :], felt, *inner),
         _terms(chord[:, None, :, None, None], _AT_ONSET, (-1, distances)),
         np.array(box, dtype=float),
         slenderness,
