@@ -435,6 +435,8 @@ def test_interpolation_is_not_felt_where_the_tip_touches_for_a_millionth_of_the_
 VARIED = {
     "taper of a half": (Rod(taper=0.5), 0.3, False),
     "taper of nine tenths": (Rod(taper=0.9), 0.0, False),
+    "curved by a function": (Rod(rest_curvature=lambda s: 0.6 * s), 0.0, False),
+    "curved by a function, with friction": (Rod(rest_curvature=lambda s: 0.6 * s - 0.3), 0.3, False),
     "tapered arc": (Rod(rest_curvature=-0.4, taper=0.4), 0.2, False),
     "all of the rig inferred": (Rod(taper=0.5), 0.0, True),
 }

@@ -95,13 +95,17 @@ _ACCEPT = 0.05
 """Share of the tolerated error that is accepted."""
 
 _FLOOR, _NOISE = 1e-2, 1e3
-"""Shares of the tolerated error: below the first an exact leg has rounding errors only, above the second others too."""
+"""Shares of the tolerated error: an exact leg has rounding errors only below the first, and others too above the
+second."""
 
 _AIM, _BACK, _LEAST_PACE, _MOST_PACE = 0.01, 0.8, 0.3, 2.0
 """Share of the tolerated error that is aimed at, and bounds on the change of the length."""
 
 _MOST = 256
 """Largest number of legs of a path, and a quarter of the largest number that are tried."""
+
+_PAST_TIP = 1e-6
+"""Share of a leg by which it passes the tip of a rod that is not smooth there."""
 
 _IN_A_DIP = 1e-5
 """Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
@@ -323,11 +327,19 @@ def follow_branch(
         pace = min(max((_AIM / excess) ** power, _LEAST_PACE), _MOST_PACE) if sound else _LEAST_PACE
         if scene.exact and excess < _FLOOR:
             pace = _MOST_PACE
-        noisy = 0.5 * excess_before < excess < _NOISE  # rounding, which a shorter leg does not make smaller
+        # Rounding, which a shorter leg does not make smaller.
+        noisy = 0.5 * excess_before < excess < (_NOISE if scene.exact else 1.0)
         excess_before = excess
         if not (excess <= _ACCEPT or noisy) and length > (shortest if sound else _SHORTEST):
-            length *= min(pace, _BACK)
-            known = min(pace, _BACK) if sound else 0.0
+            share = min(pace, _BACK)
+            if sound and not leg.tip and scene.beam.varied is not None:  # such rods are not smooth at their tip
+                change = _change(leg, psi1, accuracy, work)
+                if change < _BACK:
+                    at_tip = settle(loaded, guess(work, change), Equilibrium(0.0, 1.0, 0.0), _BY_Q, 0.0, SETTLED)
+                    change = _share(leg, at_tip) + _PAST_TIP
+                    share = change if _PAST_TIP < change < _BACK else share
+            length *= share
+            known = share if sound else 0.0
             continue
         if not sound:
             break
