@@ -16,7 +16,7 @@ from scipy.optimize import root
 
 from helpers.profiled_rods import GivenRod, RodAlong, given_rod, integrated_pose
 from tactile_bayes.contours import Circle, Contour, Parabola
-from tactile_bayes.errors import ClearanceWarning, ContourError, ReachError
+from tactile_bayes.errors import ClearanceWarning, ContourError, ReachError, StrainWarning
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.sweep import scan
 from tactile_bayes.sweep.events import SweepEvents
@@ -119,6 +119,7 @@ def swept(seed: int) -> tuple[Shooting, SweepEvents]:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ClearanceWarning)
+                warnings.simplefilter("ignore", StrainWarning)
                 events = scan(contour, direction=direction, rod=thick, friction=friction, drive_step=0.1).events
         except (ContourError, ReachError):
             continue

@@ -25,7 +25,7 @@ from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
-    from tactile_bayes.mechanics.forward_table import ForwardTable
+    from tactile_bayes.mechanics.forward_table import Box, ForwardTable
     from tactile_bayes.mechanics.sweeps import Segments, Shapes, Solutions, Sweeps
 
 __all__ = ["RecordLikelihood", "Rig", "bases_of", "without_errors"]
@@ -40,9 +40,10 @@ _LEAST = 1e-10
 _TABULATED = 5e-6
 """Least tolerance of loads for which the pose of a rod with a profile comes from a table."""
 
-_TAPER, _BEND, _FRICTION_ANGLE = 0.15, 0.2, (0.0, 0.5)
+_TAPERS, _BEND, _FRICTION_ANGLE = (0.15, 0.1), 0.2, (0.0, 0.5)
 """Ranges of tables: distances from the stated taper and rest curvature [1/L], three and four standard deviations of the
-default priors, and angles up to that of a coefficient of 0.55. Few draws are beyond them, and integrated."""
+default priors, and angles up to that of a coefficient of 0.55. Few draws are beyond them, and integrated. For thin tips
+the second range of the taper is taken."""
 
 
 @dataclass(frozen=True)
@@ -218,20 +219,28 @@ class RecordLikelihood:
 
     def _table(self, rig: Rig) -> ForwardTable:
         """Return a table for the rod, made at the first rig in which the same differs from what is stated."""
-        from tactile_bayes.mechanics.forward_table import NO_TABLE, Box, forward_table  # numba takes a second to load
+        from tactile_bayes.mechanics.forward_table import NO_TABLE, forward_table  # numba takes a second to load
 
         profile = self._profile(rig)
         if self.exact or profile is None or self._tolerance.min() < _TABULATED:
             return NO_TABLE
         varied = bool(np.any(rig.taper)), bool(np.any(rig.rest_curvature)), bool(np.any(rig.friction != self.friction))
         if varied not in self._tables:
-            taper, angle, surface = self.rod.taper, float(np.arctan(self.friction)), self.rod.surface
-            tapers = (max(taper - _TAPER, 0.0), min(taper + _TAPER, STEEPEST_TAPER)) if varied[0] else (taper, taper)
-            least, most = (surface._replace(taper=end).half_angle for end in tapers)
-            low, high = _FRICTION_ANGLE if varied[2] else (angle, angle)
-            box = Box(tapers, (-_BEND, _BEND) if varied[1] else (0.0, 0.0), (low - most, high - least))
-            self._tables[varied] = forward_table(profile, box)
+            for width in _TAPERS if varied[0] else (0.0,):
+                self._tables[varied] = forward_table(profile, self._box(width, *varied[1:]))
+                if self._tables[varied] is not NO_TABLE:
+                    break
         return self._tables[varied]
+
+    def _box(self, width: float, bends: bool, slides: bool) -> Box:
+        """Return the ranges of a table, for tapers within a distance from the stated one."""
+        from tactile_bayes.mechanics.forward_table import Box
+
+        surface, angle = self.rod.surface, float(np.arctan(self.friction))
+        tapers = max(surface.taper - width, 0.0), min(surface.taper + width, STEEPEST_TAPER)
+        least, most = (surface._replace(taper=end).half_angle for end in tapers)
+        low, high = _FRICTION_ANGLE if slides else (angle, angle)
+        return Box(tapers, (-_BEND, _BEND) if bends else (0.0, 0.0), (low - most, high - least))
 
     def _bases(self, rig: Rig) -> Floats:
         """Return the pivots, shape (segments, n, 2)."""

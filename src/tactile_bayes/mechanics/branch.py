@@ -104,6 +104,10 @@ _AIM, _BACK, _LEAST_PACE, _MOST_PACE = 0.01, 0.8, 0.3, 2.0
 _MOST = 256
 """Largest number of legs of a path, and a quarter of the largest number that are tried."""
 
+_ROOM_IN_TIP, _ROOM_PAST_TIP = 0.3, 0.02
+"""How far a leg of a rod that is not smooth at its tip may go beyond the change of the phase, in ψ1 [rad] and in arc
+length [L]."""
+
 _PAST_TIP = 1e-6
 """Share of a leg by which it passes the tip of a rod that is not smooth there."""
 
@@ -239,6 +243,14 @@ def _share(leg: Leg, found: Balance) -> float:
 
 
 @compiled
+def _share_in_phase(leg: Leg, psi1: float) -> float:
+    """Share of a leg up to somewhat beyond the change of the phase, as far as its direction tells."""
+    room = leg.begin.q - psi1 + _ROOM_IN_TIP if leg.tip else 1.0 + _ROOM_PAST_TIP - leg.begin.q
+    pace = -leg.along.q if leg.tip else leg.along.q
+    return room / pace if pace > room > 0.0 else 1.0
+
+
+@compiled
 def _past(loaded: Loaded, at_knot: Balance, sense: float) -> Balance:
     """Equilibrium at a knot, with the tangent and the rates behind it."""
     at = at_knot.at
@@ -311,6 +323,9 @@ def follow_branch(
         if done == _MOST:
             break
         leg = leg_from(loaded, begin, onward_from, length)
+        if known == 0.0 and scene.beam.varied is not None:
+            share = _share_in_phase(leg, psi1)
+            leg, length = shortened(leg, share), share * length
         sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, known, settled, work)
         known, knot, at_knot = 0.0, math.nan, begin
         if sound:

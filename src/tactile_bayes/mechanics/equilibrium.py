@@ -44,6 +44,9 @@ _MOST_STEPS = 25
 _MOST_TURN, _MOST_LOADING = 0.4, 1.0
 """Largest changes of q, and of f over 1 + f, in a step."""
 
+_ASTRAY = 1.5
+"""Arc length [L] beyond which no tangential contact is sought."""
+
 SETTLED = 1e-8
 """Step, over the largest, after which a first-order correction leaves rounding errors only."""
 
@@ -184,6 +187,8 @@ def settle(
     and rates have an error of its size. NaN where the method does not converge.
     """
     at = start
+    if _is_astray(loaded, at):
+        return nowhere()
     for _ in range(_MOST_STEPS):
         found, equations = balance(loaded, at)
         miss_u, miss_v, by_u, by_v, angle_by, lever_by_q, bend = equations
@@ -198,6 +203,8 @@ def settle(
             break
         share = min(1.0, 1.0 / largest) if largest > 0.0 else 1.0
         at = Equilibrium(at.p - share * dp, at.q - share * dq, at.force - share * df)
+        if _is_astray(loaded, at):
+            break
         if largest <= settled and abs(dp) * bend <= settled:
             angle = found.drive_angle - dot(angle_by, Equilibrium(dp, dq, df))
             before = found.at.force
@@ -219,6 +226,12 @@ def settle(
                 found.y_rate,
             )
     return nowhere()
+
+
+@compiled
+def _is_astray(loaded: Loaded, at: Equilibrium) -> bool:
+    """Return whether a rod without a closed form is sought too far beyond its tip: it takes long and leads nowhere."""
+    return loaded.beam.varied is not None and not loaded.tip and at.q > _ASTRAY
 
 
 @compiled
