@@ -139,6 +139,20 @@ def test_a_wrench_that_no_contact_makes_is_nan():
     assert np.isnan(contact(RODS["cone"].profile, np.array([1.0, math.nan, 0.0, 1.0]), 0.0, WORK)).all()
 
 
+@pytest.mark.parametrize("load", [1e12, 1e300])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_march_under_an_absurd_load_ends(sign, load):
+    """After tiny steps, and where series overflow."""
+    profile, wrench = RODS["wavy"].profile, np.array([1.0, sign * load, 0.3, 1.0])
+    x, y = np.empty((2, 3))
+    shape(profile, wrench, 1.0, np.array([0.0, 0.5, 1.0]), x, y, WORK)
+    assert np.isnan([x[1:], y[1:]]).all()
+    assert np.isnan(contact(profile, wrench, 0.1, WORK)).all()
+    assert math.isnan(bending(profile, wrench, 1.0, WORK).strain)
+    for at in (rest(profile_of(sign * load), 1.0, WORK), chord(profile_of(sign * load), 0.5, WORK)):
+        assert np.isnan(at[1:4]).all()
+
+
 @pytest.mark.parametrize("name", RODS)
 def test_a_shape_is_the_integrated_one(name):
     """Up to the contact under the force, and beyond it as at rest."""

@@ -275,7 +275,7 @@ def from_tip(beam: Beam, psi1: float) -> March:
 @compiled
 def _from_tip(varied: Varied | None, psi1: float) -> March:
     if varied is None:
-        return March(1.0, 0, State(psi1, 0.0, 0.0, 0.0))
+        return March(1.0, 0, State(psi1, 0.0, 0.0, 0.0), 0)
     return at_contact(varied.profile, psi1, 1.0)
 
 
@@ -294,5 +294,5 @@ def _loaded_part(
 ) -> March:
     if varied is None:
         here = pose(psi1, share, force, curvature)
-        return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v))
+        return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v), 0)
     return part_along(varied.profile, before, 1.0 - share, force, varied.work)

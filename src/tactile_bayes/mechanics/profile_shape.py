@@ -97,7 +97,8 @@ def shape_along(
         before, acting, end = march, force, min(contact, tip)
         if not before.at < contact:
             state = before.state
-            before, acting, end = March(before.at, before.cell, State(state.psi, 0.0, state.u, state.v)), 0.0, tip
+            unloaded = State(state.psi, 0.0, state.u, state.v)
+            before, acting, end = March(before.at, before.cell, unloaded, before.steps), 0.0, tip
         step, march = advance(profile, before, FORWARD, end, acting, work)
         for k in range(arclengths.size):
             if before.at < arclengths[k] <= march.at:
@@ -155,6 +156,8 @@ def _outward(profile: Profile, distance: float, until: float, work: Floats) -> C
             found, farthest, at = end, far, before.at + x * step.length
         if reaches:
             break
+    if math.isnan(march.state.psi):
+        at, found = march.at, march.state
     return _chord(profile, at, found)
 
 
@@ -186,4 +189,6 @@ def largest_bending_along(
             bent *= 1.0 - profile.taper * here
             if bent > strain:
                 strain, strain_at = bent, here
+    if math.isnan(march.state.psi):
+        strain = math.nan
     return Bending(curvature, at, strain, strain_at)
