@@ -234,7 +234,7 @@ def _bending(
             return max(abs(moment), curvature - math.sqrt(before))
         bent = math.sqrt(at_pivot * at_pivot + 2.0 * (math.hypot(force_x, force_y) - lever))
         return max(abs(moment), curvature + bent)
-    return largest_bending_along(varied.profile, drive_angle, moment, force_x, force_y, arclength, varied.work).strain
+    return largest_bending_along(varied.profile, drive_angle, moment, force_x, force_y, arclength, varied.work)
 
 
 @compiled
@@ -251,19 +251,19 @@ def _rest_curvature(varied: Varied | None, curvature: float, arclength: float) -
 
 
 @compiled
-def free_end(beam: Beam, arclength: float, share: float) -> tuple[float, float]:
-    """Point of the free end beyond a contact, at a share of its length, along the rod there and to its left [L]."""
-    return _free_end(beam.varied, beam.curvature, arclength, share)
+def free_end(beam: Beam, arclength: float) -> tuple[float, float]:
+    """Tip of the free end beyond a contact, along the rod there and to its left [L]."""
+    return _free_end(beam.varied, beam.curvature, arclength)
 
 
 @compiled
-def _free_end(varied: Varied | None, curvature: float, arclength: float, share: float) -> tuple[float, float]:
-    length = share * (1.0 - arclength)
+def _free_end(varied: Varied | None, curvature: float, arclength: float) -> tuple[float, float]:
     if varied is None:
+        length = 1.0 - arclength
         turn = 0.5 * curvature * length
         chord = length if turn == 0.0 else length * math.sin(turn) / turn
         return chord * math.cos(turn), chord * math.sin(turn)
-    return beyond_along(varied.profile, arclength, arclength + length, varied.work)
+    return beyond_along(varied.profile, arclength, varied.work)
 
 
 @compiled
