@@ -43,6 +43,7 @@ __all__ = [
     "varied",
     "varied_of",
     "whole_pose",
+    "with_sign",
 ]
 
 
@@ -104,9 +105,7 @@ def mirrored_by(curvature: float, varied: Varied | None) -> Beam:
     """Rod of a contact, as in `Rods`."""
     if varied is None:
         return Beam(curvature, 1.0, curvature, varied)
-    edges, bent, rigidity, taper, bend, _ = varied.profile
-    of_contact = Profile(edges, bent, rigidity, taper, bend, curvature)
-    return Beam(0.0, 1.0, math.inf, Varied(of_contact, varied.work, varied.sheet, varied.slenderness, varied.sign))
+    return Beam(0.0, 1.0, math.inf, with_sign(varied, curvature))
 
 
 @compiled
@@ -129,14 +128,15 @@ def mirrored_beam(beam: Beam) -> Beam:
 def _mirrored(varied: Varied | None) -> Varied | None:
     if varied is None:
         return varied
-    edges, curvature, rigidity, taper, bend, sign = varied.profile
-    return Varied(
-        Profile(edges, curvature, rigidity, taper, bend, -sign),
-        varied.work,
-        varied.sheet,
-        varied.slenderness,
-        varied.sign,
-    )
+    return with_sign(varied, -varied.profile.sign)
+
+
+@compiled
+def with_sign(varied: Varied, sign: float) -> Varied:
+    """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
+    edges, curvature, rigidity, taper, bend, _ = varied.profile
+    profile = Profile(edges, curvature, rigidity, taper, bend, sign)
+    return Varied(profile, varied.work, varied.sheet, varied.slenderness, varied.sign)
 
 
 @compiled
