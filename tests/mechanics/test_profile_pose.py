@@ -147,6 +147,13 @@ def test_without_arc_length_nothing_is_between_contact_and_pivot(name):
     np.testing.assert_allclose(found[2, :2], [math.cos(0.3), math.sin(0.3)])
 
 
+def test_a_table_may_have_many_points():
+    columns, s = drawn(5.0), np.linspace(0.0, 1.0, 2001)
+    table, function = profile_of((s, s), (s, 1.0 - 0.3 * s)), profile_of(lambda s: s, lambda s: 1.0 - 0.3 * s)
+    np.testing.assert_allclose(values(table, *columns), values(function, *columns), atol=1e-11)
+    np.testing.assert_allclose(slopes(table, *columns), slopes(function, *columns), atol=1e-9)
+
+
 def test_numbers_that_overflow_are_nan():
     for force in (1e200, math.inf, math.nan):
         assert np.isnan(values(profile_of(0.0), np.array([0.3]), np.array([1.0]), np.array([force]))).all()

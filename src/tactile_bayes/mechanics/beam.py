@@ -43,6 +43,7 @@ __all__ = [
     "varied",
     "varied_of",
     "whole_pose",
+    "with_sign",
 ]
 
 
@@ -104,9 +105,7 @@ def mirrored_by(curvature: float, varied: Varied | None) -> Beam:
     """Rod of a contact, as in `Rods`."""
     if varied is None:
         return Beam(curvature, 1.0, curvature, varied)
-    edges, bent, rigidity, taper, bend, _ = varied.profile
-    of_contact = Profile(edges, bent, rigidity, taper, bend, curvature)
-    return Beam(0.0, 1.0, math.inf, Varied(of_contact, varied.work, varied.sheet, varied.slenderness, varied.sign))
+    return Beam(0.0, 1.0, math.inf, with_sign(varied, curvature))
 
 
 @compiled
@@ -129,14 +128,15 @@ def mirrored_beam(beam: Beam) -> Beam:
 def _mirrored(varied: Varied | None) -> Varied | None:
     if varied is None:
         return varied
-    edges, curvature, rigidity, taper, bend, sign = varied.profile
-    return Varied(
-        Profile(edges, curvature, rigidity, taper, bend, -sign),
-        varied.work,
-        varied.sheet,
-        varied.slenderness,
-        varied.sign,
-    )
+    return with_sign(varied, -varied.profile.sign)
+
+
+@compiled
+def with_sign(varied: Varied, sign: float) -> Varied:
+    """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
+    edges, curvature, rigidity, taper, bend, _ = varied.profile
+    profile = Profile(edges, curvature, rigidity, taper, bend, sign)
+    return Varied(profile, varied.work, varied.sheet, varied.slenderness, varied.sign)
 
 
 @compiled
@@ -234,7 +234,7 @@ def _bending(
             return max(abs(moment), curvature - math.sqrt(before))
         bent = math.sqrt(at_pivot * at_pivot + 2.0 * (math.hypot(force_x, force_y) - lever))
         return max(abs(moment), curvature + bent)
-    return largest_bending_along(varied.profile, drive_angle, moment, force_x, force_y, arclength, varied.work).strain
+    return largest_bending_along(varied.profile, drive_angle, moment, force_x, force_y, arclength, varied.work)
 
 
 @compiled
@@ -251,19 +251,19 @@ def _rest_curvature(varied: Varied | None, curvature: float, arclength: float) -
 
 
 @compiled
-def free_end(beam: Beam, arclength: float, share: float) -> tuple[float, float]:
-    """Point of the free end beyond a contact, at a share of its length, along the rod there and to its left [L]."""
-    return _free_end(beam.varied, beam.curvature, arclength, share)
+def free_end(beam: Beam, arclength: float) -> tuple[float, float]:
+    """Tip of the free end beyond a contact, along the rod there and to its left [L]."""
+    return _free_end(beam.varied, beam.curvature, arclength)
 
 
 @compiled
-def _free_end(varied: Varied | None, curvature: float, arclength: float, share: float) -> tuple[float, float]:
-    length = share * (1.0 - arclength)
+def _free_end(varied: Varied | None, curvature: float, arclength: float) -> tuple[float, float]:
     if varied is None:
+        length = 1.0 - arclength
         turn = 0.5 * curvature * length
         chord = length if turn == 0.0 else length * math.sin(turn) / turn
         return chord * math.cos(turn), chord * math.sin(turn)
-    return beyond_along(varied.profile, arclength, arclength + length, varied.work)
+    return beyond_along(varied.profile, arclength, varied.work)
 
 
 @compiled
@@ -275,7 +275,7 @@ def from_tip(beam: Beam, psi1: float) -> March:
 @compiled
 def _from_tip(varied: Varied | None, psi1: float) -> March:
     if varied is None:
-        return March(1.0, 0, State(psi1, 0.0, 0.0, 0.0))
+        return March(1.0, 0, State(psi1, 0.0, 0.0, 0.0), 0)
     return at_contact(varied.profile, psi1, 1.0)
 
 
@@ -294,5 +294,5 @@ def _loaded_part(
 ) -> March:
     if varied is None:
         here = pose(psi1, share, force, curvature)
-        return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v))
+        return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v), 0)
     return part_along(varied.profile, before, 1.0 - share, force, varied.work)

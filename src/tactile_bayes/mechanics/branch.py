@@ -490,7 +490,7 @@ def _second_contact(scene: Scene, leg: Leg, goes_on: bool, stop: float, work: Le
                 if y * spot.cos > x * spot.sin and is_inside(outline, beside, spot.x + x, spot.y + y, low, high):
                     return p
         elif q < 1.0:
-            along, across = free_end(beam, q, 1.0)
+            along, across = free_end(beam, q)
             cos, sin = _along(spot, outline.half_angle)
             x, y = along * cos - across * sin, along * sin + across * cos
             if is_inside(outline, 1.0, spot.x + x, spot.y + y, low, high):

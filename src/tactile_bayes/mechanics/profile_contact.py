@@ -11,17 +11,15 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.pose import Pose
 from tactile_bayes.mechanics.profile import Profile
-from tactile_bayes.mechanics.profile_pose import pose_along_and_slopes
 from tactile_bayes.mechanics.rises import rise
 from tactile_bayes.mechanics.taylor import FARTHEST, FORWARD, State, advance, begin, moved
 
-__all__ = ["ProfileContact", "contact_along", "contact_along_and_slopes"]
+__all__ = ["ProfileContact", "contact_along"]
 
 
 class ProfileContact(NamedTuple):
-    """Contact of a forward sweep that follows from a base wrench, or its derivative; NaN where there is none."""
+    """Contact of a forward sweep that follows from a base wrench; NaN where there is none."""
 
     x: float
     y: float
@@ -59,54 +57,3 @@ def contact_along(
                     beta + end.psi,
                 )
     return ProfileContact(math.nan, math.nan, math.nan, math.nan, math.nan)
-
-
-@compiled
-def contact_along_and_slopes(
-    profile: Profile, phi0: float, moment: float, fx: float, fy: float, delta: float, work: Floats
-) -> tuple[ProfileContact, ProfileContact, ProfileContact, ProfileContact, ProfileContact]:
-    """Contact, and its derivatives by drive angle, holding moment, and both components of the reaction."""
-    found = contact_along(profile, phi0, moment, fx, fy, delta, work)
-    force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
-    psi1 = found.tip_angle - beta
-    poses = pose_along_and_slopes(profile, psi1, found.arclength, force, work)
-    lever, square = poses[0].u / force, force * force
-    cos, sin = math.cos(beta), math.sin(beta)
-    return (
-        found,
-        _change(found, beta, psi1, poses, 1.0, 0.0, 0.0, 0.0),
-        _change(found, beta, psi1, poses, 0.0, 1.0 / force, 0.0, 0.0),
-        _change(found, beta, psi1, poses, 0.0, lever * sin, -sin, -fy / square),
-        _change(found, beta, psi1, poses, 0.0, -lever * cos, cos, fx / square),
-    )
-
-
-@compiled
-def _change(
-    found: ProfileContact,
-    beta: float,
-    psi1: float,
-    poses: tuple[Pose, Pose, Pose, Pose],
-    by_angle: float,
-    by_u: float,
-    by_force: float,
-    by_beta: float,
-) -> ProfileContact:
-    """Change of a contact with changes of the drive angle, the lever arm, and size and direction of the force.
-
-    Slope and lever arm at the pivot determine ψ1 and the arc length; their determinant is cos ψ1.
-    """
-    _, at_psi1, at_arclength, at_force = poses
-    cos = math.cos(psi1)
-    turn, across = by_angle - by_beta - at_force.turn * by_force, by_u - at_force.u * by_force
-    by_psi1 = (at_arclength.u * turn - at_arclength.turn * across) / cos
-    by_arclength = ((1.0 + at_psi1.turn) * across - at_psi1.u * turn) / cos
-    by_v = at_psi1.v * by_psi1 + at_arclength.v * by_arclength + at_force.v * by_force
-    cos_beta, sin_beta = math.cos(beta), math.sin(beta)
-    return ProfileContact(
-        by_u * cos_beta - by_v * sin_beta - found.y * by_beta,
-        by_u * sin_beta + by_v * cos_beta + found.x * by_beta,
-        by_beta,
-        by_arclength,
-        by_beta + by_psi1,
-    )

@@ -16,6 +16,7 @@ from tactile_bayes.mechanics.pose import Pose
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.taylor import (
     BACKWARD,
+    MOST_STEPS,
     March,
     Slope,
     State,
@@ -29,10 +30,6 @@ from tactile_bayes.mechanics.taylor import (
 )
 
 __all__ = ["at_contact", "part_along", "pose_along", "pose_along_and_slopes"]
-
-
-_MOST_STEPS = 1000
-"""Largest number of steps: a rod that takes more is loaded beyond all reason, as in the search for an equilibrium."""
 
 
 @compiled
@@ -51,12 +48,9 @@ def at_contact(profile: Profile, psi1: float, arclength: float) -> March:
 @compiled
 def part_along(profile: Profile, march: March, until: float, force: float, work: Floats) -> March:
     """March on toward the pivot, to an arc length."""
-    steps = 0
-    while march.at > until and steps < _MOST_STEPS:
-        steps += 1
+    while march.at > until:
         _, march = advance(profile, march, BACKWARD, until, force, work)
-    # NaN of the arc length is that of series that overflow.
-    return March(math.nan, march.cell, State(math.nan, math.nan, math.nan, math.nan)) if march.at > until else march
+    return march
 
 
 @compiled
@@ -70,8 +64,7 @@ def pose_along_and_slopes(
     # A longer rod passes its former contact unloaded.
     by_arclength = Slope(-rest_curvature_at(profile, cell, at), math.cos(psi1), math.sin(psi1))
     steps = 0
-    while at > 0.0 and steps < _MOST_STEPS:
-        steps += 1
+    while at > 0.0 and steps < MOST_STEPS:
         length = at - profile.edges[cell]
         step = slope_series(profile, cell, at, length, force, state, by_psi1, by_arclength, by_force, work)
         state = moved(state, force, step, step.share, work)
@@ -80,6 +73,8 @@ def pose_along_and_slopes(
         if step.share == 1.0:
             at = profile.edges[cell]
             cell -= 1
+        else:
+            steps += 1
     u, v = (math.nan, math.nan) if at > 0.0 else (state.u, state.v)
     v_1 = u * by_psi1.psi - force * (by_psi1.u * by_force.psi - by_force.u * by_psi1.psi)
     v_s = math.sin(psi1) + u * by_arclength.psi

@@ -26,12 +26,10 @@ from tactile_bayes.mechanics.taylor import (
 )
 
 __all__ = [
-    "Bending",
     "Chord",
     "beyond_along",
     "chord_along",
     "largest_bending_along",
-    "reach_along",
     "rest_along",
     "shape_along",
 ]
@@ -53,18 +51,6 @@ class Chord(NamedTuple):
     """Slope of the rod there [rad]."""
     curvature: float
     """Rest curvature there [1/L]."""
-
-
-class Bending(NamedTuple):
-    """Largest bending of a rod between pivot and contact."""
-
-    curvature: float
-    """Largest difference of the curvature from the rest curvature [1/L]."""
-    at: float
-    """Arc length at which it is found [L]."""
-    strain: float
-    """Largest such difference times the diameter, over that at the base [1/L]."""
-    strain_at: float
 
 
 _AT_REST = State(0.0, 0.0, 0.0, 0.0)
@@ -97,7 +83,8 @@ def shape_along(
         before, acting, end = march, force, min(contact, tip)
         if not before.at < contact:
             state = before.state
-            before, acting, end = March(before.at, before.cell, State(state.psi, 0.0, state.u, state.v)), 0.0, tip
+            unloaded = State(state.psi, 0.0, state.u, state.v)
+            before, acting, end = March(before.at, before.cell, unloaded, before.steps), 0.0, tip
         step, march = advance(profile, before, FORWARD, end, acting, work)
         for k in range(arclengths.size):
             if before.at < arclengths[k] <= march.at:
@@ -116,11 +103,11 @@ def rest_along(profile: Profile, arclength: float, work: Floats) -> Chord:
 
 
 @compiled
-def beyond_along(profile: Profile, arclength: float, until: float, work: Floats) -> tuple[float, float]:
-    """Point of the rod at rest at an arc length, along the rod at another before it, and to its left."""
+def beyond_along(profile: Profile, arclength: float, work: Floats) -> tuple[float, float]:
+    """Tip of the rod at rest, along the rod at an arc length, and to its left."""
     march = begin(profile, arclength, FORWARD, _AT_REST)
-    while march.at < until:
-        _, march = advance(profile, march, FORWARD, until, 0.0, work)
+    while march.at < 1.0:
+        _, march = advance(profile, march, FORWARD, 1.0, 0.0, work)
     return march.state.u, march.state.v
 
 
@@ -129,22 +116,11 @@ def chord_along(profile: Profile, distance: float, work: Floats) -> Chord:
     """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
 
     The rod is continued beyond its tip as in `contact_along`."""
-    return _outward(profile, distance, FARTHEST, work)
-
-
-@compiled
-def reach_along(profile: Profile, work: Floats) -> Chord:
-    """Point of the rod at rest that is farthest from the pivot."""
-    return _outward(profile, math.inf, 1.0, work)
-
-
-@compiled
-def _outward(profile: Profile, distance: float, until: float, work: Floats) -> Chord:
     march = begin(profile, 0.0, FORWARD, _AT_REST)
     found, farthest, at = _AT_REST, 0.0, 0.0
-    while march.at < until:
+    while march.at < FARTHEST:
         before = march
-        step, march = advance(profile, before, FORWARD, until, 0.0, work)
+        step, march = advance(profile, before, FORWARD, FARTHEST, 0.0, work)
         x = rise(before.state, 0.0, step, False, distance, work)
         reaches = x >= 0.0
         if not reaches:
@@ -155,6 +131,8 @@ def _outward(profile: Profile, distance: float, until: float, work: Floats) -> C
             found, farthest, at = end, far, before.at + x * step.length
         if reaches:
             break
+    if math.isnan(march.state.psi):
+        at, found = march.at, march.state
     return _chord(profile, at, found)
 
 
@@ -167,23 +145,19 @@ def _chord(profile: Profile, arclength: float, at: State) -> Chord:
 @compiled
 def largest_bending_along(
     profile: Profile, phi0: float, moment: float, fx: float, fy: float, contact: float, work: Floats
-) -> Bending:
-    """Largest bending, to a part in a thousand, for a base wrench and the arc length of its contact."""
+) -> float:
+    """Largest change of curvature between pivot and contact, times the diameter over that at the base [1/L].
+
+    It is that of a base wrench and the arc length of its contact, to a part in a thousand."""
     force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
     march = begin(profile, 0.0, FORWARD, State(phi0 - beta, -moment, 0.0, 0.0))
     end = min(contact, 1.0)
-    curvature, at, strain, strain_at = 0.0, 0.0, 0.0, 0.0
+    strain = 0.0
     while march.at < end:
         before = march
         step, march = advance(profile, before, FORWARD, end, force, work)
         for k in range(_SAMPLES + 1):
             x = step.share * k / _SAMPLES
-            here = before.at + x * step.length
             bending, _ = bending_at(step, moved(before.state, force, step, x, work).load, x, work)
-            bent = abs(bending)
-            if bent > curvature:
-                curvature, at = bent, here
-            bent *= 1.0 - profile.taper * here
-            if bent > strain:
-                strain, strain_at = bent, here
-    return Bending(curvature, at, strain, strain_at)
+            strain = max(strain, abs(bending) * (1.0 - profile.taper * (before.at + x * step.length)))
+    return math.nan if math.isnan(march.state.psi) else strain

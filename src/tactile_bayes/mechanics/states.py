@@ -24,7 +24,7 @@ from tactile_bayes.mechanics.arc import (
     chord_direction_rate,
 )
 from tactile_bayes.mechanics.arc_states import Found, arc_contact
-from tactile_bayes.mechanics.beam import Beam, Varied, mirrored_by
+from tactile_bayes.mechanics.beam import Beam, Varied, mirrored_by, with_sign
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.continuation import NOWHERE, Start, State, continued_state, unloaded_arc
@@ -288,8 +288,7 @@ def profile_shapes(wrenches: Floats, varied: Varied, arclengths: Floats, x: Floa
     """
     for i in range(wrenches.shape[0]):
         phi0, moment, fx, fy = wrenches[i, 0], wrenches[i, 1], wrenches[i, 2], wrenches[i, 3]
-        edges, curvature, rigidity, taper, bend, _ = varied.profile
-        profile, end = Profile(edges, curvature, rigidity, taper, bend, wrenches[i, 4]), 0.0
+        profile, end = with_sign(varied, wrenches[i, 4]).profile, 0.0
         if fx * fx + fy * fy > 0.0 and math.isfinite(moment):
             end = contact_along(profile, phi0, moment, fx, fy, 0.0, varied.work).arclength
         else:

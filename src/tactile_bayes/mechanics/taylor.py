@@ -30,6 +30,7 @@ __all__ = [
     "BACKWARD",
     "FARTHEST",
     "FORWARD",
+    "MOST_STEPS",
     "March",
     "Slope",
     "State",
@@ -59,6 +60,10 @@ FORWARD, BACKWARD = 1.0, -1.0
 FARTHEST = 4.0
 """Arc length up to which a rod is continued beyond its tip, as it is at its tip [L]."""
 
+MOST_STEPS = 1000
+"""Steps inside cells after which a march ends with NaN: the load is beyond all reason, as in some searches for
+equilibria."""
+
 _INVERSE = 1.0 / np.arange(1.0, _TERMS + 1.0)
 
 _CURVATURE, _RIGIDITY, _QUOTIENT, _RATE, _SIN, _COS, _PSI, _U, _V = range(9)
@@ -83,6 +88,9 @@ class State(NamedTuple):
     v: float
 
 
+_NOWHERE = State(math.nan, math.nan, math.nan, math.nan)
+
+
 class March(NamedTuple):
     """State of a rod, and where it is."""
 
@@ -90,6 +98,8 @@ class March(NamedTuple):
     """Arc length from the pivot [L]."""
     cell: int
     state: State
+    steps: int
+    """Steps so far that ended inside a cell."""
 
 
 class Slope(NamedTuple):
@@ -261,14 +271,14 @@ def moved(start: State, force: float, step: Step, x: float, work: Floats) -> Sta
 @compiled
 def begin(profile: Profile, arclength: float, direction: float, state: State) -> March:
     """Start at a point of the rod."""
-    return March(arclength, cell_at(profile, arclength, direction), state)
+    return March(arclength, cell_at(profile, arclength, direction), state, 0)
 
 
 @compiled
 def advance(
     profile: Profile, march: March, direction: float, until: float, force: float, work: Floats
 ) -> tuple[Step, March]:
-    """Write the series of a step toward an arc length, and return the step and its end."""
+    """Write the series of a step toward an arc length, and return the step and its end; NaN after too many steps."""
     last = profile.edges.size - 1
     beside = march.cell if direction < 0.0 else march.cell + 1
     edge = math.inf if beside > last else profile.edges[beside]
@@ -277,10 +287,13 @@ def advance(
     step = series(profile, march.cell, march.at, direction, length, force, march.state, work)
     state = moved(march.state, force, step, step.share, work)
     if step.share < 1.0:
-        return step, March(march.at + direction * step.share * length, march.cell, state)
+        steps = march.steps + 1
+        if steps == MOST_STEPS:
+            return step, March(math.nan, march.cell, _NOWHERE, steps)
+        return step, March(march.at + direction * step.share * length, march.cell, state, steps)
     if end != edge:
-        return step, March(end, march.cell, state)
-    return step, March(end, march.cell + (-1 if direction < 0.0 else 1), state)
+        return step, March(end, march.cell, state, march.steps)
+    return step, March(end, march.cell + (-1 if direction < 0.0 else 1), state, march.steps)
 
 
 @compiled
