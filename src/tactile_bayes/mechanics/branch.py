@@ -127,6 +127,9 @@ _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
 _BODY = 8
 """Number of parts of the rod between which a second contact is looked for."""
 
+_SHORT_END = 1e-3
+"""Length of a free end [L] up to which its curvature at the contact tells whether it is in the object."""
+
 _ACROSS = 0.5 * math.pi
 
 _BY_Q = Equilibrium(0.0, 1.0, 0.0)
@@ -364,10 +367,11 @@ def follow_branch(
             limit = Equilibrium(0.0, psi1 if leg.tip else 1.0, 0.0)
             at_change = settle(loaded, guess(work, change), limit, _BY_Q, 0.0, SETTLED)
             change = min(max(_share(leg, at_change), 0.0), 1.0)
-        last, behind = min(change, 1.0), -1.0
+        last, behind, twice = min(change, 1.0), -1.0, math.nan
         if fate == _NEVER:
-            stop = first_fall(accuracy, is_first, curves)
+            stop, goes_on = first_fall(accuracy, is_first, curves), math.isfinite(behind_begin.at.p)
             if stop == 0.0:
+                twice = _second_contact(scene, leg, goes_on, stop, work)
                 fate, behind = _THRUST if abs(begin.holding_moment) <= _NO_MOMENT else _CORNER, 0.0
             else:
                 folds, stop = stop <= last, min(stop, last)
@@ -378,10 +382,7 @@ def follow_branch(
                     until = at_change
                 if folds:
                     until = settle_on(loaded, leg, stop, guess(work, stop), SETTLED)
-                goes_on = math.isfinite(behind_begin.at.p)
                 twice = _second_contact(scene, leg, goes_on, stop, work)
-                if not math.isnan(twice):
-                    return _nothing(_TOUCHES_TWICE, near.distance, twice)
                 last_at, last_tip, steadiness = until.at, leg.tip, 0.0
                 if folds:
                     fate = _THRUST if abs(until.holding_moment) <= _NO_MOMENT else _FOLD
@@ -400,6 +401,8 @@ def follow_branch(
                     _store(leg, Course(stop, begin_angle, until.drive_angle, steadiness), work, workspace, done)
                     done += 1
                 begin_angle, is_first, behind = until.drive_angle, False, stop
+        if not math.isnan(twice):
+            return _nothing(_TOUCHES_TWICE, near.distance, twice)
         onward = 2.0
         if fate != _NEVER:
             if change < 1.0:
@@ -460,42 +463,53 @@ def _note_event(at: Equilibrium, tip: bool, out: Floats) -> None:
 def _second_contact(scene: Scene, leg: Leg, goes_on: bool, stop: float, work: LegCurves) -> float:
     """Contact up to a position on a leg at which a rod curved toward the object would touch it twice; NaN without one.
 
-    In tangential contact the free end goes on as an arc. It is in the object at once where the contour is less curved
-    than the rod, or further on, at its tip. In tip contact it may be the loaded part.
+    Unless the branch is exact, it is wholly looked for at the beginning and the end only.
     """
-    outline, beam = scene.outline, scene.beam
-    if beam.most_curvature <= 0.0:
+    if scene.beam.most_curvature <= 0.0:
         return math.nan
-    low, high = ends(outline)
+    low, high = ends(scene.outline)
     for k in range(1 if goes_on else 0, work.nodes.size):  # a leg that goes on begins where the last one was checked
         if k > 0 and work.nodes[k] > stop:
             break
         p, q = work.at_nodes[PLACE, k], work.at_nodes[REST, k]
-        spot = narrower(outline, place(outline, p), 1.0 if leg.tip else q)
-        if not leg.tip and spot.bend <= rest_curvature(beam, q) * spot.speed:
+        force = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k])
+        if _touches_twice(scene, leg.tip, Equilibrium(p, q, force), scene.exact or k == 0, low, high):
             return p
-        if not scene.exact and 0 < k < work.nodes.size - 1 and work.nodes[k + 1] <= stop:
-            continue
-        if leg.tip:
-            turned = q - tangential_psi1(scene)
-            if 0.5 * beam.most_curvature <= turned <= _ACROSS:  # the rod is bent toward the object no more than at rest
-                continue
-            force, part = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k]), from_tip(beam, q)
-            for j in range(1, _BODY):
-                part = loaded_part(beam, q, force, j / _BODY, part)
-                cos, sin = _along(spot, scene.rig.friction_angle)
-                u, v = part.state.u, part.state.v
-                x, y = -u * cos + v * sin, -u * sin - v * cos
-                beside = 1.0 - j / _BODY
-                if y * spot.cos > x * spot.sin and is_inside(outline, beside, spot.x + x, spot.y + y, low, high):
-                    return p
-        elif q < 1.0:
-            along, across = free_end(beam, q)
-            cos, sin = _along(spot, outline.half_angle)
-            x, y = along * cos - across * sin, along * sin + across * cos
-            if is_inside(outline, 1.0, spot.x + x, spot.y + y, low, high):
-                return p
-    return math.nan
+    at = guess(work, stop)
+    return at.p if _touches_twice(scene, leg.tip, at, True, low, high) else math.nan
+
+
+@compiled
+def _touches_twice(scene: Scene, tip: bool, at: Equilibrium, wholly: bool, low: float, high: float) -> bool:
+    """Whether a rod touches the object at another point too, between the ends of the contour.
+
+    In tangential contact the free end goes on in its rest shape. It is in the object at once where the contour is less
+    curved than the rod, or further on, at its tip, which is looked for if all is. In tip contact it may be the loaded
+    part.
+    """
+    outline, beam, q = scene.outline, scene.beam, at.q
+    spot = narrower(outline, place(outline, at.p), 1.0 if tip else q)
+    if not tip and spot.bend <= rest_curvature(beam, q) * spot.speed:
+        return True
+    if not wholly:
+        return False
+    if tip:
+        turned = q - tangential_psi1(scene)
+        if 0.5 * beam.most_curvature <= turned <= _ACROSS:  # the rod is bent toward the object no more than at rest
+            return False
+        part, (cos, sin) = from_tip(beam, q), _along(spot, scene.rig.friction_angle)
+        for j in range(1, _BODY):
+            part = loaded_part(beam, q, at.force, j / _BODY, part)
+            u, v = part.state.u, part.state.v
+            x, y = -u * cos + v * sin, -u * sin - v * cos
+            if y * spot.cos > x * spot.sin and is_inside(outline, 1.0 - j / _BODY, spot.x + x, spot.y + y, low, high):
+                return True
+    elif q < 1.0 - _SHORT_END:
+        along, across = free_end(beam, q)
+        cos, sin = _along(spot, outline.half_angle)
+        x, y = along * cos - across * sin, along * sin + across * cos
+        return is_inside(outline, 1.0, spot.x + x, spot.y + y, low, high)
+    return False
 
 
 @compiled
