@@ -40,6 +40,7 @@ CONTOUR = tb.contours.paper_profile("II", q=0.6)
 SLOPES = 0.54, 0.12
 """From soon after first contact to just before snap-off."""
 
+TAPERED = tb.Rod(taper=0.5)
 ANGLES = np.radians(np.arange(180.0))
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 SPECIFICATION: dict[str, Any] = {
@@ -98,9 +99,16 @@ def step_one() -> tuple[list[Row], str]:
     collocation = best_time(lambda: sweep_by_collocation(CONTOUR, slopes, first), 3) / slopes.size
     ours = best_time(equilibria(MANY)) / MANY
     apart = np.abs(sweep_by_shooting(CONTOUR, slopes, first, TIGHT) - exact).max()
+    first_of_tapered = tuple(states(slopes, TAPERED)[0])
+    tapered = (
+        best_time(lambda: sweep_by_collocation(CONTOUR, slopes, first_of_tapered, taper=TAPERED.taper), 3) / slopes.size
+    )
+    few = MANY // 20
+    ours_of_tapered = best_time(equilibria(few, TAPERED)) / few
     return [
         Row("Step 1, a state: solve_ivp and root / equilibria", shooting, ours),
         Row("Step 1, a state: solve_bvp / equilibria", collocation, ours),
+        Row("Step 1, a state of a tapered rod: solve_bvp / equilibria", tapered, ours_of_tapered),
     ], (
         f"Step 1: states with {np.mean(exact[:, 3] == 1.0):.0%} in tip contact, the others tangential; "
         f"shooting at tolerance {TIGHT:g} and equilibria differ by at most {apart:.1e}"
@@ -260,9 +268,9 @@ def time_by_hand(sweep: xr.Dataset) -> float:
     return best_time(lambda: sweep_by_shooting(contour, slopes, first), 1) / slopes.size
 
 
-def states(slopes: np.ndarray) -> np.ndarray:
+def states(slopes: np.ndarray, rod: tb.Rod | None = None) -> np.ndarray:
     """Return drive angle, holding moment, force and arc length of the contact."""
-    found = tb.equilibria(CONTOUR, slopes)
+    found = tb.equilibria(CONTOUR, slopes, rod=rod)
     force = np.hypot(found.force_x, found.force_y)
     return np.stack([found.drive_angle, found.holding_moment, force, found.contact_arclength], axis=1)
 
@@ -296,9 +304,9 @@ def record(count: int) -> xr.Dataset:
     return make_record(columns)
 
 
-def equilibria(count: int) -> Callable[[], Any]:
+def equilibria(count: int, rod: tb.Rod | None = None) -> Callable[[], Any]:
     slopes = np.linspace(*SLOPES, count)
-    return lambda: tb.equilibria(CONTOUR, slopes)
+    return lambda: tb.equilibria(CONTOUR, slopes, rod=rod)
 
 
 def reconstruct(count: int) -> Callable[[], Any]:

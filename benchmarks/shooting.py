@@ -23,6 +23,11 @@ def _rod(s, state, force, beta):
     return [np.cos(phi), np.sin(phi), kappa, force * np.cos(phi - beta)]
 
 
+def _tapered_rod(s, state, force, beta, taper):
+    _, _, phi, moment = state
+    return [np.cos(phi), np.sin(phi), moment / (1.0 - taper * s) ** 4, force * np.cos(phi - beta)]
+
+
 def _sweep(contour, slope_angles: np.ndarray, first: State, solve: Callable) -> np.ndarray:
     """Return states at slope angles, in the phase of the one before, or if that fails in the other."""
     state, tip, states = first, first[3] == 1.0, []
@@ -61,8 +66,13 @@ def sweep_by_shooting(contour, slope_angles: np.ndarray, first: State, rtol: flo
     return _sweep(contour, slope_angles, first, solve)
 
 
-def sweep_by_collocation(contour, slope_angles: np.ndarray, first: State, tol: float = 1e-9) -> np.ndarray:
-    """Return them by solve_bvp, from 200 nodes of the neighbour's solution: other numbers take longer."""
+def sweep_by_collocation(
+    contour, slope_angles: np.ndarray, first: State, tol: float = 1e-9, taper: float = 0.0
+) -> np.ndarray:
+    """Return them by solve_bvp, from 200 nodes of the neighbour's solution: other numbers take longer.
+
+    The fourth component of a state is the bending moment, which is the curvature of a rod without taper.
+    """
     mesh = np.linspace(0.0, 1.0, 200)
     drive_angle, moment, _, length = first
     shape = np.stack([mesh * length * np.cos(drive_angle), mesh * length * np.sin(drive_angle), 0.0 * mesh, 0.0 * mesh])
@@ -73,6 +83,8 @@ def sweep_by_collocation(contour, slope_angles: np.ndarray, first: State, tol: f
 
         def rod(t, state, p):
             force, length = (p[0], 1.0) if tip else p
+            if taper:
+                return length * np.array(_tapered_rod(length * t, state, force, alpha, taper))
             return length * np.array(_rod(t, state, force, alpha))
 
         def boundary(pivot, contact, p):

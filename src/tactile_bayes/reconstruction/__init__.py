@@ -1,5 +1,6 @@
 """Step 2: contact points from a measured record, sample by sample, raw or constrained to possible contacts."""
 
+from tactile_bayes.reconstruction.axial_score import AXIAL_ALARM
 from tactile_bayes.reconstruction.estimate import STATUSES
 from tactile_bayes.reconstruction.samples import FALSE_ALARM, Samples, loaded_samples, samples_of
 from tactile_bayes.reconstruction.sides import (
@@ -10,7 +11,7 @@ from tactile_bayes.reconstruction.sides import (
     side_of,
     with_sides,
 )
-from tactile_bayes.reconstruction.step2 import AXIAL_ALARM, reconstruct
+from tactile_bayes.reconstruction.step2 import reconstruct
 
 __all__ = [
     "AXIAL_ALARM",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from tactile_bayes.arrays import Floats
@@ -23,7 +25,7 @@ from tactile_bayes.reconstruction.estimate import (
 )
 from tactile_bayes.reconstruction.samples import Samples
 
-__all__ = ["are_weighed", "constrained_estimate", "refuse_without_noise"]
+__all__ = ["are_weighed", "constrained_estimate", "principal_steps", "refuse_without_noise"]
 
 _CLEARANCE = 2.0
 """Standard deviations from the edge between the phases below which the phase of a contact is uncertain."""
@@ -96,18 +98,23 @@ def refuse_without_noise(samples: Samples) -> None:
         )
 
 
-def _aside(fit: ContactFit, delta: Floats, rods: Rods) -> list[tuple[Floats, Floats]]:
-    """Contacts one standard deviation aside, along the axes of the covariance."""
-    scale = np.sqrt(np.diagonal(fit.covariance, axis1=1, axis2=2))
+def principal_steps(covariance: Floats) -> Iterator[Floats]:
+    """Steps of one standard deviation along the principal axes of the covariance of coordinates, shape (n, 4)."""
+    scale = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     scale = np.where((scale > 0.0) & np.isfinite(scale), scale, 1.0)
     with np.errstate(invalid="ignore"):
-        scaled = np.nan_to_num(fit.covariance / scale[:, :, None] / scale[:, None, :], posinf=1e6)
+        scaled = np.nan_to_num(covariance / scale[:, :, None] / scale[:, None, :], posinf=1e6)
     variances, axes = np.linalg.eigh(scaled)
-    pairs = []
     for k in range(4):
-        step = scale * axes[:, :, k] * np.sqrt(np.maximum(variances[:, k], 0.0))[:, None]
         if np.any(variances[:, k] > 1e-9):
-            both = fit.coordinates + step, fit.coordinates - step
-            more, less = (contact_states(aside, delta, rods).place.T for aside in both)
-            pairs.append((more, less))
+            yield scale * axes[:, :, k] * np.sqrt(np.maximum(variances[:, k], 0.0))[:, None]
+
+
+def _aside(fit: ContactFit, delta: Floats, rods: Rods) -> list[tuple[Floats, Floats]]:
+    """Contacts one standard deviation aside, along the axes of the covariance."""
+    pairs = []
+    for step in principal_steps(fit.covariance):
+        both = fit.coordinates + step, fit.coordinates - step
+        more, less = (contact_states(aside, delta, rods).place.T for aside in both)
+        pairs.append((more, less))
     return pairs

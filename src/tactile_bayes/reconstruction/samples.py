@@ -43,6 +43,10 @@ class Samples(NamedTuple):
     has_noise: bool
     """True if any noise level is known."""
 
+    def friction_angles(self, friction: float) -> Floats:
+        """Return the friction angles with which the centreline touches, shape (n,)."""
+        return np.full(self.side.size, self.rod.surface.friction_angle(float(np.arctan(friction))))
+
     def take(self, where: Index) -> Samples:
         """Select samples."""
         return self._replace(

@@ -17,6 +17,7 @@ from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.mechanics.surface import Surface
+from tactile_bayes.reconstruction.axial_score import axial_score
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
 from tactile_bayes.reconstruction.raw import raw_estimate
@@ -25,12 +26,10 @@ from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_do
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
 from tactile_bayes.record.schema import column_attributes
 
-__all__ = ["AXIAL_ALARM", "reconstruct"]
+__all__ = ["reconstruct"]
 
 _METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")
-AXIAL_ALARM = 6.0
-"""Size of the axial score above which the force along the rod is reported to disagree with the moment."""
 _NO_CONTACT = 25.0
 """Bound on the misfit of a loaded sample; the value for a sample without a contact."""
 _TWENTY_TO_ONE = 6.0
@@ -97,9 +96,10 @@ def reconstruct(
         within 3 standard deviations; the probability is NaN if samples share errors. A value near 0 means that rod,
         friction or frame are wrong or the noise is larger than stated; near 1, that it is smaller. In tangential
         contact the force along the rod at the pivot follows from the moment, fAx cos φ0 + fAy sin φ0 = m0²/2 (− f sin δ
-        with the friction angle δ, − κ0 m0 with the rest curvature κ0). The weighted mean of the difference over such
-        samples, in standard errors, is axial_score: it is standard normal if the model holds, and far below zero with
-        unstated friction.
+        with the friction angle δ, − κ0 m0 with the rest curvature κ0). For rods that vary along their length the
+        difference is f (sin ψ1 + sin δ), with the angle ψ1 of the rod at the contact from the normal of the force by
+        Step 2. Its weighted mean over such samples, in standard errors, is axial_score: it is standard normal if the
+        model holds, and far below zero with unstated friction.
 
         status is one of
 
@@ -164,7 +164,7 @@ def reconstruct(
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     measured, doubtful = _with_likelier_sides(measured, cell, suspension_compliance, friction)
     samples = samples_of(measured, cell, suspension_compliance)
-    estimate = _METHODS[method](samples, _friction_angles(samples, friction))
+    estimate = _METHODS[method](samples, samples.friction_angles(friction))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
     return kept.assign(_variables(estimate, samples, measured)).assign_attrs(
         method=method,
@@ -193,7 +193,7 @@ def _with_likelier_sides(
             samples = samples_of(with_sides(part, {sweep: side}), cell, suspension_compliance)
             if not are_weighed(samples):
                 break
-            found = constrained_estimate(samples, _friction_angles(samples, friction)).misfit
+            found = constrained_estimate(samples, samples.friction_angles(friction)).misfit
             none = np.nan if found is None else found
             misfits.append(float(np.minimum(np.nan_to_num(none, nan=_NO_CONTACT), _NO_CONTACT)[samples.loaded].sum()))
         fits_better = len(misfits) == 2 and misfits[1] < misfits[0] - _TWENTY_TO_ONE
@@ -252,11 +252,6 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
     return variables
 
 
-def _friction_angles(samples: Samples, friction: float) -> Floats:
-    """Friction angles with which the centreline touches, shape (n,)."""
-    return np.full(samples.side.size, samples.rod.surface.friction_angle(float(np.arctan(friction))))
-
-
 def _in_lab_frame(place: Floats, side: Floats, surface: Surface) -> Floats:
     """Places on the object's surface in the laboratory frame."""
     x, y, alpha, arclength = surface.on_object(place.T)
@@ -283,26 +278,5 @@ def _check(estimate: Estimate, samples: Samples, cell: LoadCell, friction: float
     shared = cell.drift is not None or any(cell.bias_uncertainty)
     probability = np.nan if shared or not count else float(chdtrc(count, total))
     lying = np.flatnonzero(clear & (estimate.phase == TANGENTIAL))
-    score = np.nan if shared or not lying.size else _axial_score(samples.take(lying), friction)
+    score = np.nan if shared or not lying.size else axial_score(samples.take(lying), friction)
     return {"misfit_sum": total, "misfit_samples": count, "misfit_probability": probability, "axial_score": score}
-
-
-def _axial_score(samples: Samples, friction: float) -> float:
-    """Mean difference, over tangential contacts, of the force along the rod at the pivot and its value from the moment,
-    over its standard error; NaN for rods that vary along their length, which have no first integral.
-    """
-    if samples.rods.profile is not None:
-        return np.nan
-    reading, rest = samples.reading, samples.rods.curvature
-    moment, force_x, force_y = reading.loads.T
-    cos, sin = np.cos(reading.drive_angle), np.sin(reading.drive_angle)
-    force = np.hypot(force_x, force_y)
-    drag = friction / np.hypot(1.0, friction)
-    moment_variance = reading.covariance[:, 0, 0]
-    surplus = force_x * cos + force_y * sin + drag * force - 0.5 * (moment**2 - moment_variance)
-    surplus += rest * moment
-    slopes = np.stack([rest - moment, cos + drag * force_x / force, sin + drag * force_y / force], axis=1)
-    by_angle = force_y * cos - force_x * sin + np.sum(slopes * reading.leaning, axis=1)
-    variance = np.einsum("ni,nij,nj->n", slopes, reading.covariance, slopes)
-    variance += (by_angle * reading.angle_deviation) ** 2
-    return float(np.sum(surplus / variance) / np.sqrt(np.sum(1.0 / variance)))

@@ -103,8 +103,8 @@ def contacts_messages(findings: Findings) -> list[str]:
     if np.isfinite(score):
         known = "inferred" if "friction" in json.loads(findings.posterior.attrs["nuisances"]) else "stated"
         said.append(
-            "In tangential contact D = fAx cos φ₀ + fAy sin φ₀ − m₀²/2 is zero, except for the friction that was "
-            f"{known}: its mean deviates by {fixed(score, '+.2f')} standard errors, {_agreement(score)}."
+            "In tangential contact the force along the rod at the pivot follows from the moment, and from the friction "
+            f"that was {known}: the mean deviates by {fixed(score, '+.2f')} standard errors, {_agreement(score)}."
         )
     return said
 

@@ -1,0 +1,71 @@
+"""Agreement of the force along the rod with the moment, of rods that vary along their length."""
+
+import numpy as np
+import pytest
+
+from tactile_bayes.contours import Parabola
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.sweep import scan
+
+CONTOUR = Parabola(0.5, 0.5)
+TAPERED = Rod(diameter=0.02, taper=0.5)
+CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+
+
+def swept(rod, step=4.0, friction=0.0):
+    return scan(CONTOUR, rod=rod, drive_step=np.radians(step), friction=friction).record
+
+
+def score(record, seed, cell=CELL, **known):
+    measured = cell.measure(record, seed=seed)
+    return reconstruct(measured, method="constrained", load_cell=cell, **known).attrs["axial_score"]
+
+
+@pytest.mark.parametrize("curvature", [0.0, 0.4])
+@pytest.mark.parametrize("share", [1.0, 0.1])
+def test_that_of_an_arc_is_the_same_by_its_first_integral_and_by_step_2(curvature, share):
+    """They differ by terms of second order in the noise, some hundredths of a standard error."""
+    cell = LoadCell(force_noise=0.05 * share, moment_noise=0.02 * share)
+    record = swept(Rod(rest_curvature=curvature))
+    for seed in range(3):
+        arc, varied = (
+            score(record, seed, cell, rod=Rod(rest_curvature=curvature, taper=taper)) for taper in (0.0, 1e-9)
+        )
+        assert varied == pytest.approx(arc, abs=0.1 * share)
+
+
+@pytest.mark.parametrize(
+    ("count", "cell", "friction"),
+    [
+        (40, CELL, 0.0),
+        pytest.param(200, CELL, 0.0, marks=pytest.mark.slow),
+        pytest.param(200, CELL, 0.3, marks=pytest.mark.slow),
+        pytest.param(200, LoadCell(force_noise=0.15, moment_noise=0.06), 0.0, marks=pytest.mark.slow),
+        pytest.param(
+            200,
+            LoadCell(force_noise=0.05, moment_noise=0.02, frame="turning", drive_angle_noise=0.01),
+            0.0,
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_that_of_a_tapered_rod_is_standard_normal(count, cell, friction):
+    """Mean within 4.5 standard errors, and spread within 4, of which normal numbers have 1e-4 together."""
+    record = swept(TAPERED, 8.0, friction)
+    scores = [score(record, seed, cell, friction=friction) for seed in range(count)]
+    assert abs(np.mean(scores)) < 4.5 / np.sqrt(count)
+    assert abs(np.std(scores) - 1.0) < 4.0 / np.sqrt(2.0 * count)
+
+
+def test_unstated_friction_makes_that_of_a_tapered_rod_negative():
+    record = swept(TAPERED, friction=0.3)
+    assert score(record, 1) < -20.0
+    assert abs(score(record, 1, friction=0.3)) < 4.0
+
+
+def test_a_straight_rod_taken_for_a_tapered_one_makes_it_large():
+    record = swept(Rod(diameter=0.02))
+    assert abs(score(record, 1)) < 4.0
+    assert abs(score(record, 1, rod=TAPERED)) > 20.0
