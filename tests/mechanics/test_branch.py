@@ -51,7 +51,7 @@ def mirrored(contour):
 def test_states_satisfy_the_integrated_equations(name, curvature, backward, friction):
     """From the pivot, with drive angle and loads, the rod ends at the contact, with its rest curvature there."""
     paths = traced(CONTOURS[name], curvature, backward=backward, friction=friction)
-    assert np.count_nonzero(paths.reach == Reachability.TOUCHES) > COUNT // 4
+    assert np.count_nonzero(paths.reach == Reachability.TOUCHES) > COUNT // 5  # the others touch twice, or not at all
     states = paths.sampled[paths.sampled[..., 0] != NONE]
     own = -curvature if backward else curvature
     for state in states[:: max(1, len(states) // 8)]:
