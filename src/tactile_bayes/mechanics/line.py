@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = ["LINE_COLUMNS", "NO_LINE", "Line", "Offset", "components", "drive_angle_at", "line_at", "line_of", "lines_through", "off_line", "pose_at"]
+__all__ = ["LINE_COLUMNS", "NO_LINE", "Line", "LinePath", "Offset", "components", "drive_angle_at", "line_at", "line_of", "lines_through", "off_line", "pose_at"]
 
 LINE_COLUMNS = 8
 """Columns of a line in an array: its beginning (x, y, drive angle), its direction, and travel at beginning and end."""
@@ -44,40 +44,69 @@ class Line(NamedTuple):
     """Travel at its end."""
 
 
+_STRAIGHT = 1e-9
+"""Distance from a line that is rounding [L and rad]."""
+
 _ORIGIN = Offset(0.0, 0.0, 0.0)
 NO_LINE = Line(_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, 0.0, 0.0)
 
 
-def lines_through(poses: Floats, length: float) -> Floats:
+class LinePath(NamedTuple):
+    """A drive that carries the base, in the sweep frame and in rod lengths, from its first pose."""
+
+    lines: Floats
+    """Shape (lines, `LINE_COLUMNS`)."""
+    travels: Floats
+    """Travel at each pose, shape (n,)."""
+
+
+def lines_through(poses: Floats, length: float, *, backward: bool = False, off: float = _STRAIGHT) -> LinePath:
     """Return the lines between consecutive poses of the base, those that continue each other put together.
 
     Parameters
     ----------
     poses : ndarray, shape (n, 3)
-        Positions [length] and drive angles [rad] of the base, of which no two in succession are the same.
+        Positions [length] and drive angles [rad] of the base in the laboratory frame, at least two that differ.
     length : float
         Length of the rod.
-
-    Returns
-    -------
-    ndarray, shape (lines, `LINE_COLUMNS`)
-        Lines from the first pose, with lengths in rod lengths.
+    backward : bool
+        Whether the sweep frame is the mirror image.
+    off : float
+        Distance from its line [L and rad] up to which a pose lies on it.
     """
-    scaled = np.asarray(poses, dtype=float) / np.array([length, length, 1.0])
-    steps = np.diff(scaled, axis=0)
+    own = np.array(poses, dtype=float)
+    own[:, :2] = (own[:, :2] - own[0, :2]) / length
+    if backward:
+        own[:, 0], own[:, 2] = -own[:, 0], np.pi - own[:, 2]
+    # Drive angles as equilibria have them: a rod that points away from the object never touches it.
+    own[:, 2] -= 2.0 * np.pi * np.floor((own[0, 2] + 0.5 * np.pi) / (2.0 * np.pi))
+    corners = _corners(own, off)
+    steps = np.diff(own[corners], axis=0)
     ways = np.linalg.norm(steps, axis=1)
+    ends = np.append(0.0, np.cumsum(ways))
     along = steps / ways[:, None]
-    bends = np.flatnonzero(np.linalg.norm(np.diff(along, axis=0), axis=1) > _STRAIGHT) + 1
-    travel = np.append(0.0, np.cumsum(ways))
-    first, last = np.append(0, bends), np.append(bends, ways.size)
-    direction = scaled[last] - scaled[first]
-    direction /= np.linalg.norm(direction, axis=1)[:, None]
-    start = scaled[first] - np.array([*scaled[0, :2], 0.0])
-    return np.column_stack([start, direction, travel[first], travel[last]])
+    lines = np.column_stack([own[corners[:-1]], along, ends[:-1], ends[1:]])
+    on = np.searchsorted(corners, np.arange(len(own)), side="right") - 1
+    on = np.minimum(on, len(lines) - 1)
+    travels = ends[on] + np.einsum("ij,ij->i", own - own[corners[on]], along[on])
+    return LinePath(lines, travels)
 
 
-_STRAIGHT = 1e-9
-"""Change of direction that is rounding."""
+def _corners(points: Floats, off: float) -> Index:
+    """Indices of the points between which a path is straight, by the method of Ramer, Douglas and Peucker."""
+    corners, parts = {0, len(points) - 1}, [(0, len(points) - 1)]
+    while parts:
+        first, last = parts.pop()
+        chord = points[last] - points[first]
+        way = float(np.linalg.norm(chord))
+        inside = points[first + 1 : last] - points[first]
+        share = np.clip(inside @ chord / way**2, 0.0, 1.0) if way > 0.0 else np.zeros(len(inside))
+        away = np.linalg.norm(inside - share[:, None] * chord, axis=1)
+        if away.size and away.max() > off:
+            corner = first + 1 + int(np.argmax(away))
+            corners.add(corner)
+            parts += [(first, corner), (corner, last)]
+    return np.array(sorted(corners))
 
 
 @compiled
