@@ -63,7 +63,7 @@ from tactile_bayes.mechanics.leg import (
     shortened,
 )
 from tactile_bayes.mechanics.limits import Approach, approach, arrival
-from tactile_bayes.mechanics.line import line_of, pose_at
+from tactile_bayes.mechanics.line import Line, line_of, pose_at
 from tactile_bayes.mechanics.outline import Outline, Place, ends, from_base, is_inside, narrower, place
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability, SnapOff
 from tactile_bayes.mechanics.readings import (
@@ -333,9 +333,8 @@ def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> _Arrived:
     if lines is None:
         return _Arrived(approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline)
     near, k, travel = arrival(scene.outline, scene.beam, lines, first_step)
-    on = Scene(scene.outline, scene.beam, scene.rig, scene.exact, line_of(lines, k))
-    pose = pose_at(on.line, travel)
-    return _Arrived(near, on, k, from_base(scene.outline, pose.x, pose.y))
+    pose = pose_at(line_of(lines, k), travel)
+    return _Arrived(near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y))
 
 
 @compiled
@@ -396,11 +395,11 @@ def _released(loaded: Loaded, leg: Leg) -> float:
 
 
 @compiled
-def _over(scene: Scene, lines: Floats | None, last: float, accuracy: Accuracy, work: LegCurves) -> float:
+def _over(line: Line | None, last: float, accuracy: Accuracy, work: LegCurves) -> float:
     """Position on a leg, up to a last one, at which the line of the drive ends; above 1 if it does not."""
-    if lines is None:
+    if line is None:
         return 2.0
-    series, end = work.curves.series, scene.line.end
+    series, end = work.curves.series, line.end
     if value(series[ANGLE], last) < end:
         return 2.0
     weighted(work.curves.on.slopes, series[ANGLE], series[ANGLE + 1])
@@ -514,7 +513,7 @@ def follow_branch(
         stop, goes_on = 2.0, math.isfinite(behind_begin.at.p)
         if fate == _NEVER:
             stop = first_fall(accuracy, is_first, curves)
-            over = _over(scene, lines, min(stop, last), accuracy, work)
+            over = _over(scene.line, min(stop, last), accuracy, work)
             if over <= 1.0:
                 at_over, stop, last, change = settle_on(loaded, leg, over, guess(work, over), SETTLED), 2.0, over, 2.0
             if stop == 0.0:

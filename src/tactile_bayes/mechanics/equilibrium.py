@@ -11,8 +11,8 @@ be monotone along the branch: a rod curved against the load is first straightene
 it moves inward. The null vector of the two equations is the branch's tangent, and the drive angle φ0 = β(p) + ψ1 + turn
 follows without another equation.
 
-If a drive carries the base, position and angle of the base that follow from contact and pose must lie on a `Line`: again
-two equations. In place of the drive angle the travel along the line follows.
+If a drive carries the base, position and angle of the base that follow from contact and pose must lie on a `Line`:
+again two equations. In place of the drive angle the travel along the line follows.
 """
 
 from __future__ import annotations
@@ -210,13 +210,12 @@ def _equations(
         )
         moment = force * along
         travel = angle + compliance * moment
-        return _Equations(
-            along - here.u, across - here.v, by_u, by_v, travel, travel_by, moment, moment_by, spot.bend
-        )
+        return _Equations(along - here.u, across - here.v, by_u, by_v, travel, travel_by, moment, moment_by, spot.bend)
     # The vector from the base to the contact, and its derivatives.
     x, y = here.u * cos - here.v * sin, here.u * sin + here.v * cos
-    moment, moment_by = force * here.u, Equilibrium(0.0, force * by_q.u, here.u + force * by_force.u)
-    travel = off_line(line, spot.x - x, spot.y - y, angle + compliance * moment)
+    moment_by = Equilibrium(0.0, force * by_q.u, here.u + force * by_force.u)
+    moment = force * here.u
+    off = off_line(line, spot.x - x, spot.y - y, angle + compliance * moment)
     by_p = components(line, spot.speed * spot.cos + spot.bend * y, spot.speed * spot.sin - spot.bend * x, spot.bend)
     by_rod = components(
         line,
@@ -231,11 +230,11 @@ def _equations(
         by_force.turn + compliance * moment_by.force,
     )
     return _Equations(
-        travel.x,
-        travel.y,
+        off.x,
+        off.y,
         Equilibrium(by_p.x, by_rod.x, by_load.x),
         Equilibrium(by_p.y, by_rod.y, by_load.y),
-        travel.angle,
+        off.angle,
         Equilibrium(by_p.angle, by_rod.angle, by_load.angle),
         moment,
         moment_by,

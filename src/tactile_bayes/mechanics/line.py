@@ -15,7 +15,20 @@ import numpy as np
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = ["LINE_COLUMNS", "NO_LINE", "Line", "LinePath", "Offset", "components", "drive_angle_at", "line_at", "line_of", "lines_through", "off_line", "pose_at"]
+__all__ = [
+    "LINE_COLUMNS",
+    "NO_LINE",
+    "Line",
+    "LinePath",
+    "Offset",
+    "components",
+    "drive_angle_at",
+    "line_at",
+    "line_of",
+    "lines_through",
+    "off_line",
+    "pose_at",
+]
 
 LINE_COLUMNS = 8
 """Columns of a line in an array: its beginning (x, y, drive angle), its direction, and travel at beginning and end."""

@@ -17,7 +17,19 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = ["Half", "Outline", "Place", "ends", "frame", "from_base", "is_inside", "mirrored", "narrower", "on_object", "place"]
+__all__ = [
+    "Half",
+    "Outline",
+    "Place",
+    "ends",
+    "frame",
+    "from_base",
+    "is_inside",
+    "mirrored",
+    "narrower",
+    "on_object",
+    "place",
+]
 
 _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3

@@ -86,6 +86,16 @@ class Paths:
         with np.errstate(invalid="ignore"):
             return np.asarray(self.snap_angle > self.clear_angle)
 
+    def drive_angles_at(self, travels: Floats) -> Floats:
+        """Drive angles at travels in the sweep frame [rad], shape (n,): the travels themselves in rotations."""
+        if self.lines is None:
+            return travels
+        lines = np.broadcast_to(self.lines, (self.sweep_frame.size, *self.lines.shape[1:]))
+        with np.errstate(invalid="ignore"):
+            line = np.maximum(np.count_nonzero(lines[..., 6] <= travels[:, None], axis=1) - 1, 0)
+        at = lines[np.arange(len(lines)), line]
+        return np.asarray(at[:, 2] + (travels - at[:, 6]) * at[:, 5])
+
     def observables(self, drive_angles: Floats) -> Floats:
         """Holding moment and forces at given drive angles; zero out of contact.
 

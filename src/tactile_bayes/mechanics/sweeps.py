@@ -190,7 +190,8 @@ def _scene(
 ) -> Scene:
     """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
     sign = -1.0 if sweep.backward else 1.0
-    rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
+    offset = sign * sweep.offset if line is None else 0.0  # it is in the lines
+    rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, sweep.rigidity)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, sweep.friction_angle - outline.half_angle)
     return Scene(outline, beam, rig, exact, line)
@@ -274,13 +275,13 @@ def solve_events(
 
 
 def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line | None]:
-    """Lines, room for those of one sweep, and a line of their type; None without lines, so that all is compiled twice."""
+    """Lines, room for those of one sweep, and a line of their type, or None: all is compiled for both."""
     return (None, None, None) if lines is None else (lines, np.empty(lines.shape[1:]), NO_LINE)
 
 
 @compiled
 def _clear_angle(scene: Scene, lines: Floats | None, end: float, first_step: float) -> float:
-    """Travel beyond which the unloaded rod is clear; if a drive carries it, only whether it is so where contact ends."""
+    """Travel beyond which the unloaded rod is clear; on lines this only tells whether it is so where contact ends."""
     if lines is None:
         return clear_angle(scene.outline, scene.beam, first_step)
     line = line_of(lines, line_at(lines, end))

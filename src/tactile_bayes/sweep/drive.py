@@ -17,6 +17,7 @@ from tactile_bayes.errors import ParameterError
 
 __all__ = ["Carried", "Drive", "Motion", "Rotation", "Translation"]
 
+_ROUNDING = 1e-15
 _TURN = 2.0 * math.pi
 _IN_DEGREES = "give an angle in radians, at most a turn (2π); one in degrees is converted by np.radians"
 
@@ -112,7 +113,8 @@ class Translation(Carried):
 
     @property
     def poses(self) -> Floats:
-        way = self.travel * np.array([math.cos(self.heading), math.sin(self.heading), 0.0])
+        direction = np.array([math.cos(self.heading), math.sin(self.heading), 0.0])
+        way = self.travel * np.where(np.abs(direction) < _ROUNDING, 0.0, direction)
         begin = np.array([*self.base, self.drive_angle])
         return np.stack([begin, begin + way])
 
@@ -156,7 +158,8 @@ class Motion(Carried):
             columns = np.broadcast_arrays(*given)
         except ValueError as error:
             sizes = ", ".join(str(column.shape) for column in given)
-            raise ParameterError(f"x, y and drive_angle have the shapes {sizes}: give one value for each pose") from error
+            what = f"x, y and drive_angle have the shapes {sizes}: give one value for each pose"
+            raise ParameterError(what) from error
         if columns[0].ndim != 1 or columns[0].size < 2:
             raise ParameterError("a motion needs at least two poses: give x, y or drive_angle as arrays of shape (n,)")
         if np.any(np.abs(columns[2]) > _TURN):

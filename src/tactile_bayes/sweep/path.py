@@ -24,8 +24,8 @@ Direction = Literal["forward", "backward"]
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
-"""Outcomes on the two sides of a carried rod, the most telling first; −1 stands for all others. A rod that is clear of the
-object on one side seems to have passed it on the other."""
+"""Outcomes on the two sides of a carried rod, the most telling first; −1 stands for all others. A rod that is clear of
+the object on one side seems to have passed it on the other."""
 
 
 def sweep_paths(

@@ -216,9 +216,10 @@ def scan(
         With several pivots (a support that is moved, or an array of whiskers) each is used in turn, and the sweeps are
         numbered consecutively.
     drive_step : float, optional
-        Step of a rotation [rad], at most 0.5 and by default 1°; the grid consists of its multiples, from 15 steps before
-        contact to 15 steps after it, within a turn. Step of a drive that carries the base, in its travel [length], by
-        default a hundredth of the rod's length; a `Motion` of more than 8 poses is by default sampled at these.
+        Step of a rotation [rad], at most 0.5 and by default 1°; the grid consists of its multiples, from 15 steps
+        before contact to 15 steps after it, within a turn. Step of a drive that carries the base, in its travel
+        [length], by default a hundredth of the rod's length; a `Motion` of more than 8 poses is by default sampled at
+        these.
     drive_angles : array_like, shape (n,), optional
         Drive angles of rotations in place of this grid [rad], used in increasing order forward and in decreasing order
         backward, without duplicates.
@@ -358,18 +359,19 @@ def _angles(grid: Floats | None, step: float | None, sweep: SweepEvents) -> Floa
 
 def _travels(drive: Carried, step: float | None, sweep: SweepEvents, rod: Rod) -> Floats:
     """Travels of the samples of a drive that carries the base."""
+    travels: Floats
     if step is None and isinstance(drive, Motion) and drive.x.size > _FEWEST_POSES:
         travels = drive.travels
     else:
         step = _SHARE * rod.length if step is None else step
-        travels = step * np.arange(math.floor(float(drive.travels[-1]) / step + _ROUNDING) + 1)
+        travels = np.asarray(step * np.arange(math.floor(float(drive.travels[-1]) / step + _ROUNDING) + 1))
     return travels if sweep.clear else travels[travels <= sweep.snap_off.travel]
 
 
 def _ways(drive: Carried, travels: Floats, direction: str, rod: Rod) -> Floats:
     """Travels in the forward model's own measure."""
     path = lines_through(drive.poses, rod.length, backward=direction == "backward")
-    return np.interp(travels, drive.travels, path.travels)
+    return np.asarray(np.interp(travels, drive.travels, path.travels))
 
 
 def _floats(values: ArrayLike) -> Floats:
@@ -406,7 +408,7 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
 def _sweep(
     paths: Paths, ways: Floats, poses: Floats, number: int, direction: str, rod: Rod
 ) -> dict[str, NDArray[np.generic]]:
-    """Columns of a sweep, at drive angles in the sweep frame or travels, and at the same poses in the laboratory frame."""
+    """Columns of a sweep at drive angles in the sweep frame, or travels, and at the same poses in the laboratory."""
     index = np.zeros(ways.size, dtype=np.intp)
     states = paths.states(index, ways)
     columns = to_lab_frame(paths.sweep_frame, index, states, rod)
