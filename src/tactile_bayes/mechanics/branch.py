@@ -63,7 +63,7 @@ from tactile_bayes.mechanics.leg import (
     shortened,
 )
 from tactile_bayes.mechanics.limits import Approach, approach, arrival
-from tactile_bayes.mechanics.line import Line, line_of, pose_at
+from tactile_bayes.mechanics.line import Line, line_of, only_turns, pose_at
 from tactile_bayes.mechanics.outline import Outline, Place, ends, from_base, is_inside, narrower, place
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability, SnapOff
 from tactile_bayes.mechanics.readings import (
@@ -147,10 +147,13 @@ _SHORT_END = 1e-3
 
 _ACROSS = 0.5 * math.pi
 
-_BY_Q, _BY_FORCE = Equilibrium(0.0, 1.0, 0.0), Equilibrium(0.0, 0.0, 1.0)
+_BY_Q, _BY_FORCE, _NO_FORCE = Equilibrium(0.0, 1.0, 0.0), Equilibrium(0.0, 0.0, 1.0), Equilibrium(0.0, 0.0, 0.0)
 
 _WEAK = 0.5
 """Share of its force that a leg loses along its tangent for a release to be looked for on it."""
+
+_NOT_TURNED = 1e-3
+"""Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried."""
 
 _HELD = 1e-9
 """Slip per length of a leg, in the sense of the friction, that rounding may cause."""
@@ -338,23 +341,28 @@ def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> _Arrived:
 
 
 @compiled
-def _first_balance(scene: Scene, lines: Floats | None, seen: Outline, near: Approach) -> tuple[int, Scene, Balance]:
+def _first_state(
+    scene: Scene, lines: Floats | None, seen: Outline, near: Approach
+) -> tuple[int, Scene, Loaded, Balance]:
     """State at first contact, with the friction that it has: it opposes the slip of the rod along the contour."""
     loaded = in_phase(scene, near.tip_first)
     guessed = first_equilibrium(loaded, seen, near)
     if lines is None:
-        return _TOUCHES, scene, balance(loaded, guessed)[0]
-    begin = settle(loaded, guessed, Equilibrium(0.0, 0.0, 0.0), _BY_FORCE, 0.0, SETTLED)
+        return _TOUCHES, scene, loaded, balance(loaded, guessed)[0]
+    begin = settle(loaded, guessed, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+    if not loaded.tip and begin.at.q > 1.0:  # the approach is not exact
+        near = Approach(near.reach, near.distance, near.begin, True, near.low)
+        loaded = in_phase(scene, True)
+        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
     delta = scene.rig.friction_angle
-    if delta > 0.0 and _slip(loaded, begin) > 0.0:
+    if delta > 0.0 and not only_turns(scene.line) and _slip(loaded, begin) > 0.0:
         scene = with_friction(scene, -delta)
-        loaded = in_phase(scene, near.tip_first)
-        guessed = first_equilibrium(loaded, seen, near)
-        begin = settle(loaded, guessed, Equilibrium(0.0, 0.0, 0.0), _BY_FORCE, 0.0, SETTLED)
+        loaded = in_phase(scene, loaded.tip)
+        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
         if not _slip(loaded, begin) > 0.0:
-            return _STICKS, scene, begin
+            return _STICKS, scene, loaded, begin
     pushed = begin.travel_rate * begin.tangent.force > 0.0
-    return _TOUCHES if pushed else _SLIPS_OFF, scene, begin
+    return _TOUCHES if pushed else _SLIPS_OFF, scene, loaded, begin
 
 
 @compiled
@@ -389,7 +397,7 @@ def _released(loaded: Loaded, leg: Leg) -> float:
     share = -leg.begin.force / leg.along.force
     begin, along = leg.begin, leg.along
     start = Equilibrium(begin.p + share * along.p, begin.q + share * along.q, 0.0)
-    found = settle(loaded, start, Equilibrium(0.0, 0.0, 0.0), _BY_FORCE, 0.0, SETTLED)
+    found = settle(loaded, start, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
     share = _share(leg, found)
     return share if 0.0 < share <= 1.0 else math.nan
 
@@ -443,15 +451,13 @@ def follow_branch(
     near, scene, line, seen = _arrive(scene, lines, accuracy.first_step)
     if near.reach != _TOUCHES:
         return _nothing(near.reach, near.distance, math.nan)
-    reach, scene, begin = _first_balance(scene, lines, seen, near)
+    reach, scene, loaded, begin = _first_state(scene, lines, seen, near)
     z, rig = begin.at, scene.rig
     if reach != _TOUCHES:
         return _nothing(reach, near.distance, z.p)
-    low, psi1 = near.low, tangential_psi1(scene)
-    loaded = in_phase(scene, near.tip_first)
-    first = begin.travel
+    low, psi1, first = near.low, tangential_psi1(scene), begin.travel
     onward_from, nothing = Equilibrium(0.0, 0.0, 1.0), nowhere()
-    if loaded.tip and z.q < psi1:
+    if loaded.tip and z.q < psi1 - (0.0 if lines is None else _NOT_TURNED):
         return _nothing(_TOUCHES_TWICE, near.distance, z.p)
     grazes = _SLIPS_OFF if loaded.tip and z.q > _ACROSS else _GRAZES
     behind_begin, length, known = nothing, _FIRST, 0.0
@@ -539,7 +545,7 @@ def follow_branch(
                     steadiness = min(max(rate * stop / (until.travel - begin_angle), 0.0), 1.0)
                     if released and change > 1.0 and over > 1.0:
                         fate = _RELEASE
-                stuck = math.nan if lines is None else _sticks(loaded, stop, work)
+                stuck = math.nan if only_turns(loaded.line) else _sticks(loaded, stop, work)
                 if not leg.tip and lines is not None and until.at.q < _CLEARANCE:
                     return _nothing(_TOO_CLOSE, near.distance, until.at.p)
                 if wants_states:

@@ -34,9 +34,9 @@ __all__ = [
     "shortened",
 ]
 
-_BY_ROD, _BY_FORCE = 0.2, 0.03
-"""Weights of q and f in the length of a leg. Away from first contact all is smooth in p, where it is monotone: the
-greater its weight, the fewer legs a branch has."""
+_BY_ROD, _BY_FORCE, _BY_FORCE_ON_LINE = 0.2, 0.03, 0.3
+"""Weights of q and f in the length of a leg, the last if the base is carried. Away from first contact all is smooth in
+p, where it is monotone: the greater its weight, the fewer legs a branch has."""
 
 NUDGE = 1e-9
 """Distance beyond a knot of the contour, in its parameter, at which it is smooth."""
@@ -117,7 +117,8 @@ def leg_from(loaded: Loaded, begin: Balance, before: Equilibrium, length: float)
     """
     spot, tangent = place(loaded.outline, begin.at.p + math.copysign(NUDGE, before.p)), begin.tangent
     by_p, loading = spot.speed * spot.speed + spot.bend * spot.bend, 1.0 + begin.at.force
-    across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, _BY_FORCE * tangent.force / (loading * loading))
+    by_force = _BY_FORCE if loaded.line is None else _BY_FORCE_ON_LINE
+    across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
     size = length / math.sqrt(dot(across, tangent))
     if dot(across, before) < 0.0:
         size = -size

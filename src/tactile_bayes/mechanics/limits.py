@@ -39,7 +39,8 @@ _CLEARANCE = CLEARANCE
 _MOST_MOVES = 50
 """Largest number of corrections of a standoff. Each reduces the error to a share of the order of the cone's angle."""
 
-_MOST_HALVINGS = 100
+_MOST_HALVINGS, _LAST = 100, 1e-6
+"""Largest number of steps of that search, and its last step where a rod comes within reach and is past the object."""
 
 _UPRIGHT = 0.5 * math.pi
 
@@ -47,11 +48,17 @@ _ROUNDING = 1e-14
 """Distance from the end of the rod's reach [L] that counts as zero."""
 
 
-_LOOKS = 16
-"""Number of parts of a line between which a carried rod is looked at."""
+_LOOKS, _COARSE = 8, 1e-2
+"""Number of parts of a line between which a carried rod is looked at, and last step of these searches."""
+
+_CLOSE = 1e-3
+"""Angle [rad] to which first contact of a carried rod is found; a search for the equilibrium there follows."""
 
 _DEEPEST = 20
 """Number of steps of the search for the pose in which a rod reaches farthest into an object that it hardly reaches."""
+
+_JUMP = 0.02
+"""Angle [rad] by which a rod that comes within reach of an object is past it, and has not touched it."""
 
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
@@ -227,28 +234,33 @@ def _turned(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> _Tu
 
 
 @compiled
-def _arrival_on(outline: Outline, beam: Beam, line: Line, last_step: float) -> tuple[_Turned, float]:
-    """First contact on a line, and its travel."""
+def _arrival_on(outline: Outline, beam: Beam, line: Line, is_first: bool, last_step: float) -> tuple[_Turned, float]:
+    """First contact on a line, and its travel; NaN if there is none."""
     size = (line.end - line.travel) / _LOOKS
-    before, looked = line.travel, _turned(outline, beam, pose_at(line, line.travel), last_step)
-    if looked.reach != _TOO_FAR and looked.gap <= 0.0:
+    before, looked = line.travel, _turned(outline, beam, pose_at(line, line.travel), _COARSE)
+    nearest, least, was_clear = before, math.inf, looked.gap > 0.0
+    if not was_clear and (is_first or looked.reach == _CUTS_PIVOT or looked.reach == _TOO_CLOSE):
         return looked, before
-    nearest, least = before, looked.gap
     for k in range(1, _LOOKS + 1):
         travel = line.travel + k * size
-        looked = _turned(outline, beam, pose_at(line, travel), last_step)
-        if looked.gap <= 0.0:
-            return _between(outline, beam, line, before, travel, last_step)
-        if looked.gap < least:
+        looked = _turned(outline, beam, pose_at(line, travel), _COARSE)
+        if was_clear and looked.gap <= 0.0:
+            found, at = _between(outline, beam, line, before, travel, last_step)
+            if found.gap > -_JUMP or found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+                return found, at
+        elif was_clear and looked.gap < least:
             nearest, least = travel, looked.gap
-        before = travel
+        before, was_clear = travel, looked.gap > 0.0
+    if least == math.inf:
+        return looked, math.nan
     low, high = max(nearest - size, line.travel), min(nearest + size, line.end)
     for _ in range(_DEEPEST):
         left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        at_left = _turned(outline, beam, pose_at(line, left), last_step)
-        at_right = _turned(outline, beam, pose_at(line, right), last_step)
+        at_left = _turned(outline, beam, pose_at(line, left), _COARSE)
+        at_right = _turned(outline, beam, pose_at(line, right), _COARSE)
         if min(at_left.gap, at_right.gap) <= 0.0:
-            return _between(outline, beam, line, low, left if at_left.gap <= 0.0 else right, last_step)
+            found, at = _between(outline, beam, line, low, left if at_left.gap <= 0.0 else right, last_step)
+            return found, at if found.gap > -_JUMP else math.nan
         if at_left.gap < at_right.gap:
             high = right
         else:
@@ -261,7 +273,7 @@ def _between(
     outline: Outline, beam: Beam, line: Line, clear: float, inside: float, last_step: float
 ) -> tuple[_Turned, float]:
     """First contact between two travels, at the second of which the unloaded rod would cut the object."""
-    settled = last_step * (inside - clear)
+    settled = _LAST * (inside - clear)
     found = _turned(outline, beam, pose_at(line, inside), last_step)
     at_clear, at_inside = _turned(outline, beam, pose_at(line, clear), last_step).gap, found.gap
     if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
@@ -275,7 +287,7 @@ def _between(
             at_clear *= 0.5 if k % 3 == 1 else 1.0
         else:
             clear, at_clear = travel, looked.gap
-        if not inside - clear > settled or at_inside == 0.0:
+        if not inside - clear > settled or found.gap > -_CLOSE:
             break
     return found, inside
 
@@ -288,7 +300,7 @@ def arrival(outline: Outline, beam: Beam, lines: Floats, last_step: float) -> tu
         if math.isnan(lines[k, 0]):
             break
         line = line_of(lines, k)
-        found, travel = _arrival_on(outline, beam, line, last_step)
+        found, travel = _arrival_on(outline, beam, line, k == 0, last_step)
         distance = min(distance, found.distance)
         if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
             return Approach(found.reach, found.distance, math.nan, True, math.nan), k, travel

@@ -27,6 +27,7 @@ __all__ = [
     "line_of",
     "lines_through",
     "off_line",
+    "only_turns",
     "pose_at",
 ]
 
@@ -178,6 +179,14 @@ def pose_at(line: Line, travel: float) -> Offset:
     way = travel - line.travel
     begin, along = line.begin, line.along
     return Offset(begin.x + way * along.x, begin.y + way * along.y, begin.angle + way * along.angle)
+
+
+@compiled
+def only_turns(line: Line | None) -> bool:
+    """Whether the base rests."""
+    if line is None:
+        return True
+    return line.along.x == 0.0 and line.along.y == 0.0
 
 
 @compiled

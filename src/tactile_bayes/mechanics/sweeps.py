@@ -14,6 +14,7 @@ from tactile_bayes.mechanics.beam import Beam, Varied, beam_of, varied_of
 from tactile_bayes.mechanics.branch import (
     MOST_CHANGES,
     BranchWorkspace,
+    Ends,
     branch_workspace,
     follow_branch,
     on_line,
@@ -27,12 +28,12 @@ from tactile_bayes.mechanics.limits import clear_angle, is_clear
 from tactile_bayes.mechanics.line import NO_LINE, Line, line_at, line_of, pose_at
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.profile import Profile
-from tactile_bayes.mechanics.reachability import Reachability
+from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples, write_state
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
 
-_TOUCHES = int(Reachability.TOUCHES)
+_TOUCHES, _NEVER = int(Reachability.TOUCHES), int(SnapOff.NEVER)
 
 _EXACT = Accuracy(resolved=1e-9, sharp=np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True)
 """Accuracy with states and events to rounding."""
@@ -280,12 +281,13 @@ def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line |
 
 
 @compiled
-def _clear_angle(scene: Scene, lines: Floats | None, end: float, first_step: float) -> float:
+def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: float) -> float:
     """Travel beyond which the unloaded rod is clear; on lines this only tells whether it is so where contact ends."""
     if lines is None:
         return clear_angle(scene.outline, scene.beam, first_step)
-    line = line_of(lines, line_at(lines, end))
-    return -math.inf if is_clear(scene.outline, scene.beam, pose_at(line, end), first_step) else math.inf
+    pose = pose_at(line_of(lines, line_at(lines, ends.snap_angle)), ends.snap_angle)
+    is_over = ends.snap_off == _NEVER
+    return -math.inf if is_over or is_clear(scene.outline, scene.beam, pose, first_step) else math.inf
 
 
 @cached
@@ -343,7 +345,7 @@ def _solve(
         event.snap_off, event.phases, event.curvature = ends.snap_off, ends.phases, ends.curvature
         event.clear_angle = math.nan
         if asks_clearance and ends.reach == _TOUCHES:
-            event.clear_angle = _clear_angle(scene, room, ends.snap_angle, accuracy.first_step)
+            event.clear_angle = _clear_angle(scene, room, ends, accuracy.first_step)
 
 
 def solve_sweeps(
