@@ -315,8 +315,9 @@ def cases(tmp_path):
             {
                 **of_scan,
                 "direction": ("both", one_of("both", "forward", "backward")),
-                "drive_step": (0.1, number(1e-6, 0.5)),
+                "drive_step": (0.1, either(nothing, number(1e-6, 0.5))),
                 "drive_angles": (None, either(nothing, row)),
+                "drive": (None, either(nothing, kind(tb.Rotation))),
             },
             {"base": no_bases, "drive_angles": [["1", "2"], [90.0, 180.0], [[]]], "drive_step": ["1", 1]},
         ),

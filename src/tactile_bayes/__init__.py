@@ -22,11 +22,14 @@ _MODULES = ("contours", "datasets", "errors", "paper_figures", "plotting")
 _HOMES = {
     "LoadCell": "load_cell",
     "Misspecification": "calibration.misspecification",
+    "Motion": "sweep",
     "OrnsteinUhlenbeck": "load_cell",
     "Plan": "planning.plan",
     "RandomWalk": "load_cell",
     "Rod": "mechanics.rod",
+    "Rotation": "sweep",
     "SamplerSettings": "inference.ensembles",
+    "Translation": "sweep",
     "calibrate": "calibration.calibrate",
     "calibration_replicate": "calibration.calibrate",
     "check_record": "diagnostics.record_check",
@@ -106,6 +109,9 @@ if TYPE_CHECKING:
     from tactile_bayes.record import read_record as read_record
     from tactile_bayes.record import write_record as write_record
     from tactile_bayes.report import write_report as write_report
+    from tactile_bayes.sweep import Motion as Motion
+    from tactile_bayes.sweep import Rotation as Rotation
+    from tactile_bayes.sweep import Translation as Translation
     from tactile_bayes.sweep import equilibria as equilibria
     from tactile_bayes.sweep import scan as scan
     from tactile_bayes.sweep import scan_many as scan_many

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -175,14 +175,19 @@ def _ranks(
 def _ranks_of_events(tree: xr.DataTree, simulation: Simulation, rng: np.random.Generator) -> dict[str, int]:
     """Rank the true drive angle of snap-off in each sweep segment among the draws."""
     events = tree["events"].to_dataset()
-    angles = events.snap_off_drive_angle.stack(all=("chain", "draw")).values  # (segments, draws)
+    angles = _travels(events).stack(all=("chain", "draw")).values  # (segments, draws)
     picked = rng.choice(angles.shape[1], min(DRAWS, angles.shape[1]), replace=False)
     names = _segment_names(events)
-    truths = simulation.events["snap_off_drive_angle"]
+    truths = _travels(simulation.events)
     return {
         f"snap_off_{name}": _rank(of_segment[picked], truth, rng)
         for name, of_segment, truth in zip(names, angles, truths, strict=True)
     }
+
+
+def _travels(events: Any) -> Any:
+    """Return how far along the drive contact ends, in a data set or a dictionary of events."""
+    return events["snap_off_travel" if "snap_off_travel" in events else "snap_off_drive_angle"]
 
 
 def _segment_names(events: xr.Dataset) -> list[str]:
@@ -248,9 +253,9 @@ def _grid_points(simulation: Simulation) -> dict[str, Floats]:
 
 def _snap_offs(tree: xr.DataTree, simulation: Simulation, probability: float) -> dict[str, float]:
     """Return the share of segments whose snap-off lies in the central interval of the predicted one."""
-    angles = tree["events"].to_dataset().snap_off_drive_angle
+    angles = _travels(tree["events"].to_dataset())
     low, high = np.quantile(angles.values, [0.5 - 0.5 * probability, 0.5 + 0.5 * probability], axis=(0, 1))
-    true = simulation.events["snap_off_drive_angle"]
+    true = _travels(simulation.events)
     return {"snap_off": float(np.mean((low <= true) & (true <= high)))}
 
 

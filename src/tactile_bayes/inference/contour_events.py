@@ -31,7 +31,8 @@ def events_of(
     -------
     dict of str to ndarray, shape (n, segments)
         first_drive_angle and snap_off_drive_angle [rad]; first_contact_x, first_contact_y, snap_off_contact_x and
-        snap_off_contact_y [length].
+        snap_off_contact_y [length]. If a drive carries the base, also first_travel and snap_off_travel: ways of the
+        base [length] where it does so, and else drive angles [rad].
     """
     count = contours.shape[0]
     paths = likelihood.paths(contours, rig, exact=exact)
@@ -43,6 +44,9 @@ def events_of(
         ("snap_off", paths.snap_angle, paths.snap_parameter),
     ):
         locus = paths.sweep_frame.contour.take(batch).locate(np.where(backward, -parameter, parameter))
-        out[f"{label}_drive_angle"] = np.where(backward, np.pi - angle, angle)
+        turned = paths.drive_angles_at(angle)
+        out[f"{label}_drive_angle"] = np.where(backward, np.pi - turned, turned)
+        if paths.lines is not None:
+            out[f"{label}_travel"] = likelihood.ways(angle.reshape(-1, count).T).T.ravel()
         out[f"{label}_contact_x"], out[f"{label}_contact_y"] = locus.x, locus.y
     return {name: values.reshape(-1, count).T for name, values in out.items()}

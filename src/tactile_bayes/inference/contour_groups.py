@@ -110,7 +110,8 @@ def _labelled_events(model: ContourModel, events: Mapping[str, Floats], coords: 
     units = model.measured.attrs["units"]
     variables = {}
     for name, values in events.items():
-        column = COLUMNS[name.removeprefix("first_").removeprefix("snap_off_")]
+        what = name.removeprefix("first_").removeprefix("snap_off_")
+        column = COLUMNS["base_x" if what == "travel" else what]
         variables[name] = (("chain", "draw", "stroke"), values, {"units": column.unit_in(units)})
     sides = ["backward" if segment.backward else "forward" for segment in model.likelihood.segments]
     return xr.Dataset(variables, coords={**coords, "stroke": sides})

@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, present_channels, rod_of, with_rod
+from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of, with_rod
 
 __all__ = ["FoundRig", "contact_points", "found_rig", "rig_with"]
 
@@ -100,9 +99,9 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
     columns = {
         name: measured[name] - drift * fraction for name, drift in zip(CHANNELS, by_channel("drift", 0.0), strict=True)
     }
-    pivots = np.stack([measured.base_x.values, measured.base_y.values], axis=1)
-    for number, pivot in enumerate(bases_of(measured), start=1):
-        at_pivot = np.all(pivots == np.asarray(pivot), axis=1)
+    bases, of_sample = base_of_sample(measured)
+    for number in range(1, len(bases) + 1):
+        at_pivot = of_sample == number - 1
         for name in ("base_x", "base_y"):
             shift = rig.get(f"base_{number}_{name[-1]}", 0.0)
             columns[name] = columns.get(name, measured[name]) + shift * at_pivot

@@ -17,18 +17,28 @@ from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.encoder import EncoderErrors
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.line import LINE_COLUMNS, lines_through
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.shapes import shapes_of
 from tactile_bayes.reconstruction import contact_sides
-from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
+from tactile_bayes.record import (
+    CHANNELS,
+    base_of_sample,
+    carried_sweeps,
+    frame_of,
+    present_channels,
+    rod_of,
+    to_dimensionless,
+    turned,
+)
 
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.forward_table import Box, ForwardTable
     from tactile_bayes.mechanics.sweeps import Segments, Shapes, Solutions, Sweeps
 
-__all__ = ["RecordLikelihood", "Rig", "bases_of", "without_errors"]
+__all__ = ["RecordLikelihood", "Rig", "without_errors"]
 
 _UNFELT = 2e-3
 """Error of loads over their noise that is negligible for 360 samples: it changes their log-likelihood by less than
@@ -46,18 +56,30 @@ default priors, and angles up to that of a coefficient of 0.55. Few draws are be
 the second range of the taper is taken."""
 
 
+_OFF = 1e-6
+"""Distance of recorded poses from a line [L and rad] that is rounding of the record."""
+
+_SCATTER = 10.0
+"""Range of drive angles, over the noise of their readings, of a rod that is clamped at one."""
+
+_TURNS = np.array([[0.0, 0.0, -0.5 * np.pi, 0.0, 0.0, 1.0, -0.5 * np.pi, 1.5 * np.pi]])
+"""Rotation as a line, with the drive angle as travel."""
+
+
 @dataclass(frozen=True)
 class _Segment:
-    """A sweep segment: samples with one pivot, one side of contact and one direction of the drive."""
+    """A sweep segment: samples with one pivot, one side of contact and one direction of the drive, or those of a sweep
+    in which the drive carries the base."""
 
     pivot: int
     """Index of the pivot, in the order of the record."""
     base: tuple[float, float]
-    """The pivot [length]."""
+    """The pivot, or where the drive begins [length]."""
     backward: bool
     """True if the side of contact is that of a backward sweep."""
     sense: float
-    """Direction of the drive, whatever the side of contact: +1 forward, −1 backward."""
+    """Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 if it carries the base, which
+    turns no encoder."""
     samples: Index
     """Indices of the samples, shape (samples of the segment,)."""
 
@@ -139,13 +161,16 @@ class RecordLikelihood:
         angle = record.drive_angle.values - load_cell.misread(measured.direction.values)
         self._turn = angle if frame_of(record) == "turning" else None
         backward = contact_sides(without_errors(measured, load_cell), load_cell) < 0.0
-        bases = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
-        pivots = {base: k for k, base in enumerate(bases_of(measured))}
-        sense = np.where(measured.direction.values == "backward", -1.0, 1.0)
-        kinds, which = np.unique(np.column_stack([bases, backward, sense]), axis=0, return_inverse=True)
+        bases, of_sample = base_of_sample(measured)
+        sweep = measured.sweep.values
+        carried = np.where(np.isin(sweep, carried_sweeps(measured)), sweep + 1, 0)
+        sense = np.where(carried > 0, 0.0, np.where(measured.direction.values == "backward", -1.0, 1.0))
+        places = np.array(bases)[of_sample]
+        kinds, which = np.unique(np.column_stack([places, backward, sense, carried]), axis=0, return_inverse=True)
+        rows = [np.flatnonzero(which == k) for k in range(len(kinds))]
         self.segments = [
-            _Segment(pivots[float(x), float(y)], (float(x), float(y)), bool(b), float(s), np.flatnonzero(which == k))
-            for k, (x, y, b, s) in enumerate(kinds)
+            _Segment(int(of_sample[own[0]]), bases[of_sample[own[0]]], bool(kind[2]), float(kind[3]), own)
+            for kind, own in zip(kinds, rows, strict=True)
         ]
         self._pivots = np.array([segment.pivot for segment in self.segments])
         self._signs = np.array([-1.0 if segment.backward else 1.0 for segment in self.segments])
@@ -156,6 +181,32 @@ class RecordLikelihood:
         for row, segment in zip(self._angles, self.segments, strict=True):
             read = angle[segment.samples]
             row[: read.size] = np.pi - read if segment.backward else read
+        self._ways: dict[int, Floats] = {}
+        self._lines = self._drives(measured, angle) if np.any(carried) else None
+
+    def _drives(self, measured: xr.Dataset, angle: Floats) -> Floats:
+        """Return the lines of all drives, as in `Segments`; travels take the place of drive angles in those that carry.
+
+        A rotation is a line along the drive angle.
+        """
+        noise = max(self.load_cell.drive_angle_noise, self.load_cell.drive_angle_resolution)
+        drives = []
+        for k, (row, segment) in enumerate(zip(self._angles, self.segments, strict=True)):
+            if segment.sense:
+                drives.append(_TURNS)
+                continue
+            own = segment.samples
+            poses = np.column_stack([measured.base_x.values[own], measured.base_y.values[own], angle[own]])
+            if np.ptp(poses[:, 2]) <= _SCATTER * noise:
+                poses[:, 2] = poses[:, 2].mean()
+            path = lines_through(poses, self.rod.length, backward=segment.backward, off=max(_OFF, 3.0 * noise))
+            row[: own.size] = path.travels
+            self._ways[k] = np.append(0.0, np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T)))
+            drives.append(path.lines)
+        lines = np.full((len(drives), max(map(len, drives)), LINE_COLUMNS), np.nan)
+        for of_segment, drive in zip(lines, drives, strict=True):
+            of_segment[: len(drive)] = drive
+        return lines
 
     @property
     def noise(self) -> Floats:
@@ -183,10 +234,14 @@ class RecordLikelihood:
         exact : bool
             Whether paths are exact to rounding, or as accurate as the noise requires.
         drive_angles : ndarray, shape (segments · n, k), optional
-            True drive angles in the sweep frame [rad].
+            Travels as from `travels`, or others in the sweep frame.
         """
         rig = self._rig_of(rig, contours.shape[0])
-        segments = len(self.segments)
+        segments, lines = len(self.segments), None
+        if self._lines is not None:
+            lines = np.repeat(self._lines[:, None], contours.shape[0], axis=1)
+            lines[..., 2] -= (self._signs * self._misread(rig)).T[..., None]
+            lines = lines.reshape(-1, *lines.shape[2:])
         return trace(
             self._in_sweep_frame(contours, rig),
             friction_angle=np.tile(np.arctan(rig.friction), segments),
@@ -194,6 +249,7 @@ class RecordLikelihood:
             profile=self._profile(rig),
             tolerance=None if exact else self._tolerance,
             drive_angles=drive_angles,
+            lines=lines,
         )
 
     def _in_sweep_frame(self, contours: Contour, rig: Rig) -> SweepFrame:
@@ -252,6 +308,35 @@ class RecordLikelihood:
         rig = self._rig_of(rig, contours.shape[0])
         return self._events(self._solutions(contours, rig), rig)[..., 1]
 
+    def travels(self, drive_angles: Floats, rig: Rig) -> Floats:
+        """Return travels of samples as `paths` takes them, shape (n or 1, samples): drive angles [rad], or ways [L].
+
+        Parameters
+        ----------
+        drive_angles : ndarray, shape (samples,)
+            Readings of drive angles, corrected by the data sheet; NaN for samples without interest.
+        rig : Rig
+            Deviations from the stated rig.
+        """
+        backward = np.array([segment.backward for segment in self.segments])[self.segment_of_sample]
+        in_sweep_frame = np.where(backward, np.pi - drive_angles, drive_angles)[None]
+        if self._lines is None:
+            return np.asarray(in_sweep_frame - np.where(backward, -1.0, 1.0) * self.misread(rig))
+        carried = np.array([not segment.sense for segment in self.segments])[self.segment_of_sample]
+        known = carried & np.isfinite(drive_angles)
+        return np.where(known, self.angles_in_sweep_frame, in_sweep_frame)
+
+    def ways(self, travels: Floats) -> Floats:
+        """Convert travels in the sweep frame, shape (n, segments), to ways of the base [length] where it is carried,
+        and to drive angles as read [rad] elsewhere."""
+        ways = np.array(travels)
+        for k, segment in enumerate(self.segments):
+            if segment.sense:
+                ways[:, k] = np.pi - ways[:, k] if segment.backward else ways[:, k]
+            else:
+                ways[:, k] = np.interp(ways[:, k], self._angles[k, : segment.samples.size], self._ways[k])
+        return ways
+
     def misread(self, rig: Rig) -> Floats:
         """Return the errors of the encoder in addition to the data sheet [rad], shape (n or 1, samples)."""
         return self._misread(rig)[:, self.segment_of_sample]
@@ -288,7 +373,8 @@ class RecordLikelihood:
 
     @cached_property
     def angles_in_sweep_frame(self) -> Floats:
-        """Reading of the drive angle of each sample in the sweep frame [rad], shape (samples,)."""
+        """Reading of the drive angle of each sample in the sweep frame [rad], shape (samples,); where the base is
+        carried, its travel [L]."""
         angles = np.empty(len(self.measured))
         for segment, row in zip(self.segments, self._angles, strict=True):
             angles[segment.samples] = row[: segment.samples.size]
@@ -359,7 +445,8 @@ class RecordLikelihood:
     def _events(self, found: Solutions, rig: Rig) -> Floats:
         """Return readings of the drive angle at first contact and snap-off, in the sweep frame, (n, segments, 2)."""
         events = np.stack([found.first_angle, found.snap_angle], axis=-1).reshape(len(self.segments), -1, 2)
-        return np.asarray(events.swapaxes(0, 1) + (self._signs * self._misread(rig))[..., None])
+        misread = 0.0 if self._lines is not None else (self._signs * self._misread(rig))[..., None]
+        return np.asarray(events.swapaxes(0, 1) + misread)
 
     def _shapes(self, contours: Contour, rig: Rig) -> Shapes:
         if contours.halves is not None:
@@ -405,13 +492,15 @@ class RecordLikelihood:
             samples, angles = [], []
             for row, segment in zip(self._angles, self.segments, strict=True):
                 shifts = errors if segment.backward else -errors
+                if not segment.sense:
+                    shifts = np.zeros_like(errors)
                 shifted = (row[: segment.samples.size] + shifts[:, None]).ravel()
                 order = np.argsort(shifted, kind="stable")
                 angles.append(shifted[order])
                 rows = segment.samples + len(self.measured) * np.arange(errors.size)[:, None]
                 samples.append(rows.ravel()[order])
             first = np.cumsum([0, *(part.size for part in samples)])
-            self._samples_by_errors[key] = Segments(first, np.concatenate(samples), np.concatenate(angles))
+            self._samples_by_errors[key] = Segments(first, np.concatenate(samples), np.concatenate(angles), self._lines)
         return self._samples_by_errors[key]
 
     def log_likelihood(
@@ -461,11 +550,6 @@ def _longest(loaded: Flags) -> tuple[int, int]:
     lowest = np.minimum.accumulate(sums)
     end = int(np.argmax(sums - lowest))
     return int(np.argmin(sums[: end + 1])), end - 1
-
-
-def bases_of(measured: xr.Dataset) -> list[tuple[float, float]]:
-    """Return the pivots (x, y) of a record [length], in its order."""
-    return list(dict.fromkeys(zip(measured.base_x.values.tolist(), measured.base_y.values.tolist(), strict=True)))
 
 
 def without_errors(measured: xr.Dataset, load_cell: LoadCell) -> xr.Dataset:

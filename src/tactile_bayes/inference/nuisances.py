@@ -14,13 +14,13 @@ from scipy import stats
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_names, check_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.likelihood import Rig, bases_of
+from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.record import present_channels, rod_of
+from tactile_bayes.record import bases_of, present_channels, rod_of
 
 __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
 

@@ -36,6 +36,7 @@ __all__ = [
     "chord_to",
     "free_end",
     "from_tip",
+    "integrated",
     "loaded_part",
     "mirrored_beam",
     "mirrored_by",
@@ -137,6 +138,19 @@ def with_sign(varied: Varied, sign: float) -> Varied:
     edges, curvature, rigidity, taper, bend, _ = varied.profile
     profile = Profile(edges, curvature, rigidity, taper, bend, sign)
     return Varied(profile, varied.work, varied.sheet, varied.slenderness, varied.sign)
+
+
+@compiled
+def integrated(beam: Beam) -> Beam:
+    """Rod without coefficients of a table, which hold for one angle of friction."""
+    return Beam(beam.curvature, beam.reach, beam.most_curvature, _integrated(beam.varied))
+
+
+@compiled
+def _integrated(varied: Varied | None) -> Varied | None:
+    if varied is None:
+        return varied
+    return Varied(varied.profile, varied.work, varied.sheet, 0.0, varied.sign)
 
 
 @compiled

@@ -5,6 +5,9 @@ where the phase changes or the contour is not smooth. The first maximum of the d
 derivative vanishes), a corner, or the point where the line of force passes through the pivot. A maximum after which the
 drive angle falls by less than `curves.DIP` before it exceeds the maximum again does not count: the branch continues
 where it does so. This happens where a radius of curvature vanishes.
+
+If the drive carries the base, its travel along lines takes the place of the drive angle. Contact may then also end
+because the force vanishes, and is known as far as the drive goes. A leg ends where a line does.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.beam import free_end, from_tip, loaded_part, rest_curvature
+from tactile_bayes.mechanics.beam import free_end, from_tip, integrated, loaded_part, rest_curvature
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
@@ -34,6 +37,7 @@ from tactile_bayes.mechanics.equilibrium import (
     Balance,
     Equilibrium,
     Loaded,
+    Rig,
     Scene,
     balance,
     dot,
@@ -43,6 +47,7 @@ from tactile_bayes.mechanics.equilibrium import (
     settle,
     settle_at,
     tangential_psi1,
+    times,
 )
 from tactile_bayes.mechanics.leg import (
     NUDGE,
@@ -57,9 +62,10 @@ from tactile_bayes.mechanics.leg import (
     settle_on,
     shortened,
 )
-from tactile_bayes.mechanics.limits import approach
-from tactile_bayes.mechanics.outline import Place, ends, is_inside, narrower, place
-from tactile_bayes.mechanics.reachability import Reachability, SnapOff
+from tactile_bayes.mechanics.limits import Approach, approach, arrival
+from tactile_bayes.mechanics.line import Line, line_of, only_turns, pose_at
+from tactile_bayes.mechanics.outline import Outline, Place, ends, from_base, is_inside, narrower, place
+from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability, SnapOff
 from tactile_bayes.mechanics.readings import (
     Asked,
     Followed,
@@ -80,7 +86,15 @@ from tactile_bayes.mechanics.series import (
     weighted,
 )
 
-__all__ = ["MOST_CHANGES", "BranchWorkspace", "Ends", "branch_workspace", "follow_branch"]
+__all__ = [
+    "MOST_CHANGES",
+    "BranchWorkspace",
+    "Ends",
+    "branch_workspace",
+    "follow_branch",
+    "on_line",
+    "with_friction",
+]
 
 MOST_CHANGES = 16
 """Largest number of phases of a branch that are recorded."""
@@ -122,7 +136,8 @@ _ROUNDING = 1e-14
 
 _TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_OUT), int(Reachability.GRAZES)
 _TOUCHES_TWICE, _SLIPS_OFF = int(Reachability.TOUCHES_TWICE), int(Reachability.SLIPS_OFF)
-_NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
+_STICKS, _TOO_CLOSE, _CLEARANCE = int(Reachability.STICKS), int(Reachability.TOO_CLOSE), CLEARANCE
+_NEVER, _FOLD, _CORNER, _THRUST, _RELEASE = (int(kind) for kind in SnapOff)
 
 _BODY = 8
 """Number of parts of the rod between which a second contact is looked for."""
@@ -132,7 +147,16 @@ _SHORT_END = 1e-3
 
 _ACROSS = 0.5 * math.pi
 
-_BY_Q = Equilibrium(0.0, 1.0, 0.0)
+_BY_Q, _BY_FORCE, _NO_FORCE = Equilibrium(0.0, 1.0, 0.0), Equilibrium(0.0, 0.0, 1.0), Equilibrium(0.0, 0.0, 0.0)
+
+_WEAK = 0.5
+"""Share of its force that a leg loses along its tangent for a release to be looked for on it."""
+
+_NOT_TURNED = 1e-3
+"""Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried."""
+
+_HELD = 1e-9
+"""Slip per length of a leg, in the sense of the friction, that rounding may cause."""
 
 
 class Ends(NamedTuple):
@@ -160,7 +184,7 @@ class BranchWorkspace(NamedTuple):
     knots: Floats
     """Parameters at which the contour may not be smooth."""
     followed: Floats
-    """Legs that have been followed, as in `Leg` and `Course`, shape (legs, 14)."""
+    """Legs that have been followed, as in `Leg` and `Course`, shape (legs, 15)."""
     curves: Floats
     """Their series, shape (legs, 7, order)."""
 
@@ -168,7 +192,7 @@ class BranchWorkspace(NamedTuple):
 def branch_workspace(samples: int, order: int, knots: int) -> BranchWorkspace:
     """Workspace for at most so many samples, with `order` nodes on a leg and `knots` knots of the contour."""
     return BranchWorkspace(
-        leg_curves(order), asked(samples), np.empty(knots), np.empty((_MOST, 14)), np.empty((_MOST, 7, order))
+        leg_curves(order), asked(samples), np.empty(knots), np.empty((_MOST, 15)), np.empty((_MOST, 7, order))
     )
 
 
@@ -227,13 +251,13 @@ def _polished_fold(loaded: Loaded, leg: Leg, stop: float, work: LegCurves) -> fl
     curves = work.curves
     weighted(curves.on.slopes, curves.series[ANGLE + 1], curves.bend)
     bend = value(curves.bend, stop)
-    at_stop, last = settle_on(loaded, leg, stop, guess(work, stop), SETTLED).angle_rate, 2e-2
+    at_stop, last = settle_on(loaded, leg, stop, guess(work, stop), SETTLED).travel_rate, 2e-2
     for _ in range(7):
         step = at_stop / bend
         if not abs(step) < 0.5 * last:
             break
         new = min(max(stop - step, 0.0), 1.0)
-        at_new = settle_on(loaded, leg, new, guess(work, new), SETTLED).angle_rate
+        at_new = settle_on(loaded, leg, new, guess(work, new), SETTLED).travel_rate
         bend = (at_new - at_stop) / (new - stop)
         stop, at_stop, last = new, at_new, abs(step)
     return stop
@@ -261,12 +285,12 @@ def _past(loaded: Loaded, at_knot: Balance, sense: float) -> Balance:
     rates = balance(loaded, behind)[0]
     return Balance(
         at,
-        at_knot.drive_angle,
+        at_knot.travel,
         at_knot.holding_moment,
         at_knot.force_x,
         at_knot.force_y,
         rates.tangent,
-        rates.angle_rate,
+        rates.travel_rate,
         rates.moment_rate,
         rates.x_rate,
         rates.y_rate,
@@ -282,9 +306,126 @@ def _bent(stop: float, loaded: Loaded, curves: Curves) -> float:
     return largest_curvature(stop, loaded, curves)
 
 
+class _Arrived(NamedTuple):
+    """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
+
+    near: Approach
+    scene: Scene
+    line: int
+    seen: Outline
+
+
+@compiled
+def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
+    """Scene with another line of the drive."""
+    if lines is None:
+        return scene
+    return Scene(scene.outline, scene.beam, scene.rig, scene.exact, line_of(lines, k))
+
+
+@compiled
+def with_friction(scene: Scene, angle: float) -> Scene:
+    """Scene with friction that acts in the other sense."""
+    _, compliance, offset, sign, rigidity = scene.rig
+    rig = Rig(angle, compliance, offset, sign, rigidity)
+    return Scene(scene.outline, integrated(scene.beam), rig, scene.exact, scene.line)
+
+
+@compiled
+def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> _Arrived:
+    if lines is None:
+        return _Arrived(approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline)
+    near, k, travel = arrival(scene.outline, scene.beam, lines, first_step)
+    pose = pose_at(line_of(lines, k), travel)
+    return _Arrived(near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y))
+
+
+@compiled
+def _first_state(
+    scene: Scene, lines: Floats | None, seen: Outline, near: Approach
+) -> tuple[int, Scene, Loaded, Balance]:
+    """State at first contact, with the friction that it has: it opposes the slip of the rod along the contour."""
+    loaded = in_phase(scene, near.tip_first)
+    guessed = first_equilibrium(loaded, seen, near)
+    if lines is None:
+        return _TOUCHES, scene, loaded, balance(loaded, guessed)[0]
+    begin = settle(loaded, guessed, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+    if not loaded.tip and begin.at.q > 1.0:  # the approach is not exact
+        near = Approach(near.reach, near.distance, near.begin, True, near.low)
+        loaded = in_phase(scene, True)
+        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+    delta = scene.rig.friction_angle
+    if delta > 0.0 and not only_turns(scene.line) and _slip(loaded, begin) > 0.0:
+        scene = with_friction(scene, -delta)
+        loaded = in_phase(scene, loaded.tip)
+        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+        if not _slip(loaded, begin) > 0.0:
+            return _STICKS, scene, loaded, begin
+    pushed = begin.travel_rate * begin.tangent.force > 0.0
+    return _TOUCHES if pushed else _SLIPS_OFF, scene, loaded, begin
+
+
+@compiled
+def _slip(loaded: Loaded, found: Balance) -> float:
+    """Slip of the rod along the contour, to greater parameters, per travel."""
+    spot = narrower(loaded.outline, place(loaded.outline, found.at.p), 1.0 if loaded.tip else found.at.q)
+    slip = spot.speed * found.tangent.p - (0.0 if loaded.tip else found.tangent.q)
+    return slip / found.travel_rate
+
+
+@compiled
+def _sticks(loaded: Loaded, stop: float, work: LegCurves) -> float:
+    """Contact up to a position on a leg where the rod does not slip against its friction; NaN if there is none."""
+    half = work.nodes.size
+    for k in range(half):
+        if loaded.friction_angle == 0.0 or (k > 0 and work.nodes[k] > stop):
+            break
+        p = work.at_nodes[PLACE, k]
+        spot = narrower(loaded.outline, place(loaded.outline, p), 1.0 if loaded.tip else work.at_nodes[REST, k])
+        along_rod = 0.0 if loaded.tip else work.at_nodes[REST, half + k]
+        slip = spot.speed * work.at_nodes[PLACE, half + k] - along_rod
+        if math.copysign(slip, slip * loaded.friction_angle) > _HELD:
+            return p
+    return math.nan
+
+
+@compiled
+def _released(loaded: Loaded, leg: Leg) -> float:
+    """Share of a leg at which the force vanishes; NaN if it hardly falls, or if that is not on the leg."""
+    if not leg.along.force < -_WEAK * leg.begin.force:
+        return math.nan
+    share = -leg.begin.force / leg.along.force
+    begin, along = leg.begin, leg.along
+    start = Equilibrium(begin.p + share * along.p, begin.q + share * along.q, 0.0)
+    found = settle(loaded, start, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+    share = _share(leg, found)
+    return share if 0.0 < share <= 1.0 else math.nan
+
+
+@compiled
+def _over(line: Line | None, last: float, accuracy: Accuracy, work: LegCurves) -> float:
+    """Position on a leg, up to a last one, at which the line of the drive ends; above 1 if it does not."""
+    if line is None:
+        return 2.0
+    series, end = work.curves.series, line.end
+    if value(series[ANGLE], last) < end:
+        return 2.0
+    weighted(work.curves.on.slopes, series[ANGLE], series[ANGLE + 1])
+    return crossing(series[ANGLE], series[ANGLE + 1], end, last, 0.0, 0.5 * last, accuracy.last_step)
+
+
+@compiled
+def _goes_on(lines: Floats | None, k: int) -> bool:
+    """Whether the drive goes on after a line."""
+    if lines is None:
+        return False
+    return k + 1 < lines.shape[0] and not math.isnan(lines[k + 1, 0])
+
+
 @compiled
 def follow_branch(
     scene: Scene,
+    lines: Floats | None,
     knots: Floats,
     samples: Samples,
     accuracy: Accuracy,
@@ -297,30 +438,33 @@ def follow_branch(
     Parameters
     ----------
     scene : Scene
+        With the first line of a drive that carries the base.
+    lines : ndarray, shape (lines, `LINE_COLUMNS`), optional
+        Lines of that drive, NaN after the last.
     knots : ndarray, shape (k,)
         Parameters at which the contour may not be smooth.
     tolerance : ndarray, shape (3,)
         Tolerated errors of moment and forces [EI/L and EI/L²].
     """
-    rig, work = scene.rig, workspace.leg
+    work = workspace.leg
     curves = work.curves
-    near = approach(scene.outline, scene.beam, accuracy.first_step)
+    near, scene, line, seen = _arrive(scene, lines, accuracy.first_step)
     if near.reach != _TOUCHES:
         return _nothing(near.reach, near.distance, math.nan)
-    low, psi1 = near.low, tangential_psi1(scene)
-    loaded = in_phase(scene, near.tip_first)
-    z = first_equilibrium(loaded, near)
-    begin = balance(loaded, z)[0]
-    first = begin.drive_angle
+    reach, scene, loaded, begin = _first_state(scene, lines, seen, near)
+    z, rig = begin.at, scene.rig
+    if reach != _TOUCHES:
+        return _nothing(reach, near.distance, z.p)
+    low, psi1, first = near.low, tangential_psi1(scene), begin.travel
     onward_from, nothing = Equilibrium(0.0, 0.0, 1.0), nowhere()
-    if loaded.tip and z.q < psi1:
+    if loaded.tip and z.q < psi1 - (0.0 if lines is None else _NOT_TURNED):
         return _nothing(_TOUCHES_TWICE, near.distance, z.p)
     grazes = _SLIPS_OFF if loaded.tip and z.q > _ACROSS else _GRAZES
     behind_begin, length, known = nothing, _FIRST, 0.0
     settled, power = max(SETTLED, 0.1 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
     shortest, excess_before = _LONGEST * 0.5**accuracy.halvings, math.inf
     begin_angle, last_at, last_tip, fate = first, z, loaded.tip, _NEVER
-    changes, largest, is_first, done, runs_out = 0, math.nan, True, 0, False
+    changes, largest, is_first, done, runs_out, is_over = 0, math.nan, True, 0, False, False
     wants_states = found.changes.shape[0] > 0
     for _ in range(4 * _MOST):
         if done == _MOST:
@@ -329,6 +473,10 @@ def follow_branch(
         if known == 0.0 and scene.beam.varied is not None:
             share = _share_in_phase(leg, psi1)
             leg, length = shortened(leg, share), share * length
+        share = math.nan if lines is None else _released(loaded, leg)
+        released = share <= 1.0
+        if released:
+            leg, length, known = shortened(leg, share), share * length, share * known
         sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, known, settled, work)
         known, knot, at_knot = 0.0, math.nan, begin
         if sound:
@@ -339,7 +487,7 @@ def follow_branch(
                 if not share > 0.0:
                     length *= _LEAST_PACE
                     continue
-                leg, length = shortened(leg, share), share * length
+                leg, length, released = shortened(leg, share), share * length, False
                 sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, share, settled, work)
         excess = _excess(accuracy, tolerance, fate != _NEVER, work) if sound else math.inf
         pace = min(max((_AIM / excess) ** power, _LEAST_PACE), _MOST_PACE) if sound else _LEAST_PACE
@@ -367,11 +515,15 @@ def follow_branch(
             limit = Equilibrium(0.0, psi1 if leg.tip else 1.0, 0.0)
             at_change = settle(loaded, guess(work, change), limit, _BY_Q, 0.0, SETTLED)
             change = min(max(_share(leg, at_change), 0.0), 1.0)
-        last, behind, twice = min(change, 1.0), -1.0, math.nan
+        last, behind, twice, stuck, over, at_over = min(change, 1.0), -1.0, math.nan, math.nan, 2.0, begin
+        stop, goes_on = 2.0, math.isfinite(behind_begin.at.p)
         if fate == _NEVER:
-            stop, goes_on = first_fall(accuracy, is_first, curves), math.isfinite(behind_begin.at.p)
+            stop = first_fall(accuracy, is_first, curves)
+            over = _over(scene.line, min(stop, last), accuracy, work)
+            if over <= 1.0:
+                at_over, stop, last, change = settle_on(loaded, leg, over, guess(work, over), SETTLED), 2.0, over, 2.0
             if stop == 0.0:
-                twice = _second_contact(scene, leg, goes_on, stop, work)
+                twice = _second_contact(scene, seen, leg, goes_on, stop, work)
                 fate, behind = _THRUST if abs(begin.holding_moment) <= _NO_MOMENT else _CORNER, 0.0
             else:
                 folds, stop = stop <= last, min(stop, last)
@@ -380,29 +532,41 @@ def follow_branch(
                 until = end if math.isnan(knot) else at_knot
                 if change <= 1.0:
                     until = at_change
+                if over <= 1.0:
+                    until = at_over
                 if folds:
                     until = settle_on(loaded, leg, stop, guess(work, stop), SETTLED)
-                twice = _second_contact(scene, leg, goes_on, stop, work)
+                twice = _second_contact(scene, seen, leg, goes_on, stop, work)
                 last_at, last_tip, steadiness = until.at, leg.tip, 0.0
                 if folds:
                     fate = _THRUST if abs(until.holding_moment) <= _NO_MOMENT else _FOLD
                 else:
                     rate = value(curves.series[ANGLE + 1], stop)
-                    steadiness = min(max(rate * stop / (until.drive_angle - begin_angle), 0.0), 1.0)
+                    steadiness = min(max(rate * stop / (until.travel - begin_angle), 0.0), 1.0)
+                    if released and change > 1.0 and over > 1.0:
+                        fate = _RELEASE
+                stuck = math.nan if only_turns(loaded.line) else _sticks(loaded, stop, work)
+                if not leg.tip and lines is not None and until.at.q < _CLEARANCE:
+                    return _nothing(_TOO_CLOSE, near.distance, until.at.p)
                 if wants_states:
                     bent = _bent(stop, loaded, curves)
                     largest = bent if math.isnan(largest) else max(bent, largest)
                 if found.changes.shape[0] > changes + 1 and (
                     not changes or (found.changes[changes - 1, 3] > 0.0) != leg.tip
                 ):
-                    _note_event(leg.begin, leg.tip, found.changes[changes])
+                    _note_event(leg.begin, leg.tip, line, rig, found.changes[changes])
                     changes += 1
-                if samples.angles.size:
-                    _store(leg, Course(stop, begin_angle, until.drive_angle, steadiness), work, workspace, done)
+                if samples.angles.size and until.travel > begin_angle:
+                    course = Course(stop, begin_angle, until.travel, steadiness)
+                    _store(leg, line, course, work, workspace, done)
                     done += 1
-                begin_angle, is_first, behind = until.drive_angle, False, stop
+                begin_angle, is_first, behind = until.travel, False, stop
         if not math.isnan(twice):
             return _nothing(_TOUCHES_TWICE, near.distance, twice)
+        if not math.isnan(stuck):
+            return _nothing(_STICKS, near.distance, stuck)
+        if fate == _RELEASE:
+            break
         onward = 2.0
         if fate != _NEVER:
             if change < 1.0:
@@ -416,6 +580,15 @@ def follow_branch(
             fate = _NEVER
             begin = settle_on(loaded, leg, last * onward, guess(work, onward), SETTLED)
             onward_from = begin.tangent
+        elif over <= 1.0:
+            if not _goes_on(lines, line):
+                is_over = True
+                break
+            line += 1
+            scene = on_line(scene, lines, line)
+            loaded = in_phase(scene, leg.tip)
+            begin = settle(loaded, at_over.at, at_over.at, leg.normal, 0.0, SETTLED)
+            onward_from = times(math.copysign(1.0, begin.travel_rate), begin.tangent)
         elif change <= 1.0:
             loaded = in_phase(scene, not leg.tip)
             begin = balance(loaded, Equilibrium(at_change.at.p, 1.0 if leg.tip else psi1, at_change.at.force))[0]
@@ -431,19 +604,19 @@ def follow_branch(
         length = max(min((max(pace, 1.0) if noisy else pace) * length, _LONGEST), shortest)
         if not math.isfinite(begin.at.p):
             break
-    if fate == _NEVER:
+    if fate == _NEVER and not is_over:
         return _nothing(_RUNS_OUT if runs_out else grazes, near.distance, math.nan)
     if not begin_angle > first:
         return _nothing(grazes, near.distance, math.nan)
     if wants_states:
-        _note_event(last_at, last_tip, found.changes[changes])
+        _note_event(last_at, last_tip, line, rig, found.changes[changes])
     if samples.relative:
         for j in range(samples.angles.size):
             workspace.asked.angles[j] = first + samples.angles[j] * (begin_angle - first) + rig.offset
         samples = Samples(workspace.asked.angles[: samples.angles.size], samples.rows, False)
     for k in range(done):
-        leg, course = _recall(work, workspace, k)
-        part = Followed(scene, leg, accuracy, course, curves, workspace.asked)
+        leg, line, course = _recall(work, workspace, k)
+        part = Followed(on_line(scene, lines, line), leg, accuracy, course, curves, workspace.asked)
         there = find_samples(samples, part)
         if not wants_states:
             write_loads(there, part, found.loads)
@@ -455,19 +628,19 @@ def follow_branch(
 
 
 @compiled
-def _note_event(at: Equilibrium, tip: bool, out: Floats) -> None:
-    out[0], out[1], out[2], out[3] = at.p, at.q, at.force, tip
+def _note_event(at: Equilibrium, tip: bool, line: int, rig: Rig, out: Floats) -> None:
+    out[0], out[1], out[2], out[3], out[4], out[5] = at.p, at.q, at.force, tip, line, rig.friction_angle
 
 
 @compiled
-def _second_contact(scene: Scene, leg: Leg, goes_on: bool, stop: float, work: LegCurves) -> float:
+def _second_contact(scene: Scene, seen: Outline, leg: Leg, goes_on: bool, stop: float, work: LegCurves) -> float:
     """Contact up to a position on a leg at which a rod curved toward the object would touch it twice; NaN without one.
 
     Unless the branch is exact, it is wholly looked for at the beginning and the end only.
     """
     if scene.beam.most_curvature <= 0.0:
         return math.nan
-    low, high = ends(scene.outline)
+    low, high = ends(seen)
     for k in range(1 if goes_on else 0, work.nodes.size):  # a leg that goes on begins where the last one was checked
         if k > 0 and work.nodes[k] > stop:
             break
@@ -520,20 +693,21 @@ def _along(spot: Place, turn: float) -> tuple[float, float]:
 
 
 @compiled
-def _store(leg: Leg, course: Course, work: LegCurves, workspace: BranchWorkspace, k: int) -> None:
+def _store(leg: Leg, line: int, course: Course, work: LegCurves, workspace: BranchWorkspace, k: int) -> None:
     row, curves = workspace.followed[k], work.curves
     for c in range(3):
         row[c], row[3 + c], row[6 + c] = leg.begin[c], leg.along[c], leg.normal[c]
     row[9] = leg.tip
     for c in range(4):
         row[10 + c] = course[c]
+    row[14] = line
     copy_rows(curves.series, workspace.curves[k])
     for i in range(work.place.size):
         workspace.curves[k, 6, i] = work.place[i]
 
 
 @compiled
-def _recall(work: LegCurves, workspace: BranchWorkspace, k: int) -> tuple[Leg, Course]:
+def _recall(work: LegCurves, workspace: BranchWorkspace, k: int) -> tuple[Leg, int, Course]:
     row, curves = workspace.followed[k], work.curves
     copy_rows(workspace.curves[k], curves.series)
     for i in range(work.place.size):
@@ -541,7 +715,7 @@ def _recall(work: LegCurves, workspace: BranchWorkspace, k: int) -> tuple[Leg, C
         curves.values[ANGLE, i] = value(curves.series[ANGLE], curves.on.nodes[i])
     begin, along = Equilibrium(row[0], row[1], row[2]), Equilibrium(row[3], row[4], row[5])
     leg = Leg(begin, along, Equilibrium(row[6], row[7], row[8]), row[9] > 0.0)
-    return leg, Course(row[10], row[11], row[12], row[13])
+    return leg, int(row[14]), Course(row[10], row[11], row[12], row[13])
 
 
 @compiled

@@ -17,6 +17,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.beam import bending
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.equilibrium import Loaded
+from tactile_bayes.mechanics.line import drive_angle_at
 from tactile_bayes.mechanics.series import Nodes, crossing, nodes_of, value, value_and_slope, weighted
 
 __all__ = [
@@ -204,5 +205,5 @@ def largest_curvature(stop: float, loaded: Loaded, curves: Curves) -> float:
 @compiled
 def _bent(loaded: Loaded, driven: float, moment: float, force_x: float, force_y: float, rest: float) -> float:
     """Largest change of curvature between pivot and contact [1/L]."""
-    slope = driven - loaded.compliance * moment
+    slope = drive_angle_at(loaded.line, driven) - loaded.compliance * moment
     return bending(loaded.beam, slope, moment, force_x, force_y, 1.0 if loaded.tip else rest)

@@ -10,6 +10,9 @@ two equations that leave a curve, the branch. A third, linear equation picks a p
 be monotone along the branch: a rod curved against the load is first straightened, and its contact moves outward before
 it moves inward. The null vector of the two equations is the branch's tangent, and the drive angle φ0 = β(p) + ψ1 + turn
 follows without another equation.
+
+If a drive carries the base, position and angle of the base that follow from contact and pose must lie on a `Line`:
+again two equations. In place of the drive angle the travel along the line follows.
 """
 
 from __future__ import annotations
@@ -19,7 +22,9 @@ from typing import NamedTuple
 
 from tactile_bayes.mechanics.beam import Beam, beam_pose
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.outline import Outline, narrower, place
+from tactile_bayes.mechanics.line import Line, components, off_line
+from tactile_bayes.mechanics.outline import Outline, Place, narrower, place
+from tactile_bayes.mechanics.pose import Pose
 
 __all__ = [
     "SETTLED",
@@ -69,6 +74,8 @@ class Loaded(NamedTuple):
     tip: bool
     psi1: float
     """ψ1 in tangential contact [rad]."""
+    line: Line | None
+    """Drive that carries the base; None for a rotation about a pivot that rests."""
 
 
 class Rig(NamedTuple):
@@ -94,35 +101,39 @@ class Scene(NamedTuple):
     rig: Rig
     exact: bool
     """True if events are computed to rounding."""
+    line: Line | None
+    """As in `Loaded`; then the origin is the base at the beginning of the drive."""
 
 
 class Balance(NamedTuple):
     """An equilibrium with its loads, and its tangent."""
 
     at: Equilibrium
-    drive_angle: float
-    """With the turn of the suspension [rad]."""
+    travel: float
+    """Travel of the drive: its angle, with the turn of the suspension [rad], or the way along its line."""
     holding_moment: float
     force_x: float
     force_y: float
     tangent: Equilibrium
     """Null vector of the equations, in no particular length."""
-    angle_rate: float
-    """Derivatives of the drive angle and the loads along it."""
+    travel_rate: float
+    """Derivatives of the travel and the loads along it."""
     moment_rate: float
     x_rate: float
     y_rate: float
 
 
 class _Equations(NamedTuple):
-    """The two equations at a point, and the derivatives of the loads."""
+    """The two equations at a point, their derivatives, and those of travel and holding moment."""
 
-    miss_u: float
-    miss_v: float
-    by_u: Equilibrium
-    by_v: Equilibrium
-    angle_by: Equilibrium
-    lever_by_q: float
+    miss_one: float
+    miss_two: float
+    by_one: Equilibrium
+    by_two: Equilibrium
+    travel: float
+    travel_by: Equilibrium
+    moment: float
+    moment_by: Equilibrium
     bend: float
 
 
@@ -130,7 +141,8 @@ class _Equations(NamedTuple):
 def in_phase(scene: Scene, tip: bool) -> Loaded:
     """Rod in one phase of contact."""
     rig = scene.rig
-    return Loaded(scene.outline, scene.beam, rig.friction_angle, rig.compliance, tip, tangential_psi1(scene))
+    psi1 = tangential_psi1(scene)
+    return Loaded(scene.outline, scene.beam, rig.friction_angle, rig.compliance, tip, psi1, scene.line)
 
 
 @compiled
@@ -147,34 +159,87 @@ def balance(loaded: Loaded, at: Equilibrium) -> tuple[Balance, _Equations]:
     spot = narrower(loaded.outline, place(loaded.outline, p), length)
     sin_delta, cos_delta = math.sin(delta), math.cos(delta)
     sin, cos = spot.sin * cos_delta + spot.cos * sin_delta, spot.cos * cos_delta - spot.sin * sin_delta
-    along, across = spot.x * cos + spot.y * sin, spot.y * cos - spot.x * sin
-    here, by_q, by_force = beam_pose(loaded.beam, psi1, length, force, loaded.tip)
-    closer = 0.0 if loaded.tip else loaded.outline.narrowing
-    lever_by_q = closer * sin_delta
-    by_u = Equilibrium(spot.speed * cos_delta + spot.bend * across, lever_by_q - by_q.u, -by_force.u)
-    by_v = Equilibrium(-spot.speed * sin_delta - spot.bend * along, closer * cos_delta - by_q.v, -by_force.v)
-    moment, compliance = force * along, loaded.compliance
-    angle_by = Equilibrium(
-        spot.bend + compliance * force * by_u.p,
-        by_q.turn + (1.0 if loaded.tip else 0.0) + compliance * force * lever_by_q,
-        by_force.turn + compliance * along,
-    )
-    angle = math.atan2(sin, cos) + psi1 + here.turn + compliance * moment
-    tangent = _cross(by_u, by_v)
+    rod = beam_pose(loaded.beam, psi1, length, force, loaded.tip)
+    angle = math.atan2(sin, cos) + psi1 + rod[0].turn
+    equations = _equations(loaded, loaded.line, spot, _Force(force, sin, cos), rod, angle)
+    tangent, moment = _cross(equations.by_one, equations.by_two), equations.moment
     turning = force * spot.bend * tangent.p
     found = Balance(
         at,
-        angle,
+        equations.travel,
         moment,
         -force * sin,
         force * cos,
         tangent,
-        dot(angle_by, tangent),
-        force * (by_u.p * tangent.p + lever_by_q * tangent.q) + along * tangent.force,
+        dot(equations.travel_by, tangent),
+        dot(equations.moment_by, tangent),
         -sin * tangent.force - cos * turning,
         cos * tangent.force - sin * turning,
     )
-    return found, _Equations(along - here.u, across - here.v, by_u, by_v, angle_by, lever_by_q, spot.bend)
+    return found, equations
+
+
+class _Force(NamedTuple):
+    """Contact force; its direction (sin β, −cos β)."""
+
+    size: float
+    sin: float
+    cos: float
+
+
+@compiled
+def _equations(
+    loaded: Loaded, line: Line | None, spot: Place, contact: _Force, rod: tuple[Pose, Pose, Pose], angle: float
+) -> _Equations:
+    """Equations for a drive, with a base at an angle before the turn of the suspension."""
+    here, by_q, by_force = rod
+    force, sin, cos = contact
+    compliance, closer = loaded.compliance, 0.0 if loaded.tip else loaded.outline.narrowing
+    by_tip = 1.0 if loaded.tip else 0.0
+    sin_delta, cos_delta = spot.cos * sin - spot.sin * cos, spot.cos * cos + spot.sin * sin
+    if line is None:
+        along, across = spot.x * cos + spot.y * sin, spot.y * cos - spot.x * sin
+        lever_by_q = closer * sin_delta
+        by_u = Equilibrium(spot.speed * cos_delta + spot.bend * across, lever_by_q - by_q.u, -by_force.u)
+        by_v = Equilibrium(-spot.speed * sin_delta - spot.bend * along, closer * cos_delta - by_q.v, -by_force.v)
+        moment_by = Equilibrium(force * by_u.p, force * lever_by_q, along)
+        travel_by = Equilibrium(
+            spot.bend + compliance * moment_by.p,
+            by_q.turn + by_tip + compliance * moment_by.q,
+            by_force.turn + compliance * along,
+        )
+        moment = force * along
+        travel = angle + compliance * moment
+        return _Equations(along - here.u, across - here.v, by_u, by_v, travel, travel_by, moment, moment_by, spot.bend)
+    # The vector from the base to the contact, and its derivatives.
+    x, y = here.u * cos - here.v * sin, here.u * sin + here.v * cos
+    moment_by = Equilibrium(0.0, force * by_q.u, here.u + force * by_force.u)
+    moment = force * here.u
+    off = off_line(line, spot.x - x, spot.y - y, angle + compliance * moment)
+    by_p = components(line, spot.speed * spot.cos + spot.bend * y, spot.speed * spot.sin - spot.bend * x, spot.bend)
+    by_rod = components(
+        line,
+        -closer * spot.sin - by_q.u * cos + by_q.v * sin,
+        closer * spot.cos - by_q.u * sin - by_q.v * cos,
+        by_q.turn + by_tip + compliance * moment_by.q,
+    )
+    by_load = components(
+        line,
+        by_force.v * sin - by_force.u * cos,
+        -by_force.u * sin - by_force.v * cos,
+        by_force.turn + compliance * moment_by.force,
+    )
+    return _Equations(
+        off.x,
+        off.y,
+        Equilibrium(by_p.x, by_rod.x, by_load.x),
+        Equilibrium(by_p.y, by_rod.y, by_load.y),
+        off.angle,
+        Equilibrium(by_p.angle, by_rod.angle, by_load.angle),
+        moment,
+        moment_by,
+        spot.bend,
+    )
 
 
 @compiled
@@ -191,13 +256,13 @@ def settle(
         return nowhere()
     for _ in range(_MOST_STEPS):
         found, equations = balance(loaded, at)
-        miss_u, miss_v, by_u, by_v, angle_by, lever_by_q, bend = equations
+        one, two, bend = equations.miss_one, equations.miss_two, equations.bend
         off = dot(normal, less(at, origin)) - level
         det = dot(normal, found.tangent)
-        first, second, third = _cross(by_v, normal), _cross(normal, by_u), found.tangent
-        dp = (miss_u * first.p + miss_v * second.p + off * third.p) / det
-        dq = (miss_u * first.q + miss_v * second.q + off * third.q) / det
-        df = (miss_u * first.force + miss_v * second.force + off * third.force) / det
+        first, second, third = _cross(equations.by_two, normal), _cross(normal, equations.by_one), found.tangent
+        dp = (one * first.p + two * second.p + off * third.p) / det
+        dq = (one * first.q + two * second.q + off * third.q) / det
+        df = (one * first.force + two * second.force + off * third.force) / det
         largest = max(abs(dq) / _MOST_TURN, abs(df) / (_MOST_LOADING * (1.0 + at.force)))
         if not largest < math.inf:
             break
@@ -206,21 +271,20 @@ def settle(
         if _is_astray(loaded, at):
             break
         if largest <= settled and abs(dp) * bend <= settled:
-            angle = found.drive_angle - dot(angle_by, Equilibrium(dp, dq, df))
-            before = found.at.force
-            lever = found.holding_moment / before if before > 0.0 else 0.0
-            moment = found.holding_moment - df * lever - before * (by_u.p * dp + lever_by_q * dq)
+            change, before = Equilibrium(dp, dq, df), found.at.force
+            travel = found.travel - dot(equations.travel_by, change)
+            moment = found.holding_moment - dot(equations.moment_by, change)
             share, turn = (-df / before if before > 0.0 else 0.0), -bend * dp
             force_x = found.force_x + share * found.force_x - turn * found.force_y
             force_y = found.force_y + share * found.force_y + turn * found.force_x
             return Balance(
                 at,
-                angle,
+                travel,
                 moment,
                 force_x,
                 force_y,
                 found.tangent,
-                found.angle_rate,
+                found.travel_rate,
                 found.moment_rate,
                 found.x_rate,
                 found.y_rate,
@@ -243,9 +307,9 @@ def settle_at(loaded: Loaded, p: float, start: Equilibrium) -> Balance:
     at = Equilibrium(p, start.q, start.force)
     for _ in range(_MOST_STEPS):
         equations = balance(loaded, at)[1]
-        miss_u, miss_v, by_u, by_v = equations.miss_u, equations.miss_v, equations.by_u, equations.by_v
-        det = by_u.q * by_v.force - by_u.force * by_v.q
-        dq, df = (miss_u * by_v.force - miss_v * by_u.force) / det, (by_u.q * miss_v - by_v.q * miss_u) / det
+        one, two, by_one, by_two = equations.miss_one, equations.miss_two, equations.by_one, equations.by_two
+        det = by_one.q * by_two.force - by_one.force * by_two.q
+        dq, df = (one * by_two.force - two * by_one.force) / det, (by_one.q * two - by_two.q * one) / det
         largest = max(abs(dq) / _MOST_TURN, abs(df) / (_MOST_LOADING * (1.0 + at.force)))
         if not largest < math.inf:
             break

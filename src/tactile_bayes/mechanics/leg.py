@@ -16,7 +16,7 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, REST, Curves, curves_of
 from tactile_bayes.mechanics.equilibrium import Balance, Equilibrium, Loaded, dot, less, settle, times
 from tactile_bayes.mechanics.limits import Approach, touch
-from tactile_bayes.mechanics.outline import place
+from tactile_bayes.mechanics.outline import Outline, place
 from tactile_bayes.mechanics.series import value_and_slope, weighted
 from tactile_bayes.numerics import chebyshev
 
@@ -34,9 +34,9 @@ __all__ = [
     "shortened",
 ]
 
-_BY_ROD, _BY_FORCE = 0.2, 0.03
-"""Weights of q and f in the length of a leg. Away from first contact all is smooth in p, where it is monotone: the
-greater its weight, the fewer legs a branch has."""
+_BY_ROD, _BY_FORCE, _BY_FORCE_ON_LINE = 0.2, 0.03, 0.3
+"""Weights of q and f in the length of a leg, the last if the base is carried. Away from first contact all is smooth in
+p, where it is monotone: the greater its weight, the fewer legs a branch has."""
 
 NUDGE = 1e-9
 """Distance beyond a knot of the contour, in its parameter, at which it is smooth."""
@@ -99,11 +99,12 @@ def _onward(nodes: Floats) -> Floats:
 
 
 @compiled
-def first_equilibrium(loaded: Loaded, found: Approach) -> Equilibrium:
-    """Equilibrium without force at first contact."""
-    at, chord = touch(loaded.outline, loaded.beam, found.begin, found.tip_first)
+def first_equilibrium(loaded: Loaded, outline: Outline, found: Approach) -> Equilibrium:
+    """Equilibrium without force at first contact with an outline relative to the base."""
+    at, chord = touch(outline, loaded.beam, found.begin, found.tip_first)
     if found.tip_first:
-        psi1 = math.atan2(at.y, at.x) + chord.at_point - math.atan2(at.sin, at.cos) - loaded.friction_angle
+        bearing = math.atan2(at.y, at.x) if loaded.line is None else math.atan2(-at.x, at.y) + 0.5 * math.pi
+        psi1 = bearing + chord.at_point - math.atan2(at.sin, at.cos) - loaded.friction_angle
         return Equilibrium(found.begin, psi1, 0.0)
     return Equilibrium(found.begin, chord.arclength, 0.0)
 
@@ -116,7 +117,8 @@ def leg_from(loaded: Loaded, begin: Balance, before: Equilibrium, length: float)
     """
     spot, tangent = place(loaded.outline, begin.at.p + math.copysign(NUDGE, before.p)), begin.tangent
     by_p, loading = spot.speed * spot.speed + spot.bend * spot.bend, 1.0 + begin.at.force
-    across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, _BY_FORCE * tangent.force / (loading * loading))
+    by_force = _BY_FORCE if loaded.line is None else _BY_FORCE_ON_LINE
+    across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
     size = length / math.sqrt(dot(across, tangent))
     if dot(across, before) < 0.0:
         size = -size
@@ -150,12 +152,12 @@ def _by_way(leg: Leg, found: Balance) -> Balance:
     scale = 1.0 / dot(leg.normal, tangent)
     return Balance(
         found.at,
-        found.drive_angle,
+        found.travel,
         found.holding_moment,
         found.force_x,
         found.force_y,
         times(scale, tangent),
-        scale * found.angle_rate,
+        scale * found.travel_rate,
         scale * found.moment_rate,
         scale * found.x_rate,
         scale * found.y_rate,
@@ -226,13 +228,13 @@ def sample_leg(
                 start = _cubic(leg, found, before, work.nodes[k])
             older, old = old, found
             found = settle_on(loaded, leg, work.nodes[k], start, settled)
-            if not math.isfinite(found.drive_angle):
+            if not math.isfinite(found.travel):
                 return False, begin, before
         at_nodes[0, k], at_nodes[0, half + k] = found.holding_moment, found.moment_rate
         at_nodes[1, k], at_nodes[1, half + k] = found.force_x, found.x_rate
         at_nodes[2, k], at_nodes[2, half + k] = found.force_y, found.y_rate
         at_nodes[REST, k], at_nodes[REST, half + k] = found.at.q, found.tangent.q
-        at_nodes[ANGLE, k], at_nodes[ANGLE, half + k] = found.drive_angle, found.angle_rate
+        at_nodes[ANGLE, k], at_nodes[ANGLE, half + k] = found.travel, found.travel_rate
         at_nodes[PLACE, k], at_nodes[PLACE, half + k] = found.at.p, found.tangent.p
     for c in range(PLACE):
         weighted(work.fit, at_nodes[c], series[c])

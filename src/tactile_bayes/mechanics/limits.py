@@ -9,13 +9,15 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.beam import Beam, Chord, chord_to, mirrored_beam
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.line import Line, Offset, line_of, pose_at
 from tactile_bayes.mechanics.newton import newton_step
-from tactile_bayes.mechanics.outline import Outline, Place, ends, frame, mirrored, narrower, place
+from tactile_bayes.mechanics.outline import Outline, Place, ends, frame, from_base, mirrored, narrower, place
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
-__all__ = ["Approach", "approach", "clear_angle", "touch"]
+__all__ = ["Approach", "approach", "arrival", "clear_angle", "is_clear", "touch"]
 
 
 class _Sought(IntEnum):
@@ -31,13 +33,34 @@ class _Sought(IntEnum):
 
 _TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reachability.TOUCHES), int(Reachability.TOO_FAR), int(Reachability.CUTS_PIVOT)
 _ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reachability.ENDS), int(Reachability.TOO_CLOSE), int(Reachability.RUNS_OUT)
+_BEGINS_INSIDE = int(Reachability.BEGINS_INSIDE)
 _CLEARANCE = CLEARANCE
 
 _MOST_MOVES = 50
 """Largest number of corrections of a standoff. Each reduces the error to a share of the order of the cone's angle."""
 
+_MOST_HALVINGS, _LAST = 100, 1e-6
+"""Largest number of steps of that search, and its last step where a rod comes within reach and is past the object."""
+
+_UPRIGHT = 0.5 * math.pi
+
 _ROUNDING = 1e-14
 """Distance from the end of the rod's reach [L] that counts as zero."""
+
+
+_LOOKS, _COARSE = 8, 1e-2
+"""Number of parts of a line between which a carried rod is looked at, and last step of these searches."""
+
+_CLOSE = 1e-3
+"""Angle [rad] to which first contact of a carried rod is found; a search for the equilibrium there follows."""
+
+_DEEPEST = 20
+"""Number of steps of the search for the pose in which a rod reaches farthest into an object that it hardly reaches."""
+
+_JUMP = 0.02
+"""Angle [rad] by which a rod that comes within reach of an object is past it, and has not touched it."""
+
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 class Approach(NamedTuple):
@@ -166,3 +189,131 @@ def clear_angle(outline: Outline, beam: Beam, last_step: float) -> float:
     begin, tip_first = _first(opposite, of_opposite, high, nearest, last_step)
     at, chord = touch(opposite, of_opposite, begin, tip_first)
     return math.pi - (math.atan2(at.y, at.x) - chord.at_base)
+
+
+class _Turned(NamedTuple):
+    """What a rod would touch first if it turned about its base where it is."""
+
+    reach: int
+    """Among `_TOUCHES`, `_TOO_FAR`, `_ENDS` if it is the end of what is known, `_CUTS_PIVOT` and `_TOO_CLOSE`."""
+    gap: float
+    """Angle by which it would turn until it touches [rad]; out of reach, one and the distance that is missing."""
+    begin: float
+    """Parameter of the contour there."""
+    tip_first: bool
+    distance: float
+    """Least distance of contour and base [L]."""
+
+
+@compiled
+def _turned(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> _Turned:
+    """What a rod would touch first that turns from a pose of its base."""
+    seen = from_base(outline, pose.x, pose.y)
+    low, high = ends(seen)
+    nearest, beyond_high, beyond_low = _nearest(seen, beam, low, high, last_step)
+    at = place(seen, nearest)
+    at_tip, distance = narrower(seen, at, 1.0), math.hypot(at.x, at.y)
+    missing = math.hypot(at_tip.x, at_tip.y) - (beam.reach - _ROUNDING)
+    if frame(at)[1] <= 0.0:
+        cuts = not (beyond_high or beyond_low)
+        return _Turned(_CUTS_PIVOT if cuts else _TOO_FAR, 1.0 + max(missing, 0.0), nearest, True, distance)
+    if distance < _CLEARANCE:
+        return _Turned(_TOO_CLOSE, 0.0, nearest, True, distance)
+    if missing >= 0.0:
+        return _Turned(_TOO_FAR, 1.0 + missing, nearest, True, distance)
+    begin, tip_first, reach = high, False, _TOUCHES
+    if not beyond_high and _missing(seen, beam, _Sought.TURNED, high)[0] > 0.0:
+        begin, tip_first = _first(seen, beam, high, nearest, last_step)
+    elif _is_out(seen, beam, high):
+        begin, tip_first = _root(seen, beam, _Sought.WITHIN, nearest, high, last_step), True
+    else:
+        reach = _ENDS
+    there, chord = touch(seen, beam, begin, tip_first)
+    bearing = math.atan2(-there.x, there.y) + _UPRIGHT
+    return _Turned(reach, bearing - chord.at_base - pose.angle, begin, tip_first, distance)
+
+
+@compiled
+def _arrival_on(outline: Outline, beam: Beam, line: Line, is_first: bool, last_step: float) -> tuple[_Turned, float]:
+    """First contact on a line, and its travel; NaN if there is none."""
+    size = (line.end - line.travel) / _LOOKS
+    before, looked = line.travel, _turned(outline, beam, pose_at(line, line.travel), _COARSE)
+    nearest, least, was_clear = before, math.inf, looked.gap > 0.0
+    if not was_clear and (is_first or looked.reach == _CUTS_PIVOT or looked.reach == _TOO_CLOSE):
+        return looked, before
+    for k in range(1, _LOOKS + 1):
+        travel = line.travel + k * size
+        looked = _turned(outline, beam, pose_at(line, travel), _COARSE)
+        if was_clear and looked.gap <= 0.0:
+            found, at = _between(outline, beam, line, before, travel, last_step)
+            if found.gap > -_JUMP or found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+                return found, at
+        elif was_clear and looked.gap < least:
+            nearest, least = travel, looked.gap
+        before, was_clear = travel, looked.gap > 0.0
+    if least == math.inf:
+        return looked, math.nan
+    low, high = max(nearest - size, line.travel), min(nearest + size, line.end)
+    for _ in range(_DEEPEST):
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        at_left = _turned(outline, beam, pose_at(line, left), _COARSE)
+        at_right = _turned(outline, beam, pose_at(line, right), _COARSE)
+        if min(at_left.gap, at_right.gap) <= 0.0:
+            found, at = _between(outline, beam, line, low, left if at_left.gap <= 0.0 else right, last_step)
+            return found, at if found.gap > -_JUMP else math.nan
+        if at_left.gap < at_right.gap:
+            high = right
+        else:
+            low = left
+    return _turned(outline, beam, pose_at(line, low), last_step), math.nan
+
+
+@compiled
+def _between(
+    outline: Outline, beam: Beam, line: Line, clear: float, inside: float, last_step: float
+) -> tuple[_Turned, float]:
+    """First contact between two travels, at the second of which the unloaded rod would cut the object."""
+    settled = _LAST * (inside - clear)
+    found = _turned(outline, beam, pose_at(line, inside), last_step)
+    at_clear, at_inside = _turned(outline, beam, pose_at(line, clear), last_step).gap, found.gap
+    if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+        return found, inside
+    for k in range(_MOST_HALVINGS):
+        share = at_clear / (at_clear - at_inside)
+        travel = clear + (inside - clear) * (share if k % 3 < 2 else 0.5)
+        looked = _turned(outline, beam, pose_at(line, travel), last_step)
+        if looked.gap <= 0.0:
+            inside, at_inside, found = travel, looked.gap, looked
+            at_clear *= 0.5 if k % 3 == 1 else 1.0
+        else:
+            clear, at_clear = travel, looked.gap
+        if not inside - clear > settled or found.gap > -_CLOSE:
+            break
+    return found, inside
+
+
+@compiled
+def arrival(outline: Outline, beam: Beam, lines: Floats, last_step: float) -> tuple[Approach, int, float]:
+    """First contact of a rod that is carried along lines, the number of the line, and the travel."""
+    reach, distance = _TOO_FAR, math.inf
+    for k in range(lines.shape[0]):
+        if math.isnan(lines[k, 0]):
+            break
+        line = line_of(lines, k)
+        found, travel = _arrival_on(outline, beam, line, k == 0, last_step)
+        distance = min(distance, found.distance)
+        if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+            return Approach(found.reach, found.distance, math.nan, True, math.nan), k, travel
+        if math.isfinite(travel):
+            reach = _BEGINS_INSIDE if k == 0 and travel == line.travel else found.reach
+            pose = pose_at(line, travel)
+            low = ends(from_base(outline, pose.x, pose.y))[0]
+            return Approach(reach, found.distance, found.begin, found.tip_first, low), k, travel
+    return Approach(reach, distance, math.nan, True, math.nan), 0, math.nan
+
+
+@compiled
+def is_clear(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> bool:
+    """Whether an unloaded rod in a pose has passed the contour."""
+    passed = Offset(-pose.x, pose.y, math.pi - pose.angle)
+    return _turned(mirrored(outline), mirrored_beam(beam), passed, last_step).gap > 0.0

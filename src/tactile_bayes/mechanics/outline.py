@@ -17,7 +17,19 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = ["Half", "Outline", "Place", "ends", "frame", "is_inside", "mirrored", "narrower", "on_object", "place"]
+__all__ = [
+    "Half",
+    "Outline",
+    "Place",
+    "ends",
+    "frame",
+    "from_base",
+    "is_inside",
+    "mirrored",
+    "narrower",
+    "on_object",
+    "place",
+]
 
 _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3
@@ -79,6 +91,13 @@ def mirrored(outline: Outline) -> Outline:
     """Outline in the frame of the opposite sweep."""
     left, right, low, high, sign, x, y, standoff, half_angle, narrowing, table = outline
     return Outline(right, left, -high, -low, -sign, -x, y, standoff, half_angle, narrowing, table)
+
+
+@compiled
+def from_base(outline: Outline, x: float, y: float) -> Outline:
+    """Outline relative to another base."""
+    left, right, low, high, sign, vertex_x, vertex_y, standoff, half_angle, narrowing, table = outline
+    return Outline(left, right, low, high, sign, vertex_x - x, vertex_y - y, standoff, half_angle, narrowing, table)
 
 
 @compiled

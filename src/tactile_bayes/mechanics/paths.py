@@ -16,6 +16,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.elastica import Wrench
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL
+from tactile_bayes.mechanics.readings import STATE_COLUMNS
 from tactile_bayes.mechanics.shapes import shapes_of
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ class Paths:
     snap_parameter: Floats
     snap_off: NDArray[np.int8]
     changes: Floats
-    """Beginnings of phases, then the end of the last, as in `Found`, shape (n, phases + 1, 4); NaN beyond."""
+    """Beginnings of phases, then the end of the last, as in `Found`, shape (n, phases + 1, 6); NaN beyond."""
     phases: Index
     """Number of phases."""
     largest_curvature: Floats
@@ -74,6 +75,9 @@ class Paths:
     shapes: Shapes
     sweeps: Sweeps
     profile: Profile | None
+    lines: Floats | None
+    """Lines of drives that carry the base, as in `Segments`, shape (1 or n, lines, columns). All drive angles here are
+    then travels, in rod lengths."""
     sampled: Floats
     """States at the drive angles given to `trace`, shape (n, k, columns)."""
 
@@ -81,6 +85,16 @@ class Paths:
         """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,)."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.snap_angle > self.clear_angle)
+
+    def drive_angles_at(self, travels: Floats) -> Floats:
+        """Drive angles at travels in the sweep frame [rad], shape (n,): the travels themselves in rotations."""
+        if self.lines is None:
+            return travels
+        lines = np.broadcast_to(self.lines, (self.sweep_frame.size, *self.lines.shape[1:]))
+        with np.errstate(invalid="ignore"):
+            line = np.maximum(np.count_nonzero(lines[..., 6] <= travels[:, None], axis=1) - 1, 0)
+        at = lines[np.arange(len(lines)), line]
+        return np.asarray(at[:, 2] + (travels - at[:, 6]) * at[:, 5])
 
     def observables(self, drive_angles: Floats) -> Floats:
         """Holding moment and forces at given drive angles; zero out of contact.
@@ -102,7 +116,7 @@ class Paths:
 
     def _swept(self, drive_angles: Floats, states: bool = False) -> Solutions:
         of_rod: dict[str, Any] = {"profile": self.profile, "tolerance": self.tolerance}
-        return _swept(self.shapes, self.sweeps, drive_angles, states=states, **of_rod)
+        return _swept(self.shapes, self.sweeps, drive_angles, self.lines, states=states, **of_rod)
 
     def states(self, index: Index, drive_angles: Floats) -> States:
         """Exact states at drive angles, shape (k,), of contours, shape (k,); NaN and `NONE` out of contact."""
@@ -143,9 +157,17 @@ class Paths:
 
         Those of a path are its first `phases + 1`; the others are NaN.
         """
+        return _as_states(self._events()[..., :STATE_COLUMNS])
+
+    def event_travels(self) -> Floats:
+        """Travels at the events of `event_states`: drive angles [rad], or ways of the base [L]."""
+        return self._events()[..., STATE_COLUMNS]
+
+    def _events(self) -> Floats:
         from tactile_bayes.mechanics.sweeps import solve_events  # numba takes a second to load
 
-        return _as_states(solve_events(self.shapes, self.sweeps, self.changes, self.profile))
+        sweeps, lines = _segments_of(self.sweeps, self.lines, 1)
+        return solve_events(self.shapes, sweeps, self.changes, self.profile, lines)
 
 
 def trace(
@@ -158,6 +180,7 @@ def trace(
     drive_angles: Floats | None = None,
     relative: bool = False,
     polished: bool = True,
+    lines: Floats | None = None,
 ) -> Paths:
     """Follow the equilibria of every contour from first contact to snap-off.
 
@@ -181,6 +204,9 @@ def trace(
     polished : bool
         Whether states at drive angles are exact. Otherwise they come from the series, with an error of 1e-10 of the
         largest and without derivatives, in a third of the time.
+    lines : ndarray, shape (1 or n, lines, columns), optional
+        Lines of drives that carry the base, in the sweep frame from the first pose of each, as in `lines_through`; NaN
+        after the last. Drive angles are then travels, in rod lengths.
     """
     from tactile_bayes.mechanics.sweeps import Sweeps  # numba takes a second to load
 
@@ -205,7 +231,7 @@ def trace(
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
     of_rod: dict[str, Any] = {"profile": profile, "tolerance": tolerance}
-    solutions = _swept(shapes, sweeps, angles, relative, states=True, polished=polished, **of_rod)
+    solutions = _swept(shapes, sweeps, angles, lines, relative, states=True, polished=polished, **of_rod)
     most = int(solutions.phases.max(initial=0))
     changes = np.where(solutions.phases[:, None, None] > 0, solutions.changes[:, : most + 1], np.nan)
     return Paths(
@@ -226,6 +252,7 @@ def trace(
         shapes=shapes,
         sweeps=sweeps,
         profile=profile,
+        lines=lines,
         sampled=solutions.states,
     )
 
@@ -238,6 +265,7 @@ def _swept(
     shapes: Shapes,
     sweeps: Sweeps,
     drive_angles: Floats,
+    lines: Floats | None = None,
     relative: bool = False,
     **options: Any,
 ) -> Solutions:
@@ -245,13 +273,22 @@ def _swept(
     from tactile_bayes.mechanics.sweeps import Segments, solve_sweeps
 
     angles = np.atleast_2d(np.asarray(drive_angles, dtype=float))
+    if lines is not None:
+        angles = np.broadcast_to(angles, (max(angles.shape[0], lines.shape[0]), angles.shape[1]))
     order = np.argsort(angles, axis=1, kind="stable")
     segments, each = angles.shape
-    asked = Segments(
-        each * np.arange(segments + 1), order.ravel(), np.take_along_axis(angles, order, axis=1).ravel(), relative
-    )
-    sweeps = sweeps._replace(segment=sweeps.contour % segments)
+    sweeps, lines = _segments_of(sweeps, lines, segments)
+    sorted_angles = np.take_along_axis(angles, order, axis=1)
+    asked = Segments(each * np.arange(segments + 1), order.ravel(), sorted_angles.ravel(), lines, relative)
     return solve_sweeps(shapes, sweeps, asked, (sweeps.contour.size, each), **options)
+
+
+def _segments_of(sweeps: Sweeps, lines: Floats | None, segments: int) -> tuple[Sweeps, Floats | None]:
+    """Sweeps of as many segments, or of as many as there are drives, and the lines of each."""
+    if lines is not None:
+        segments = max(segments, lines.shape[0])
+        lines = np.broadcast_to(lines, (segments, *lines.shape[1:])).copy()
+    return sweeps._replace(segment=sweeps.contour % segments), lines
 
 
 def _as_states(columns: Floats) -> States:

@@ -31,6 +31,10 @@ class Reachability(IntEnum):
     """A rod that is curved toward the object would touch it at two points."""
     SLIPS_OFF = 8
     """At first contact the tip is turned beyond the normal of the contour, so that any force pushes it off."""
+    BEGINS_INSIDE = 9
+    """A rod that is carried touches the contour already at the beginning of its drive."""
+    STICKS = 10
+    """Friction would hold the contact of a rod that is carried, or the contact would slide the other way."""
 
     @property
     def message(self) -> str:
@@ -48,6 +52,8 @@ _MESSAGES = {
     Reachability.GRAZES: "hardly touched",
     Reachability.TOUCHES_TWICE: "touched twice",
     Reachability.SLIPS_OFF: "slips off at once",
+    Reachability.BEGINS_INSIDE: "touched at the beginning",
+    Reachability.STICKS: "held by friction",
 }
 
 
@@ -61,3 +67,5 @@ class SnapOff(IntEnum):
     """A maximum where the phase changes or the contour's curvature jumps."""
     THRUST = 3
     """The line of force passes through the pivot, so that the holding moment vanishes."""
+    RELEASE = 4
+    """The force vanishes: a rod that is carried leaves the contour without a jump."""

@@ -12,6 +12,7 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, REST, WAY, Accuracy, Course, Curves, lay_over_angle, left_of
 from tactile_bayes.mechanics.equilibrium import SETTLED, Balance, Scene, in_phase
 from tactile_bayes.mechanics.leg import Leg, LegCurves, guess, settle_on
+from tactile_bayes.mechanics.line import drive_angle_at
 from tactile_bayes.mechanics.outline import on_object, place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
@@ -62,8 +63,9 @@ class Found(NamedTuple):
     states: Floats
     """States in the sweep frame, initially zero, shape (rows, `STATE_COLUMNS`)."""
     changes: Floats
-    """Beginnings of phases, then the end of the last: coordinates p, q and f of the equilibrium, and 1 for tip contact,
-    shape (phases + 1, 4); no rows if no states are computed."""
+    """Beginnings of phases, then the end of the last: coordinates p, q and f of the equilibrium, 1 for tip contact, the
+    number of the line of the drive, and the friction angle with the sign of its sense, shape (phases + 1, 6); no rows
+    if no states are computed."""
 
 
 class Asked(NamedTuple):
@@ -178,7 +180,7 @@ def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
 @compiled
 def write_state(found: Balance, tip: bool, scene: Scene, out: Floats) -> None:
     """Write the columns of a state."""
-    out[5] = found.drive_angle - scene.rig.compliance * found.holding_moment
+    out[5] = drive_angle_at(scene.line, found.travel) - scene.rig.compliance * found.holding_moment
     out[6], out[7], out[8] = found.holding_moment, found.force_x, found.force_y
     _write_place(found.at.p, found.at.q, tip, scene, out)
 
@@ -219,7 +221,8 @@ def write_states(samples: Samples, part: Followed, work: LegCurves, out: Found) 
     for j in range(count):
         row = samples.rows[j]
         states = out.states[row]
-        states[5] = workspace.wanted[j] - off - part.scene.rig.compliance * workspace.found[0, j]
+        driven = drive_angle_at(part.scene.line, workspace.wanted[j] - off)
+        states[5] = driven - part.scene.rig.compliance * workspace.found[0, j]
         for c in range(3):
             states[6 + c] = workspace.found[c, j]
         p = value(work.place, 0.25 * (workspace.twice[j] + 2.0))
@@ -242,7 +245,7 @@ def polish_states(samples: Samples, part: Followed, work: LegCurves, out: Found)
         for _ in range(100):
             state = settle_on(loaded, leg, way, guess(work, way), SETTLED)
             # Rounding may undo the very first contact.
-            turned = 1.0 - left_of(state.drive_angle, course) if math.isfinite(state.drive_angle) else 0.0
+            turned = 1.0 - left_of(state.travel, course) if math.isfinite(state.travel) else 0.0
             missing = target - turned
             if abs(missing) <= _SETTLED or not high > low:
                 break
@@ -250,7 +253,7 @@ def polish_states(samples: Samples, part: Followed, work: LegCurves, out: Found)
                 low = way
             else:
                 high = way
-            rate = state.angle_rate
+            rate = state.travel_rate
             newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (course.end - course.begin) / rate
             # Much nearer to the end than the target the rate may be zero or rounding: take the interpolant's rate.
             new = way + missing * (newton if newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target) else pace)
@@ -260,10 +263,10 @@ def polish_states(samples: Samples, part: Followed, work: LegCurves, out: Found)
             if new == way or not before > 0.0:
                 break
             way = new
-        if not math.isfinite(state.drive_angle):
+        if not math.isfinite(state.travel):
             continue
         # The digits of a position are limited: the interpolant corrects for the remaining distance to the angle.
-        reached = 1.0 - left_of(state.drive_angle, course)
+        reached = 1.0 - left_of(state.travel, course)
         states = out.states[row]
         write_state(state, leg.tip, scene, states)
         for c in range(3):

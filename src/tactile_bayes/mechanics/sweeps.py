@@ -11,20 +11,29 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.beam import Beam, Varied, beam_of, varied_of
-from tactile_bayes.mechanics.branch import MOST_CHANGES, BranchWorkspace, branch_workspace, follow_branch
+from tactile_bayes.mechanics.branch import (
+    MOST_CHANGES,
+    BranchWorkspace,
+    Ends,
+    branch_workspace,
+    follow_branch,
+    on_line,
+    with_friction,
+)
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.curves import Accuracy
 from tactile_bayes.mechanics.equilibrium import Equilibrium, Rig, Scene, balance, in_phase
 from tactile_bayes.mechanics.forward_table import NO_TABLE, ForwardTable, prepare
-from tactile_bayes.mechanics.limits import clear_angle
+from tactile_bayes.mechanics.limits import clear_angle, is_clear
+from tactile_bayes.mechanics.line import NO_LINE, Line, line_at, line_of, pose_at
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.profile import Profile
-from tactile_bayes.mechanics.reachability import Reachability
+from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples, write_state
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
 
-_TOUCHES = int(Reachability.TOUCHES)
+_TOUCHES, _NEVER = int(Reachability.TOUCHES), int(SnapOff.NEVER)
 
 _EXACT = Accuracy(resolved=1e-9, sharp=np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True)
 """Accuracy with states and events to rounding."""
@@ -87,6 +96,9 @@ class Segments(NamedTuple):
     """Row of the results of each sample."""
     angles: Floats
     """Drive angles as read, in the sweep frame, increasing in each segment [rad]."""
+    lines: Floats | None = None
+    """Lines of the drives that carry the base, in the sweep frame from their beginnings, as in `lines_through`, shape
+    (segments, lines, columns), NaN after the last; without any, the pivots rest. Angles are then travels."""
     relative: bool = False
     """True if they are shares of the drive angle from first contact to snap-off."""
 
@@ -99,7 +111,7 @@ class Solutions(NamedTuple):
     states: Floats
     """States as in `Found`, shape (contours, rows or 0, columns)."""
     changes: Floats
-    """Events as in `Found`, shape (sweeps, phases + 1 or 0, 4)."""
+    """Events as in `Found`, shape (sweeps, phases + 1 or 0, 6)."""
     phases: Index
     """Number of phases."""
     reach: NDArray[np.int8]
@@ -168,13 +180,33 @@ def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
 
 
 @compiled
-def _scene(shapes: Shapes, varied: Varied | None, known: ForwardTable, sweep: Any, exact: bool, table: Floats) -> Scene:
+def _scene(
+    shapes: Shapes,
+    varied: Varied | None,
+    known: ForwardTable,
+    sweep: Any,
+    line: Line | None,
+    exact: bool,
+    table: Floats,
+) -> Scene:
     """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
     sign = -1.0 if sweep.backward else 1.0
-    rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
+    offset = sign * sweep.offset if line is None else 0.0  # it is in the lines
+    rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, sweep.rigidity)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, sweep.friction_angle - outline.half_angle)
-    return Scene(outline, beam, rig, exact)
+    return Scene(outline, beam, rig, exact, line)
+
+
+@compiled
+def _place_lines(lines: Floats | None, sweep: Any, room: Floats | None) -> None:
+    """Write the lines of a sweep with its encoder offset to the room."""
+    if room is not None and lines is not None:
+        offset = -sweep.offset if sweep.backward else sweep.offset
+        for k in range(room.shape[0]):
+            for c in range(room.shape[1]):
+                room[k, c] = lines[sweep.segment, k, c]
+            room[k, 2] -= offset
 
 
 @compiled
@@ -183,9 +215,9 @@ def _beam(varied: Varied | None, table: ForwardTable, sweep: Any, sign: float, l
     if varied is None:
         return beam_of(sign * sweep.rest_curvature, varied)
     edges, curvature, rigidity, _, bend, _ = varied.profile
-    of_sweep = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
-    slenderness = table.slenderness if prepare(table, of_sweep, lean, varied.sheet) else 0.0
-    return beam_of(0.0, Varied(of_sweep, varied.work, varied.sheet, slenderness, sign))
+    room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
+    slenderness = table.slenderness if prepare(table, room, lean, varied.sheet) else 0.0
+    return beam_of(0.0, Varied(room, varied.work, varied.sheet, slenderness, sign))
 
 
 @cached
@@ -194,31 +226,68 @@ def _solve_events(
     varied: Varied | None,
     known: ForwardTable,
     sweeps: Any,
+    lines: Floats | None,
+    room: Floats | None,
+    line: Line | None,
     events: Floats,
     table: Floats,
     out: Floats,
 ) -> None:
     """Write the states of events; see `solve_events`."""
     for i in range(sweeps.size):
-        scene = _scene(shapes, varied, known, sweeps[i], True, table)
+        _place_lines(lines, sweeps[i], room)
+        scene = _scene(shapes, varied, known, sweeps[i], line, True, table)
         for k in range(events.shape[1]):
             out[i, k] = math.nan
             out[i, k, 0] = 0.0
             if not math.isnan(events[i, k, 0]):
                 tip = events[i, k, 3] > 0.0
                 at = Equilibrium(events[i, k, 0], events[i, k, 1], events[i, k, 2])
-                write_state(balance(in_phase(scene, tip), at)[0], tip, scene, out[i, k])
+                there = on_line(with_friction(scene, events[i, k, 5]), room, int(events[i, k, 4]))
+                state = balance(in_phase(there, tip), at)[0]
+                write_state(state, tip, there, out[i, k])
+                out[i, k, STATE_COLUMNS] = state.travel
 
 
-def solve_events(shapes: Shapes, sweeps: Sweeps, events: Floats, profile: Profile | None = None) -> Floats:
-    """States of events of sweeps, shape (sweeps, k, columns), from their coordinates as in `Found`, (sweeps, k, 4).
+def solve_events(
+    shapes: Shapes, sweeps: Sweeps, events: Floats, profile: Profile | None = None, lines: Floats | None = None
+) -> Floats:
+    """States of events of sweeps, and their travel, from their coordinates as in `Found`.
 
     The phase is `NONE` and the rest NaN for coordinates that are NaN.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    sweeps : Sweeps
+    events : ndarray, shape (sweeps, k, 6)
+    profile : Profile, optional
+    lines : ndarray, optional
+        As in `Segments`.
+
+    Returns
+    -------
+    ndarray, shape (sweeps, k, columns + 1)
     """
-    out = np.empty((*events.shape[:2], STATE_COLUMNS))
-    table = np.empty(shapes.tables.shape[1:])
-    _solve_events(shapes, varied_of(profile), NO_TABLE, _as_sweeps(sweeps), events, table, out)
+    out = np.empty((*events.shape[:2], STATE_COLUMNS + 1))
+    table, drive = np.empty(shapes.tables.shape[1:]), _carried(lines)
+    _solve_events(shapes, varied_of(profile), NO_TABLE, _as_sweeps(sweeps), *drive, events, table, out)
     return out
+
+
+def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line | None]:
+    """Lines, room for those of one sweep, and a line of their type, or None: all is compiled for both."""
+    return (None, None, None) if lines is None else (lines, np.empty(lines.shape[1:]), NO_LINE)
+
+
+@compiled
+def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: float) -> float:
+    """Travel beyond which the unloaded rod is clear; on lines this only tells whether it is so where contact ends."""
+    if lines is None:
+        return clear_angle(scene.outline, scene.beam, first_step)
+    pose = pose_at(line_of(lines, line_at(lines, ends.snap_angle)), ends.snap_angle)
+    is_over = ends.snap_off == _NEVER
+    return -math.inf if is_over or is_clear(scene.outline, scene.beam, pose, first_step) else math.inf
 
 
 @cached
@@ -228,6 +297,9 @@ def _solve(
     known: ForwardTable,
     sweeps: Any,
     segments: Segments,
+    lines: Floats | None,
+    room: Floats | None,
+    line: Line | None,
     exact: bool,
     accuracy: Accuracy,
     tolerance: Floats,
@@ -259,20 +331,21 @@ def _solve(
     count, knots = shapes.knots.shape[1], workspace.knots
     for i in range(sweeps.size):
         sweep, event, c = sweeps[i], events[i], sweeps[i].contour
-        scene = _scene(shapes, varied, known, sweep, exact, table)
+        _place_lines(lines, sweep, room)
+        scene = _scene(shapes, varied, known, sweep, line, exact, table)
         for k in range(count):
             knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
         samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
         found = Found(loads[c], all_states[c], changes[i])
-        ends = follow_branch(scene, knots, samples, accuracy, tolerance, workspace, found)
+        ends = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found)
         event.reach, event.distance = ends.reach, ends.distance
         event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
         event.snap_angle, event.snap_parameter = ends.snap_angle, ends.snap_parameter
         event.snap_off, event.phases, event.curvature = ends.snap_off, ends.phases, ends.curvature
         event.clear_angle = math.nan
         if asks_clearance and ends.reach == _TOUCHES:
-            event.clear_angle = clear_angle(scene.outline, scene.beam, accuracy.first_step)
+            event.clear_angle = _clear_angle(scene, room, ends, accuracy.first_step)
 
 
 def solve_sweeps(
@@ -320,7 +393,7 @@ def solve_sweeps(
     sweep = _as_sweeps(sweeps)
     loads = np.zeros((count, rows, 3))
     all_states = np.zeros((count, rows if states else 0, STATE_COLUMNS))
-    changes = np.full((sweep.size, MOST_CHANGES + 1 if states else 0, 4), np.nan)
+    changes = np.full((sweep.size, MOST_CHANGES + 1 if states else 0, 6), np.nan)
     events = np.empty(sweep.size, dtype=_EVENTS)
     longest = int(np.diff(segments.first).max(initial=0))
     _solve(
@@ -329,6 +402,7 @@ def solve_sweeps(
         table,
         sweep,
         segments,
+        *_carried(segments.lines),
         tolerance is None,
         accuracy,
         _NEVER_MISSED if tolerance is None else tolerance,

@@ -16,6 +16,7 @@ from tactile_bayes.record.schema import (
     column_of,
     present_channels,
 )
+from tactile_bayes.record.sweep import base_of_sample, bases_of, carried_sweeps
 from tactile_bayes.record.units import rod_of, to_dimensionless, to_si, with_rod
 from tactile_bayes.record.validation import validate
 
@@ -28,6 +29,9 @@ __all__ = [
     "REQUIRED",
     "Column",
     "Frame",
+    "base_of_sample",
+    "bases_of",
+    "carried_sweeps",
     "column_of",
     "frame_of",
     "in_frame",

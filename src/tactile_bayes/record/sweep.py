@@ -1,4 +1,4 @@
-"""A sweep: one motion of the drive, with one direction and one pivot."""
+"""A sweep: one motion of the drive in one direction, about one pivot or along a path of the base."""
 
 from __future__ import annotations
 
@@ -9,17 +9,21 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.record.schema import DIRECTIONS
 from tactile_bayes.record.table import Source
 
-__all__ = ["refuse_impossible_sweeps"]
+__all__ = ["base_of_sample", "bases_of", "carried_sweeps", "refuse_impossible_sweeps"]
 
 
 def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
-    """Refuse sweeps with several directions or pivots, or with a drive angle in degrees or against the direction."""
+    """Refuse sweeps with several directions or two pivots, or with a drive angle in degrees or against the direction.
+
+    From three places of the base on, or if the drive angle does not move, the drive carries the base.
+    """
     direction, angle = values["direction"], values["drive_angle"]
     forward = direction == "forward"
     impossible = ~(forward | (direction == "backward"))
@@ -45,13 +49,14 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
     for rows in _sweeps(values["sweep"]):
         first, last = _ends(rows)
         sweep = int(values["sweep"][first])
+        carried = _is_carried(values["base_x"][rows], values["base_y"][rows], angle[rows])
         for name, column, part in (
             ("direction", forward, "motion of the drive"),
             ("base_x", values["base_x"], "position of the pivot"),
             ("base_y", values["base_y"], "position of the pivot"),
         ):
             differs = column[rows] != column[first]
-            if differs.any():
+            if differs.any() and not (carried and column is not forward):
                 other = first + int(np.argmax(differs)) if isinstance(rows, slice) else int(rows[np.argmax(differs)])
                 one, two = values[name][first].item(), values[name][other].item()
                 raise source.error(
@@ -59,13 +64,51 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
                     f"({source.row(other)}): give each {part} a sweep number of its own"
                 )
         sense = 1 if forward[first] else -1
-        if _runs_backwards(angle[rows], sense):
+        if not carried and _runs_backwards(angle[rows], sense):
             raise source.error(
                 f"sweep {sweep} is labelled {DIRECTIONS[sense < 0]!r}, but its drive angle "
                 f"{'decreases' if sense > 0 else 'increases'}, from {float(angle[first])!r} rad ({source.row(first)}) "
                 f"to {float(angle[last])!r} rad ({source.row(last)}): label it {DIRECTIONS[sense > 0]!r}, or put its "
                 "samples in the order in which they were measured"
             )
+
+
+def carried_sweeps(record: xr.Dataset) -> tuple[int, ...]:
+    """Return the numbers of the sweeps in which the drive carries the base, in the order of the record."""
+    columns = [record[name].values for name in ("base_x", "base_y", "drive_angle")]
+    sweep = record.sweep.values
+    found = {int(sweep[_ends(rows)[0]]): _is_carried(*(values[rows] for values in columns)) for rows in _sweeps(sweep)}
+    return tuple(number for number, carried in found.items() if carried)
+
+
+def _is_carried(base_x: Floats, base_y: Floats, angle: Floats) -> bool:
+    """Return whether the base of a sweep is carried."""
+    if (base_x == base_x[0]).all() and (base_y == base_y[0]).all():
+        return False
+    return bool((angle == angle[0]).all()) or len(set(zip(base_x.tolist(), base_y.tolist(), strict=True))) > 2
+
+
+def base_of_sample(record: xr.Dataset) -> tuple[list[tuple[float, float]], Index]:
+    """Return the bases of a record, and the index of that of each sample.
+
+    Returns
+    -------
+    bases : list of (float, float)
+        Pivots, and where drives that carry the base begin [length], in the order of the record.
+    index : ndarray, shape (samples,)
+    """
+    x, y, sweep = record.base_x.values.copy(), record.base_y.values.copy(), record.sweep.values
+    for number in carried_sweeps(record):
+        rows = sweep == number
+        x[rows], y[rows] = x[np.argmax(rows)], y[np.argmax(rows)]
+    places: dict[tuple[float, float], int] = {}
+    index = [places.setdefault(place, len(places)) for place in zip(x.tolist(), y.tolist(), strict=True)]
+    return list(places), np.array(index, dtype=np.intp)
+
+
+def bases_of(record: xr.Dataset) -> list[tuple[float, float]]:
+    """Return the pivots (x, y) of a record, and where drives that carry the base begin [length], in its order."""
+    return base_of_sample(record)[0]
 
 
 def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | Index]:

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.found_rig import found_rig
-from tactile_bayes.inference.likelihood import bases_of
+from tactile_bayes.record import bases_of
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.wording import Shown, percent, shown_as, spread

@@ -110,10 +110,10 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
         batch_indices[segment.samples] = index
     batch_index = batch_indices[samples]
     mirrored = paths.sweep_frame.mirrored[batch_index]
-    misread = cell.misread(record.direction.values) + likelihood.misread(rig)[0]
-    angle = (record.drive_angle.values - misread)[samples]
+    read = record.drive_angle.values - cell.misread(record.direction.values)
+    angle = (read - likelihood.misread(rig)[0])[samples]
     angle_in_sweep_frame = np.where(mirrored, np.pi - angle, angle)
-    states = paths.states(batch_index, angle_in_sweep_frame)
+    states = paths.states(batch_index, likelihood.travels(read, rig)[0, samples])
     rod, stiffer = rod_of(record), float(np.ravel(rig.rigidity_scale)[0])
     units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
     in_lab_frame = to_lab_frame(paths.sweep_frame, batch_index, states, units)
@@ -123,12 +123,17 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     sign = np.where(mirrored, -1.0, 1.0)
     x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rod.mirrored(sign))
     loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
+    base_x, base_y = (record[name].values[samples] for name in ("base_x", "base_y"))
+    of_sample = likelihood.segment_of_sample
+    first = np.array([segment.base for segment in likelihood.segments])[of_sample[samples]]
+    base_x = paths.sweep_frame.base_x[batch_index] + base_x - first[:, 0]
+    base_y = paths.sweep_frame.base_y[batch_index] + base_y - first[:, 1]
     return Motion(
         contour=contour.take(np.array(0)),
         samples=samples,
         sweep=numbers[samples],
-        rod_x=paths.sweep_frame.base_x[batch_index][:, None] + sign[:, None] * x * rod.length_unit,
-        rod_y=paths.sweep_frame.base_y[batch_index][:, None] + y * rod.length_unit,
+        rod_x=base_x[:, None] + sign[:, None] * x * rod.length_unit,
+        rod_y=base_y[:, None] + y * rod.length_unit,
         contact_x=np.where(loaded, in_lab_frame["contact_x"], np.nan),
         contact_y=np.where(loaded, in_lab_frame["contact_y"], np.nan),
         phase=np.array(PHASE_NAMES)[states.wrench.phase],

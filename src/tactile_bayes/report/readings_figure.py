@@ -11,9 +11,8 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.plotting.maps import outline
-from tactile_bayes.record import CHANNELS, frame_of, present_channels, turned
+from tactile_bayes.record import CHANNELS, bases_of, frame_of, present_channels, turned
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.frames import Motion

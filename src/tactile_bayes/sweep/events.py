@@ -7,9 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from tactile_bayes.mechanics.line import lines_through
 from tactile_bayes.mechanics.paths import Paths
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep.drive import Carried, Drive
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.path import Direction
 
@@ -24,10 +26,15 @@ class Event:
     ----------
     kind : str
         At first contact "tip" or "tangential"; at a change "tip → tangential" and so on; at snap-off "fold" (a smooth
-        maximum of the drive angle), "corner" (a maximum where the phase changes or the contour's curvature jumps) or
-        "thrust" (the line of force passes through the pivot).
+        maximum of the drive angle, or of the travel), "corner" (a maximum where the phase changes or the contour's
+        curvature jumps) or "thrust" (the line of force passes through the pivot). A rod that is carried may also leave
+        the contour without a jump ("release"), or still touch it at the end of the drive ("never").
+    travel : float
+        How far along the drive it lies: the drive angle of a rotation [rad], or the way of the base [length].
     drive_angle, slope_angle : float
         Drive angle, and slope angle of the contour at the contact [rad].
+    base_x, base_y : float
+        The pivot, or the base where it is then [length].
     contact_x, contact_y, contact_arclength : float
         Contact point on the object and arc length of the rod up to it [length].
     holding_moment, force_x, force_y : float
@@ -35,7 +42,10 @@ class Event:
     """
 
     kind: str
+    travel: float
     drive_angle: float
+    base_x: float
+    base_y: float
     slope_angle: float
     contact_x: float
     contact_y: float
@@ -54,7 +64,7 @@ class SweepEvents:
     direction : str
         "forward" or "backward".
     base : (float, float)
-        The pivot [length].
+        The pivot, or where the drive begins [length].
     first_contact, snap_off : Event
     transitions : tuple of Event
         Changes of the phase, in their order.
@@ -74,11 +84,19 @@ class SweepEvents:
     largest_strain: float
 
 
-def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod: Rod) -> SweepEvents:
+def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> SweepEvents:
     phases = ["tip" if tip else "tangential" for tip in paths.changes_to_tip()[0]]
     index = np.zeros(len(phases) + 1, dtype=np.intp)
     states = paths.event_states().take(index, np.arange(index.size))
     columns = to_lab_frame(paths.sweep_frame, index, states, rod)
+    if isinstance(drive, Carried):
+        internal = lines_through(drive.poses, rod.length, backward=direction == "backward").travels
+        columns["travel"] = np.interp(paths.event_travels()[0, : index.size], internal, drive.travels)
+        columns["base_x"], columns["base_y"], _ = drive.at(columns["travel"]).T
+        base = (float(drive.poses[0, 0]), float(drive.poses[0, 1]))
+    else:
+        base, columns["travel"] = drive.base, columns["drive_angle"]
+        columns["base_x"], columns["base_y"] = (np.full(index.size, value) for value in base)
     kinds = [
         phases[0],
         *(f"{before} → {after}" for before, after in pairwise(phases)),
@@ -86,6 +104,6 @@ def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod
     ]
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]
     found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
-    clear = bool(paths.is_clear()[0])
+    clear = bool(paths.is_clear()[0]) or kinds[-1] == "never"
     strain = float(paths.largest_curvature[0]) * 0.5 * rod.diameter / rod.length
     return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, strain)

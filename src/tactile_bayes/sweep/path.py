@@ -11,13 +11,21 @@ from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.line import lines_through
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep.drive import Carried
 
-__all__ = ["Direction", "friction_angle_of", "sweep_paths", "to_sweep_frame"]
+__all__ = ["Direction", "carried_paths", "friction_angle_of", "sweep_paths", "to_sweep_frame"]
 
 Direction = Literal["forward", "backward"]
+
+_DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
+
+_PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
+"""Outcomes on the two sides of a carried rod, the most telling first; −1 stands for all others. A rod that is clear of
+the object on one side seems to have passed it on the other."""
 
 
 def sweep_paths(
@@ -42,23 +50,72 @@ def sweep_paths(
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
     paths = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile)
-    sweep = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
+    where = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
+    _refuse(paths, contour, rod, direction, where)
+    return paths
+
+
+def carried_paths(
+    contour: Contour, drive: Carried, *, rod: Rod | None = None, friction: float = 0.0
+) -> tuple[Paths, Direction]:
+    """Compute the exact path of a rod that a drive carries along one contour, and the direction that its side implies.
+
+    It touches the object with its left side, as a forward sweep does, or with its right side. Errors are those of
+    `scan`.
+    """
+    rod, poses = Rod() if rod is None else rod, drive.poses
+    base, friction_angle = (float(poses[0, 0]), float(poses[0, 1])), friction_angle_of(friction)
+    found: dict[Direction, Paths] = {}
+    for direction in _DIRECTIONS:
+        lines = lines_through(poses, rod.length, backward=direction == "backward").lines[None]
+        sweep_frame = to_sweep_frame(contour, base, direction, rod)
+        found[direction] = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile, lines=lines)
+
+    def rank(direction: Direction) -> tuple[int, float]:
+        reach, first = int(found[direction].reach[0]), float(found[direction].first_angle[0])
+        return (_PLAIN.index(reach) if reach in _PLAIN else 1), first
+
+    side = min(_DIRECTIONS, key=rank)
+    _refuse(found[side], contour, rod, side, f"in the drive that begins at ({base[0]:g}, {base[1]:g})")
+    return found[side], side
+
+
+def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, sweep: str) -> None:
+    """Raise an error that says why there is no path."""
+    base = float(paths.sweep_frame.base_x[0]), float(paths.sweep_frame.base_y[0])
     match Reachability(int(paths.reach[0])):
+        case Reachability.TOO_FAR if paths.lines is not None:
+            raise ReachError(
+                f"{sweep} the rod does not touch the contour: bring them closer together, or carry the rod farther "
+                "(are contour, drive and rod in one unit?)"
+            )
+        case Reachability.BEGINS_INSIDE:
+            raise ContourError(
+                f"{sweep} the unloaded rod would cut the contour from the beginning: begin the drive clear of it"
+            )
+        case Reachability.STICKS:
+            raise ReachError(
+                f"{sweep} friction would hold the contact at {_point(paths)}, where the rod would have to slide the "
+                "other way, and sticking is not modelled: take another heading or drive angle, or less friction"
+            )
         case Reachability.TOO_FAR:
             raise ReachError(
                 f"the contour is out of reach: its nearest point is {paths.distance[0] * rod.length:.6g} from the "
                 f"pivot at ({base[0]:g}, {base[1]:g}), and the rod is {rod.length:g} long"
             )
+        case Reachability.CUTS_PIVOT if paths.lines is not None:
+            raise ContourError(f"{sweep} the contour cuts the way of the base: raise the contour or lower the drive")
         case Reachability.CUTS_PIVOT:
             raise ContourError(
                 f"the contour cuts the base: the pivot at ({base[0]:g}, {base[1]:g}) is not below it; raise the "
                 "contour or lower the pivot"
             )
         case Reachability.TOO_CLOSE:
+            of_drive = "way of the base" if paths.lines is not None else f"pivot at ({base[0]:g}, {base[1]:g})"
             raise ContourError(
-                f"the contour comes within {paths.distance[0] * rod.length:.6g} of the pivot at ({base[0]:g}, "
-                f"{base[1]:g}); a path can be followed from {CLEARANCE * rod.length:g} on ({CLEARANCE:.0%} of the "
-                "rod's length): move one of them away"
+                f"the contour comes within {paths.distance[0] * rod.length:.6g} of the {of_drive}; a path can be "
+                f"followed from {CLEARANCE * rod.length:g} on ({CLEARANCE:.0%} of the rod's length): move one of them "
+                "away"
             )
         case Reachability.ENDS:
             raise ContourError(
@@ -87,7 +144,6 @@ def sweep_paths(
                 "the object so much that another part of it would cut the contour, and contact at two points is not "
                 "modelled; take a rod that is less curved, sweep in the other direction, or move the pivot"
             )
-    return paths
 
 
 def _point(paths: Paths) -> str:

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import as_numbers, check_choice, check_number, check_pivots
+from tactile_bayes.checks import as_numbers, check_choice, check_number, check_pivots, refused
 from tactile_bayes.contours.base import Contour, Locus
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
 from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
+from tactile_bayes.mechanics.line import lines_through
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.mechanics.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.record import make_record
 from tactile_bayes.record.schema import column_attributes
+from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation
 from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
-from tactile_bayes.sweep.path import Direction, friction_angle_of, sweep_paths, to_sweep_frame
+from tactile_bayes.sweep.path import Direction, carried_paths, friction_angle_of, sweep_paths, to_sweep_frame
 
 __all__ = ["Scan", "equilibria", "scan"]
 
@@ -36,6 +38,15 @@ _MOST_MOVES, _SETTLED = 50, 1e-15
 
 _FINEST = 1e-6
 """Least step of the drive [rad]; smaller ones would give millions of samples."""
+
+_STEP, _SHARE = float(np.radians(1.0)), 0.01
+"""Default steps of rotations [rad], and of drives that carry the base, over the rod's length."""
+
+_FEWEST_POSES = 8
+"""Number of poses of a motion up to which it is sampled by steps, and not at these."""
+
+_ROUNDING = 1e-9
+"""Share of a step by which the last one may be too short."""
 
 _COARSEST = 0.5
 """Largest step of the drive [rad]; a larger one is probably in degrees."""
@@ -177,9 +188,10 @@ def _wrench(locus: Locus, rod: Rod, friction: float, side: float) -> Wrench:
 def scan(
     contour: Contour,
     *,
+    drive: Drive | Sequence[Drive] | None = None,
     direction: Literal["both", "forward", "backward"] = "both",
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
-    drive_step: float = float(np.radians(1.0)),
+    drive_step: float | None = None,
     drive_angles: ArrayLike | None = None,
     rod: Rod | None = None,
     friction: float = 0.0,
@@ -193,17 +205,24 @@ def scan(
     ----------
     contour : Contour
         One contour; in metres if `rod` is given in SI, else in rod lengths.
+    drive : Rotation, Translation or Motion, or a sequence of them, optional
+        Path of the base; by default a rotation about `base`. One that carries the base makes one sweep, from its
+        beginning to its end. It is called forward if the rod touches the object with its left side, as in a
+        counter-clockwise rotation, and else backward. The sweeps of several drives are numbered consecutively.
     direction : {"both", "forward", "backward"}
-        Directions of the sweeps; "both" is a forward sweep (number 0), then a backward one (number 1).
+        Directions of rotations; "both" is a forward sweep (number 0), then a backward one (number 1).
     base : (float, float) or sequence of them
-        The pivot, in the contour's unit of length. The contour must lie above it. With several pivots (a support that
-        is moved, or an array of whiskers) each is used in turn, and the sweeps are numbered consecutively.
-    drive_step : float
-        Step of the drive [rad], at most 0.5; the grid consists of its multiples, from 15 steps before contact to 15
-        steps after it, within a turn.
+        The pivot of a rotation, in the contour's unit of length, if there is no `drive`. The contour must lie above it.
+        With several pivots (a support that is moved, or an array of whiskers) each is used in turn, and the sweeps are
+        numbered consecutively.
+    drive_step : float, optional
+        Step of a rotation [rad], at most 0.5 and by default 1°; the grid consists of its multiples, from 15 steps
+        before contact to 15 steps after it, within a turn. Step of a drive that carries the base, in its travel
+        [length], by default a hundredth of the rod's length; a `Motion` of more than 8 poses is by default sampled at
+        these.
     drive_angles : array_like, shape (n,), optional
-        Drive angles in place of this grid [rad], used in increasing order forward and in decreasing order backward,
-        without duplicates.
+        Drive angles of rotations in place of this grid [rad], used in increasing order forward and in decreasing order
+        backward, without duplicates.
     rod : Rod, optional
         By default the dimensionless rod, which is straight. A rod with a diameter touches with its surface.
     friction : float
@@ -240,40 +259,42 @@ def scan(
     >>> round(result.events["forward"].snap_off.drive_angle, 6)
     3.154275
     """
-    check_choice("direction", direction, ("both", "forward", "backward"), "choose 'forward' or 'backward', or 'both'")
-    directions: tuple[Direction, ...] = ("forward", "backward") if direction == "both" else (direction,)
     rod = Rod() if rod is None else rod
-    check_number(
-        "drive_step",
-        drive_step,
-        f"give a positive angle in radians, at most {_COARSEST}; one in degrees is converted by np.radians, and below "
-        f"{_FINEST:g} there would be millions of samples",
-        least=_FINEST,
-        most=_COARSEST,
-    )
+    check_choice("direction", direction, ("both", "forward", "backward"), "choose 'forward' or 'backward', or 'both'")
+    drives = _drives(drive, base)
+    step = _checked_step(drive_step, drives, rod)
     given = None if drive_angles is None else _floats(drive_angles)
     grid = None if given is None else np.unique(given)
     if given is not None and not (given.ndim < 2 and given.size and np.all(np.abs(given) <= 2.0 * np.pi)):
         raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
+    if all(isinstance(one, Carried) for one in drives) and (given is not None or direction != "both"):
+        raise ParameterError(
+            f"{'direction' if given is None else 'drive_angles'} is for rotations, and the drive carries the base: its "
+            "poses say where it goes, and drive_step how finely it is sampled"
+        )
 
     columns: list[dict[str, NDArray[np.generic]]] = []
     sweeps: list[SweepEvents] = []
-    for pivot, sense in product(check_pivots("base", base), directions):
-        paths = sweep_paths(contour, base=pivot, direction=sense, rod=rod, friction=friction)
-        sweep = events_of(paths, sense, pivot, rod)
-        _warn_of(sweep, rod)
-        if grid is None:
-            first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
-            steps = np.arange(np.floor(first / drive_step) - _MARGIN, np.ceil(snap / drive_step) + _MARGIN + 1)
-            angles = steps * drive_step
-            angles = angles[np.abs(angles) <= 2.0 * np.pi]  # the limit of a record
+    senses: tuple[Direction, ...] = ("forward", "backward") if direction == "both" else (direction,)
+    for one in drives:
+        if isinstance(one, Carried):
+            paths, sense = carried_paths(contour, one, rod=rod, friction=friction)
+            sweep = events_of(paths, sense, one, rod)
+            _warn_of(sweep, rod)
+            travels = _travels(one, step, sweep, rod)
+            found = [(paths, sweep, one.at(travels), _ways(one, travels, sense, rod))]
         else:
-            angles = grid
-        if not sweep.clear:
-            onward = 1.0 if sense == "forward" else -1.0
-            angles = angles[onward * (sweep.snap_off.drive_angle - angles) >= 0.0]
-        columns.append(_sweep(paths, angles[:: 1 if sense == "forward" else -1], len(sweeps), sense, pivot, rod))
-        sweeps.append(sweep)
+            found = []
+            for sense in senses:
+                paths = sweep_paths(contour, base=one.base, direction=sense, rod=rod, friction=friction)
+                sweep = events_of(paths, sense, one, rod)
+                _warn_of(sweep, rod)
+                angles = _angles(grid, step, sweep)
+                poses = np.column_stack([*(np.full(angles.size, value) for value in one.base), angles])
+                found.append((paths, sweep, poses, np.pi - angles if sense == "backward" else angles))
+        for paths, sweep, poses, ways in found:
+            columns.append(_sweep(paths, ways, poses, len(sweeps), sweep.direction, rod))
+            sweeps.append(sweep)
     if not any(len(of_sweep["drive_angle"]) for of_sweep in columns):
         snaps = ", ".join(f"{sweep.snap_off.drive_angle:.6g} rad ({sweep.direction})" for sweep in sweeps)
         raise ParameterError(
@@ -282,6 +303,75 @@ def scan(
         )
     record = {name: np.concatenate([of_sweep[name] for of_sweep in columns]) for name in columns[0]}
     return Scan(make_record(record, rod=rod), tuple(sweeps), contour)
+
+
+def _drives(drive: Drive | Sequence[Drive] | None, base: Any) -> list[Drive]:
+    """Return drives, or rotations about pivots."""
+    pivots = check_pivots("base", base)
+    if drive is None:
+        return [Rotation(pivot) for pivot in pivots]
+    drives = [drive] if isinstance(drive, Rotation | Carried) else list(drive) if isinstance(drive, Sequence) else []
+    if not drives or not all(isinstance(one, Rotation | Carried) for one in drives):
+        raise refused("drive", drive, "give a Rotation, a Translation or a Motion, or a list of them")
+    if pivots != [(0.0, 0.0)]:
+        raise ParameterError("base is for rotations without a drive: give the base to the drive, as in Rotation(base)")
+    return drives
+
+
+def _checked_step(step: float | None, drives: Sequence[Drive], rod: Rod) -> float | None:
+    """Return the step of the drives [rad or length] if it is given."""
+    if step is None:
+        return None
+    if any(isinstance(one, Rotation) for one in drives):
+        if any(isinstance(one, Carried) for one in drives):
+            raise ParameterError(
+                "drive_step would be an angle in rotations, and a length where the base is carried: leave it out, or "
+                "scan them one by one"
+            )
+        return check_number(
+            "drive_step",
+            step,
+            f"give a positive angle in radians, at most {_COARSEST}; one in degrees is converted by np.radians, and "
+            f"below {_FINEST:g} there would be millions of samples",
+            least=_FINEST,
+            most=_COARSEST,
+        )
+    least = _FINEST * max(float(one.travels[-1]) for one in drives if isinstance(one, Carried))
+    return check_number(
+        "drive_step", step, f"give a positive length; below {least:g} there would be millions of samples", least=least
+    )
+
+
+def _angles(grid: Floats | None, step: float | None, sweep: SweepEvents) -> Floats:
+    """Drive angles of the samples of a rotation, in their order."""
+    forward = sweep.direction == "forward"
+    if grid is None:
+        step = _STEP if step is None else step
+        first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
+        angles = np.arange(np.floor(first / step) - _MARGIN, np.ceil(snap / step) + _MARGIN + 1) * step
+        angles = angles[np.abs(angles) <= 2.0 * np.pi]  # the limit of a record
+    else:
+        angles = grid
+    if not sweep.clear:
+        angles = angles[(1.0 if forward else -1.0) * (sweep.snap_off.drive_angle - angles) >= 0.0]
+    return angles[:: 1 if forward else -1]
+
+
+def _travels(drive: Carried, step: float | None, sweep: SweepEvents, rod: Rod) -> Floats:
+    """Travels of the samples of a drive that carries the base."""
+    travels: Floats
+    if step is None and isinstance(drive, Motion) and drive.x.size > _FEWEST_POSES:
+        travels = drive.travels
+    else:
+        step = _SHARE * rod.length if step is None else step
+        travels = np.asarray(step * np.arange(math.floor(float(drive.travels[-1]) / step + _ROUNDING) + 1))
+    return travels if sweep.clear else travels[travels <= sweep.snap_off.travel]
+
+
+def _ways(drive: Carried, travels: Floats, direction: str, rod: Rod) -> Floats:
+    """Travels in the forward model's own measure."""
+    path = lines_through(drive.poses, rod.length, backward=direction == "backward")
+    return np.asarray(np.interp(travels, drive.travels, path.travels))
 
 
 def _floats(values: ArrayLike) -> Floats:
@@ -316,19 +406,20 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
 
 
 def _sweep(
-    paths: Paths, angles: Floats, number: int, direction: Direction, base: tuple[float, float], rod: Rod
+    paths: Paths, ways: Floats, poses: Floats, number: int, direction: str, rod: Rod
 ) -> dict[str, NDArray[np.generic]]:
-    index = np.zeros(angles.size, dtype=np.intp)
-    states = paths.states(index, np.pi - angles if paths.sweep_frame.mirrored[0] else angles)
+    """Columns of a sweep at drive angles in the sweep frame, or travels, and at the same poses in the laboratory."""
+    index = np.zeros(ways.size, dtype=np.intp)
+    states = paths.states(index, ways)
     columns = to_lab_frame(paths.sweep_frame, index, states, rod)
     loaded = states.wrench.phase != NONE
     columns["contact_phase"] = np.array(PHASE_NAMES)[states.wrench.phase]
     sweep: dict[str, NDArray[np.generic]] = {
-        "sweep": np.full(angles.size, number),
-        "direction": np.full(angles.size, direction),
-        "base_x": np.full(angles.size, float(base[0])),
-        "base_y": np.full(angles.size, float(base[1])),
-        "drive_angle": angles,
+        "sweep": np.full(ways.size, number),
+        "direction": np.full(ways.size, direction),
+        "base_x": poses[:, 0],
+        "base_y": poses[:, 1],
+        "drive_angle": poses[:, 2],
     }
     for name in ("holding_moment", "force_x", "force_y"):
         sweep[name] = np.where(loaded, columns[name], 0.0)

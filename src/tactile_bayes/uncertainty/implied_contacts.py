@@ -184,19 +184,18 @@ def contacts_of(
     ``exact=False`` the events are found to 1e-6 rad, at a quarter of the cost.
     """
     count, segments = contours.shape[0], likelihood.segments
-    read = angle - np.broadcast_to(likelihood.misread(rig), (count, angle.size))
+    travels = np.broadcast_to(likelihood.travels(angle, rig), (count, angle.size))
     shape = (len(segments), max(segment.samples.size for segment in segments))
     samples = np.zeros(shape, dtype=np.intp)
     in_sweep_frame = np.full((shape[0], count, shape[1]), np.nan)
-    for which, angles, segment in zip(samples, in_sweep_frame, segments, strict=True):
+    for which, of_segment, segment in zip(samples, in_sweep_frame, segments, strict=True):
         which[: segment.samples.size] = segment.samples
-        of_segment = read[:, segment.samples]
-        angles[:, : segment.samples.size] = np.pi - of_segment if segment.backward else of_segment
+        of_segment[:, : segment.samples.size] = travels[:, segment.samples]
     paths = likelihood.paths(contours, rig, exact=exact, drive_angles=in_sweep_frame.reshape(-1, shape[1]))
     batch_index, rank, states = paths.loaded_states()
     columns = to_lab_frame(paths.sweep_frame, batch_index, states, likelihood.rod)
     columns["tangential"] = (states.wrench.phase == TANGENTIAL).astype(float)
-    out = {name: np.full(read.shape, np.nan) for name in (*PLACE, "drive_angle", "tangential")}
+    out = {name: np.full(travels.shape, np.nan) for name in (*PLACE, "drive_angle", "tangential")}
     for name, values in out.items():
         values[batch_index % count, samples[batch_index // count, rank]] = columns[name]
     return out

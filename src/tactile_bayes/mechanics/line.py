@@ -1,0 +1,197 @@
+"""Straight parts of a drive that carries the base: it moves along a line, and turns with it at a constant rate.
+
+Poses of the base are points (x, y, drive angle) in space, with lengths in rod lengths and angles in rad, and a part of
+a drive is a line in it. A state is on the line if two components across it vanish. The third is the travel. A rotation
+about a pivot that rests is the line along the drive angle; it needs no such line, for its travel is the angle itself.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.mechanics.compiler import compiled
+
+__all__ = [
+    "LINE_COLUMNS",
+    "NO_LINE",
+    "Line",
+    "LinePath",
+    "Offset",
+    "components",
+    "drive_angle_at",
+    "line_at",
+    "line_of",
+    "lines_through",
+    "off_line",
+    "only_turns",
+    "pose_at",
+]
+
+LINE_COLUMNS = 8
+"""Columns of a line in an array: its beginning (x, y, drive angle), its direction, and travel at beginning and end."""
+
+
+class Offset(NamedTuple):
+    """A pose of the base from another, or a direction in the space of poses."""
+
+    x: float
+    y: float
+    angle: float
+
+
+class Line(NamedTuple):
+    """A straight part of a drive, in the sweep frame and in rod lengths."""
+
+    begin: Offset
+    along: Offset
+    """Direction of the drive, of length one."""
+    across: Offset
+    other: Offset
+    """Directions of length one across it and each other."""
+    travel: float
+    """Travel at its beginning."""
+    end: float
+    """Travel at its end."""
+
+
+_STRAIGHT = 1e-9
+"""Distance from a line that is rounding [L and rad]."""
+
+_ORIGIN = Offset(0.0, 0.0, 0.0)
+NO_LINE = Line(_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, 0.0, 0.0)
+
+
+class LinePath(NamedTuple):
+    """A drive that carries the base, in the sweep frame and in rod lengths, from its first pose."""
+
+    lines: Floats
+    """Shape (lines, `LINE_COLUMNS`)."""
+    travels: Floats
+    """Travel at each pose, shape (n,)."""
+
+
+def lines_through(poses: Floats, length: float, *, backward: bool = False, off: float = _STRAIGHT) -> LinePath:
+    """Return the lines between consecutive poses of the base, those that continue each other put together.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (n, 3)
+        Positions [length] and drive angles [rad] of the base in the laboratory frame, at least two that differ.
+    length : float
+        Length of the rod.
+    backward : bool
+        Whether the sweep frame is the mirror image.
+    off : float
+        Distance from its line [L and rad] up to which a pose lies on it.
+    """
+    own = np.array(poses, dtype=float)
+    own[:, :2] = (own[:, :2] - own[0, :2]) / length
+    if backward:
+        own[:, 0], own[:, 2] = -own[:, 0], np.pi - own[:, 2]
+    # Drive angles as equilibria have them: a rod that points away from the object never touches it.
+    own[:, 2] -= 2.0 * np.pi * np.floor((own[0, 2] + 0.5 * np.pi) / (2.0 * np.pi))
+    corners = _corners(own, off)
+    steps = np.diff(own[corners], axis=0)
+    ways = np.linalg.norm(steps, axis=1)
+    ends = np.append(0.0, np.cumsum(ways))
+    along = steps / ways[:, None]
+    lines = np.column_stack([own[corners[:-1]], along, ends[:-1], ends[1:]])
+    on = np.searchsorted(corners, np.arange(len(own)), side="right") - 1
+    on = np.minimum(on, len(lines) - 1)
+    travels = ends[on] + np.einsum("ij,ij->i", own - own[corners[on]], along[on])
+    return LinePath(lines, travels)
+
+
+def _corners(points: Floats, off: float) -> Index:
+    """Indices of the points between which a path is straight, by the method of Ramer, Douglas and Peucker."""
+    corners, parts = {0, len(points) - 1}, [(0, len(points) - 1)]
+    while parts:
+        first, last = parts.pop()
+        chord = points[last] - points[first]
+        way = float(np.linalg.norm(chord))
+        inside = points[first + 1 : last] - points[first]
+        share = np.clip(inside @ chord / way**2, 0.0, 1.0) if way > 0.0 else np.zeros(len(inside))
+        away = np.linalg.norm(inside - share[:, None] * chord, axis=1)
+        if away.size and away.max() > off:
+            corner = first + 1 + int(np.argmax(away))
+            corners.add(corner)
+            parts += [(first, corner), (corner, last)]
+    return np.array(sorted(corners))
+
+
+@compiled
+def line_of(lines: Floats, k: int) -> Line:
+    """Line in a row of an array."""
+    row = lines[k]
+    begin, along = Offset(row[0], row[1], row[2]), Offset(row[3], row[4], row[5])
+    level = math.hypot(along.x, along.y)
+    across = Offset(-along.y / level, along.x / level, 0.0) if level > 0.0 else Offset(1.0, 0.0, 0.0)
+    other = Offset(
+        along.y * across.angle - along.angle * across.y,
+        along.angle * across.x - along.x * across.angle,
+        along.x * across.y - along.y * across.x,
+    )
+    return Line(begin, along, across, other, row[6], row[7])
+
+
+@compiled
+def line_at(lines: Floats, travel: float) -> int:
+    """Number of the line at a travel."""
+    k = 0
+    while k + 1 < lines.shape[0] and lines[k + 1, 6] <= travel:
+        k += 1
+    return k
+
+
+@compiled
+def off_line(line: Line, x: float, y: float, angle: float) -> Offset:
+    """Components of a pose across the line, and its travel in place of the angle."""
+    x, y, angle = x - line.begin.x, y - line.begin.y, angle - line.begin.angle
+    return Offset(
+        _component(line.across, x, y, angle),
+        _component(line.other, x, y, angle),
+        line.travel + _component(line.along, x, y, angle),
+    )
+
+
+@compiled
+def components(line: Line, x: float, y: float, angle: float) -> Offset:
+    """Components of a direction across the line, and along it in place of the angle."""
+    return Offset(
+        _component(line.across, x, y, angle),
+        _component(line.other, x, y, angle),
+        _component(line.along, x, y, angle),
+    )
+
+
+@compiled
+def _component(direction: Offset, x: float, y: float, angle: float) -> float:
+    return direction.x * x + direction.y * y + direction.angle * angle
+
+
+@compiled
+def pose_at(line: Line, travel: float) -> Offset:
+    """Pose of the base at a travel."""
+    way = travel - line.travel
+    begin, along = line.begin, line.along
+    return Offset(begin.x + way * along.x, begin.y + way * along.y, begin.angle + way * along.angle)
+
+
+@compiled
+def only_turns(line: Line | None) -> bool:
+    """Whether the base rests."""
+    if line is None:
+        return True
+    return line.along.x == 0.0 and line.along.y == 0.0
+
+
+@compiled
+def drive_angle_at(line: Line | None, travel: float) -> float:
+    """Drive angle at a travel, which is the angle itself in a rotation."""
+    if line is None:
+        return travel
+    return line.begin.angle + (travel - line.travel) * line.along.angle

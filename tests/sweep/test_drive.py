@@ -1,0 +1,163 @@
+"""Drives that carry the base: values, scans, records and what follows from them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tactile_bayes as tb
+from helpers.refusals import refused
+from tactile_bayes.errors import ContourError, ParameterError, ReachError, RecordError
+from tactile_bayes.record import carried_sweeps
+
+CIRCLE = tb.contours.Circle(0.3, 0.8)
+THERE = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
+BACK = tb.Translation(base=(-0.8, 0.0), heading=0.0, drive_angle=np.pi - 1.2, travel=1.6)
+COMBINED = tb.Motion(x=[0.8, -0.8], y=0.0, drive_angle=[0.9, 1.7])
+
+
+def test_poses_lie_on_straight_lines():
+    np.testing.assert_allclose(THERE.poses, [[0.8, 0.0, 1.2], [-0.8, 0.0, 1.2]], atol=1e-15)
+    motion = tb.Motion(x=[0.0, 3.0, 3.0], y=[0.0, 4.0, 5.0], drive_angle=[0.0, 0.5, 1.0])
+    np.testing.assert_allclose(motion.travels, [0.0, 5.0, 6.0])
+    np.testing.assert_allclose(motion.at([2.5, 5.5]), [[1.5, 2.0, 0.25], [3.0, 4.5, 0.75]])
+    turning = tb.Motion(x=0.1, y=0.0, drive_angle=[0.2, 1.0])
+    np.testing.assert_allclose(turning.travels, [0.0, 0.8])
+
+
+@pytest.mark.parametrize(
+    ("make", "values"),
+    [
+        (lambda: tb.Translation((0, 0), heading=180.0, drive_angle=1.0, travel=1.0), ["heading", "180"]),
+        (lambda: tb.Translation((0, 0), heading=np.pi, drive_angle=1.0, travel=0.0), ["travel", "0"]),
+        (lambda: tb.Translation((0, 0, 0), heading=np.pi, drive_angle=1.0, travel=1.0), ["base"]),
+        (lambda: tb.Rotation("here"), ["base", "here"]),
+        (lambda: tb.Motion([0.0, 1.0], [0.0, 1.0, 2.0], 1.0), ["(2,)", "(3,)"]),
+        (lambda: tb.Motion(0.0, 0.0, 1.0), ["two poses"]),
+        (lambda: tb.Motion([0.0, 0.0], 0.0, 1.0), ["0 and 1"]),
+        (lambda: tb.Motion([0.0, 1.0], 0.0, 90.0), ["90"]),
+    ],
+)
+def test_drives_that_are_none_are_refused(make, values):
+    with refused(ParameterError, *values):
+        make()
+
+
+def test_a_rotation_is_what_the_base_is_short_for():
+    by_base, by_drive = tb.scan(CIRCLE, base=(0.1, 0.0)), tb.scan(CIRCLE, drive=tb.Rotation((0.1, 0.0)))
+    assert by_base.record.identical(by_drive.record)
+    assert by_base.sweeps == by_drive.sweeps
+    assert by_drive.events["forward"].snap_off.travel == by_drive.events["forward"].snap_off.drive_angle
+
+
+@pytest.mark.parametrize("drive", [THERE, COMBINED])
+def test_a_scan_records_where_the_base_is(drive):
+    scan = tb.scan(CIRCLE, drive=drive, drive_step=0.01)
+    record, events = scan.record, scan.events["forward"]
+    travels = 0.01 * np.arange(161)
+    np.testing.assert_allclose(
+        np.stack([record[name].values for name in ("base_x", "base_y", "drive_angle")], axis=-1), drive.at(travels)
+    )
+    loaded = record.truth_contact_phase.values != "none"
+    np.testing.assert_array_equal(
+        loaded, (travels >= events.first_contact.travel) & (travels <= events.snap_off.travel)
+    )
+    np.testing.assert_allclose(
+        [events.snap_off.base_x, events.snap_off.base_y, events.snap_off.drive_angle],
+        drive.at(events.snap_off.travel),
+        atol=1e-12,
+    )
+    assert events.first_contact.holding_moment == 0.0
+    assert carried_sweeps(record) == (0,)
+
+
+def test_the_other_side_is_a_backward_sweep():
+    forward, backward = tb.scan(CIRCLE, drive=THERE), tb.scan(CIRCLE, drive=BACK)
+    one, other = forward.events["forward"], backward.events["backward"]
+    assert other.snap_off.travel == pytest.approx(one.snap_off.travel, abs=1e-12)
+    assert other.snap_off.contact_x == pytest.approx(-one.snap_off.contact_x, abs=1e-12)
+    np.testing.assert_allclose(backward.record.holding_moment, -forward.record.holding_moment, atol=1e-9)
+
+
+def test_turned_here_and_carried_there_is_one_record():
+    both = tb.scan(CIRCLE, drive=[tb.Rotation(), THERE, BACK])
+    assert [sweep.direction for sweep in both.sweeps] == ["forward", "backward", "forward", "backward"]
+    assert carried_sweeps(both.record) == (2, 3)
+    turned = both.record.isel(sample=both.record.sweep.values < 2)
+    assert turned.identical(tb.scan(CIRCLE).record)
+
+
+@pytest.mark.parametrize("drive", [THERE, COMBINED, [tb.Rotation(), THERE]])
+@pytest.mark.parametrize("rod", [tb.Rod(), tb.Rod(rest_curvature=-0.3), tb.Rod(taper=0.5)])
+def test_step_2_brings_the_contacts_back(drive, rod):
+    record = tb.scan(CIRCLE, drive=drive, rod=rod).record
+    found = tb.reconstruct(record)
+    loaded = np.hypot(record.force_x, record.force_y) > 1e-6
+    assert loaded.sum() > 20
+    for name in ("contact_x", "contact_y"):
+        np.testing.assert_allclose(found[name].values[loaded], record[f"truth_{name}"].values[loaded], atol=1e-9)
+
+
+def test_lengths_are_in_metres_with_a_rod_in_si():
+    rod = tb.Rod(length=0.1, flexural_rigidity=1.2e-5)
+    drive = tb.Translation(base=(0.08, 0.0), heading=np.pi, drive_angle=1.2, travel=0.16)
+    scan = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rod=rod)
+    plain = tb.scan(CIRCLE, drive=THERE)
+    np.testing.assert_allclose(scan.record.base_x, 0.1 * plain.record.base_x, atol=1e-15)
+    np.testing.assert_allclose(scan.record.force_y, rod.force_unit * plain.record.force_y, rtol=1e-9, atol=1e-15)
+    assert scan.events["forward"].snap_off.travel == pytest.approx(0.1 * plain.events["forward"].snap_off.travel)
+
+
+def test_a_motion_of_many_poses_is_sampled_at_them():
+    x = np.linspace(0.8, -0.8, 33)
+    scan = tb.scan(CIRCLE, drive=tb.Motion(x, 0.02 * np.sin(3.0 * x), 1.2))
+    np.testing.assert_allclose(scan.record.base_x, x)
+    found = tb.reconstruct(scan.record)
+    loaded = np.hypot(scan.record.force_x, scan.record.force_y) > 1e-6
+    assert loaded.sum() > 5
+    np.testing.assert_allclose(found.contact_x[loaded], scan.record.truth_contact_x[loaded], atol=1e-9)
+
+
+def test_a_drive_that_ends_in_contact_says_so():
+    short = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.1)
+    events = tb.scan(CIRCLE, drive=short).events["forward"]
+    assert events.snap_off.kind == "never"
+    assert events.snap_off.travel == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize(
+    ("error", "arguments", "values"),
+    [
+        (ReachError, {"drive": tb.Translation((0.8, -1.0), np.pi, 1.2, 1.6)}, ["does not touch"]),
+        (ContourError, {"drive": tb.Translation((-0.2, 0.0), np.pi, 1.2, 1.0)}, ["from the beginning"]),
+        (ReachError, {"drive": tb.Motion([0.8, -0.3, 0.8], 0.0, 1.2), "friction": 0.2}, ["friction", "other way"]),
+        (ParameterError, {"drive": THERE, "direction": "backward"}, ["direction"]),
+        (ParameterError, {"drive": THERE, "drive_angles": [0.1, 0.2]}, ["drive_angles"]),
+        (ParameterError, {"drive": THERE, "base": (0.1, 0.0)}, ["base"]),
+        (ParameterError, {"drive": [THERE, tb.Rotation()], "drive_step": 0.1}, ["drive_step"]),
+        (ParameterError, {"drive": THERE, "drive_step": 0.0}, ["drive_step"]),
+        (ParameterError, {"drive": "left"}, ["drive", "left"]),
+        (ParameterError, {"drive": []}, ["drive"]),
+    ],
+)
+def test_what_cannot_be_scanned_is_refused(error, arguments, values):
+    with refused(error, *values):
+        tb.scan(CIRCLE, **arguments)
+
+
+def test_records_survive_files_and_noise(tmp_path):
+    record = tb.scan(CIRCLE, drive=[tb.Rotation(), COMBINED]).record
+    measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
+    for name in ("one.csv", "one.nc"):
+        tb.write_record(measured, tmp_path / name)
+        read = tb.read_record(tmp_path / name)
+        for column in ("base_x", "base_y", "drive_angle", "holding_moment"):
+            np.testing.assert_array_equal(read[column], measured[column])
+        assert carried_sweeps(read) == (2,)
+
+
+def test_two_pivots_in_one_sweep_are_still_refused():
+    record = tb.scan(CIRCLE, direction="forward").record
+    x = np.where(np.arange(record.sizes["sample"]) < 20, 0.0, 0.1)
+    with refused(RecordError, "base_x", "0.1"):
+        tb.make_record({**{name: record[name].values for name in record}, "base_x": x})
