@@ -22,7 +22,6 @@ from tactile_bayes.checks import (
     check_numbers,
     check_optional,
     check_path,
-    check_pivots,
     check_seed,
     check_whole_number,
     refused,
@@ -33,7 +32,7 @@ from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.sweep import record_template
+from tactile_bayes.sweep import Drive, Rotation, drives_of, record_template
 from tactile_bayes.tasks import ResultsStore, TaskProgress, keep_outcomes, open_results_store
 
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
@@ -56,6 +55,7 @@ def calibrate(
     replicates: int = 200,
     load_cell: LoadCell | None = None,
     rod: Rod | None = None,
+    drive: Drive | Sequence[Drive] | None = None,
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
     direction: Literal["both", "forward", "backward"] = "both",
     drive_angles: ArrayLike | None = None,
@@ -94,10 +94,12 @@ def calibrate(
         and moment_noise 0.02 EI/L.
     rod : Rod, optional
         By default the dimensionless rod.
+    drive : Rotation, Translation or Motion, or a sequence of them, optional
+        As in `scan`; those that carry the base are sampled at as many places as there are drive angles.
     base : (float, float) or sequence of them
-        Pivots, visited in turn [length].
+        Pivots of rotations if there is no `drive`, visited in turn [length].
     direction : {"both", "forward", "backward"}
-        Directions of the sweeps about each pivot.
+        Directions of the sweeps of each rotation.
     drive_angles : array_like, shape (n,), optional
         Readings of a perfect encoder [rad], in every sweep; by default every 2° from −30° to 210°. They do not depend
         on the contour, and so carry no information about it.
@@ -176,6 +178,7 @@ def calibrate(
         family=family,
         load_cell=load_cell,
         rod=rod,
+        drive=drive,
         base=base,
         direction=direction,
         drive_angles=drive_angles,
@@ -244,6 +247,7 @@ def experiment_of(
     family: str = "parabola",
     load_cell: LoadCell | None = None,
     rod: Rod | None = None,
+    drive: Drive | Sequence[Drive] | None = None,
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
     direction: str = "both",
     drive_angles: ArrayLike | None = None,
@@ -267,9 +271,10 @@ def experiment_of(
     angles = np.unique(check_numbers("drive_angles", given, correction, shape=(None,)))
     if angles.size < 3:
         raise refused("drive_angles", drive_angles, correction)
-    bases, cell = tuple(check_pivots("base", base)), load_cell or usual_load_cell(rod or Rod())
+    drives, cell = drives_of(drive, base), load_cell or usual_load_cell(rod or Rod())
+    bases = tuple(one.base for one in drives if isinstance(one, Rotation))
     assumed = Experiment(
-        record_template(bases, directions[direction], angles, rod, cell),
+        record_template(drives, directions[direction], angles, rod, cell),
         family,
         cell,
         {} if priors is None else priors,
@@ -287,6 +292,7 @@ def experiment_of(
         probability=probability,
         seed=check_seed(seed),
         world=world or Misspecification(),
+        drives=() if len(bases) == len(drives) else tuple(drives),
     )
     default = replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS))
     return replace(experiment, settings=default, again=_AGAIN) if settings in (None, default) else experiment

@@ -21,6 +21,7 @@ from tactile_bayes.inference.experiment import Experiment, priors_in_words
 from tactile_bayes.inference.priors import refuse_unknown_priors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import bases_of
+from tactile_bayes.sweep import Carried, Drive
 
 __all__ = ["SimulatedExperiment"]
 
@@ -42,6 +43,8 @@ class SimulatedExperiment:
     probability: float = 0.9
     seed: int = 0
     world: Misspecification = field(default_factory=Misspecification)
+    drives: tuple[Drive, ...] = ()
+    """Drives, unless they are rotations about `bases`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "probability", check_probability("probability", self.probability))
@@ -111,11 +114,17 @@ class SimulatedExperiment:
             "probability": repr(self.probability),
             "seed": repr(self.seed),
         }
+        if self.drives:
+            entries["drives"] = json.dumps([_described(drive) for drive in self.drives])
         entries["world_family"] = world.family or self.assumed.family
         entries |= {f"world_{name}": repr(getattr(world, name)) for name in NUMBERS}
         entries["world_load_cell"] = "as stated" if world.load_cell is None else json.dumps(world.load_cell.entries())
         entries["world_priors"] = priors_in_words(world.priors)
         return entries | {f"version of {name}": version(name) for name in _LIBRARIES}
+
+
+def _described(drive: Drive) -> Any:
+    return drive.poses.tolist() if isinstance(drive, Carried) else drive.base
 
 
 def _plain(value: Any) -> Any:

@@ -20,7 +20,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.record import bases_of, present_channels, rod_of
+from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
 
 __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
 
@@ -271,10 +271,12 @@ def _unidentifiable(measured: xr.Dataset) -> dict[str, str]:
     reasons: dict[str, str] = {}
     if "holding_moment" not in present_channels(measured):
         reasons |= dict.fromkeys(("lever", *_GROUPS["lever"]), "it shows in the moment, which was not measured")
-    if len(np.unique(measured.direction.values)) == 1:
-        only = str(measured.direction.values[0])
+    turned = measured.direction.values[~np.isin(measured.sweep.values, carried_sweeps(measured))]
+    if turned.size == 0:
+        reasons["backlash"] = "the drive carries the base in every sweep, and turns no encoder to and fro"
+    elif len(np.unique(turned)) == 1:
         reasons["backlash"] = (
-            f"every sweep is {only}, and in one direction it cannot be distinguished from drive_angle_offset; "
+            f"every sweep is {turned[0]}, and in one direction it cannot be distinguished from drive_angle_offset; "
             "infer that"
         )
     return reasons

@@ -155,6 +155,10 @@ _WEAK = 0.5
 _NOT_TURNED = 1e-3
 """Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried."""
 
+_NO_LOAD = 1e-8
+"""Force [EI/L²] at the end of a leg on which a release was found that is zero. There may be another state without force
+on the plane across its end."""
+
 _HELD = 1e-9
 """Slip per length of a leg, in the sense of the friction, that rounding may cause."""
 
@@ -415,6 +419,15 @@ def _over(line: Line | None, last: float, accuracy: Accuracy, work: LegCurves) -
 
 
 @compiled
+def _ending(line: Line | None, found: Balance) -> Balance:
+    """Equilibrium at the end of a line, to which it was found with rounding errors."""
+    if line is None:
+        return found
+    at, _, moment, force_x, force_y, tangent, rate, moment_rate, x_rate, y_rate = found
+    return Balance(at, line.end, moment, force_x, force_y, tangent, rate, moment_rate, x_rate, y_rate)
+
+
+@compiled
 def _goes_on(lines: Floats | None, k: int) -> bool:
     """Whether the drive goes on after a line."""
     if lines is None:
@@ -521,7 +534,8 @@ def follow_branch(
             stop = first_fall(accuracy, is_first, curves)
             over = _over(scene.line, min(stop, last), accuracy, work)
             if over <= 1.0:
-                at_over, stop, last, change = settle_on(loaded, leg, over, guess(work, over), SETTLED), 2.0, over, 2.0
+                at_over = _ending(scene.line, settle_on(loaded, leg, over, guess(work, over), SETTLED))
+                stop, last, change = 2.0, over, 2.0
             if stop == 0.0:
                 twice = _second_contact(scene, seen, leg, goes_on, stop, work)
                 fate, behind = _THRUST if abs(begin.holding_moment) <= _NO_MOMENT else _CORNER, 0.0
@@ -543,7 +557,7 @@ def follow_branch(
                 else:
                     rate = value(curves.series[ANGLE + 1], stop)
                     steadiness = min(max(rate * stop / (until.travel - begin_angle), 0.0), 1.0)
-                    if released and change > 1.0 and over > 1.0:
+                    if released and end.at.force < _NO_LOAD and change > 1.0 and over > 1.0:
                         fate = _RELEASE
                 stuck = math.nan if only_turns(loaded.line) else _sticks(loaded, stop, work)
                 if not leg.tip and lines is not None and until.at.q < _CLEARANCE:

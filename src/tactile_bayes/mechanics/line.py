@@ -103,6 +103,7 @@ def lines_through(poses: Floats, length: float, *, backward: bool = False, off: 
     on = np.searchsorted(corners, np.arange(len(own)), side="right") - 1
     on = np.minimum(on, len(lines) - 1)
     travels = ends[on] + np.einsum("ij,ij->i", own - own[corners[on]], along[on])
+    lines[-1, 7] += _STRAIGHT  # rounding does not hide the last pose
     return LinePath(lines, travels)
 
 

@@ -20,7 +20,7 @@ from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import rod_of
-from tactile_bayes.sweep import record_template
+from tactile_bayes.sweep import Rotation, record_template
 
 __all__ = ["COARSE", "Base", "Knowledge", "empty_record", "known_from_posterior", "known_from_prior"]
 
@@ -72,7 +72,7 @@ def empty_record(bases: Sequence[Base], drive_step: float, rod: Rod | None, load
     Sweeps go from before any first contact to after any snap-off, where the object lies above the pivot.
     """
     angles = np.arange(np.radians(-30.0), np.radians(210.0) + 1e-9, drive_step)
-    return record_template(bases, ("forward", "backward"), angles, rod, load_cell)
+    return record_template([Rotation(base) for base in bases], ("forward", "backward"), angles, rod, load_cell)
 
 
 def known_from_prior(experiment: Experiment, *, draws: int, rng: np.random.Generator) -> Knowledge:

@@ -4,7 +4,7 @@ from tactile_bayes.sweep.columns import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits
 from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation, Translation
 from tactile_bayes.sweep.events import Event, SweepEvents
 from tactile_bayes.sweep.lab_frame import to_lab_frame
-from tactile_bayes.sweep.scanning import Scan, equilibria, scan
+from tactile_bayes.sweep.scanning import Scan, drives_of, equilibria, scan
 from tactile_bayes.sweep.scanning_many import scan_many
 from tactile_bayes.sweep.template import record_template
 
@@ -20,6 +20,7 @@ __all__ = [
     "Scan",
     "SweepEvents",
     "Translation",
+    "drives_of",
     "equilibria",
     "phases_of",
     "record_template",

@@ -63,6 +63,12 @@ class Carried(ABC):
         ways = np.hypot(steps[:, 0], steps[:, 1])
         return np.append(0.0, np.cumsum(ways if ways.any() else np.abs(steps[:, 2])))
 
+    def side(self, length: float) -> str:
+        """Return "forward" if the left side of an unloaded rod of a length leads on average, else "backward"."""
+        steps, angle = np.diff(self.poses, axis=0), self.poses[:-1, 2]
+        ahead = steps[:, 1] * np.cos(angle) - steps[:, 0] * np.sin(angle) + 0.5 * length * steps[:, 2]
+        return "forward" if ahead.sum() >= 0.0 else "backward"
+
     def at(self, travels: ArrayLike) -> Floats:
         """Poses of the base at travels between the first and the last [length and rad], shape (k, 3)."""
         wanted = np.asarray(travels, dtype=float)

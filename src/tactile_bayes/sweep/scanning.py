@@ -28,7 +28,7 @@ from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.path import Direction, carried_paths, friction_angle_of, sweep_paths, to_sweep_frame
 
-__all__ = ["Scan", "equilibria", "scan"]
+__all__ = ["Scan", "drives_of", "equilibria", "scan"]
 
 _MARGIN = 15
 """Number of drive steps before first contact and after snap-off."""
@@ -261,7 +261,7 @@ def scan(
     """
     rod = Rod() if rod is None else rod
     check_choice("direction", direction, ("both", "forward", "backward"), "choose 'forward' or 'backward', or 'both'")
-    drives = _drives(drive, base)
+    drives = drives_of(drive, base)
     step = _checked_step(drive_step, drives, rod)
     given = None if drive_angles is None else _floats(drive_angles)
     grid = None if given is None else np.unique(given)
@@ -305,8 +305,8 @@ def scan(
     return Scan(make_record(record, rod=rod), tuple(sweeps), contour)
 
 
-def _drives(drive: Drive | Sequence[Drive] | None, base: Any) -> list[Drive]:
-    """Return drives, or rotations about pivots."""
+def drives_of(drive: Drive | Sequence[Drive] | None, base: Any) -> list[Drive]:
+    """Return drives, or rotations about pivots; ParameterError if they are neither, or both are given."""
     pivots = check_pivots("base", base)
     if drive is None:
         return [Rotation(pivot) for pivot in pivots]

@@ -12,29 +12,31 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record
+from tactile_bayes.sweep.drive import Carried, Drive
 
 __all__ = ["record_template"]
 
 
 def record_template(
-    bases: Sequence[tuple[float, float]],
+    drives: Sequence[Drive],
     directions: Sequence[str],
     drive_angles: Floats,
     rod: Rod | None,
     load_cell: LoadCell,
 ) -> xr.Dataset:
-    """Return a record of sweeps about every pivot in every direction, with loads of zero.
+    """Return a record of sweeps by every drive, with loads of zero.
 
     Its drive angles include the encoder's offset and backlash.
 
     Parameters
     ----------
-    bases : sequence of (float, float)
-        Pivots, in the unit of length of the record.
+    drives : sequence of Rotation, Translation or Motion
+        In the unit of length of the record. Those that carry the base are sampled at as many places as there are drive
+        angles.
     directions : sequence of {"forward", "backward"}
-        Directions of the sweeps about each pivot.
+        Directions of the sweeps of each rotation.
     drive_angles : ndarray, shape (n,)
-        Drive angles of the rod, in any order [rad].
+        Drive angles of rotations, in any order [rad].
     rod : Rod, optional
         By default the dimensionless rod.
     load_cell : LoadCell
@@ -42,15 +44,20 @@ def record_template(
     """
     angles = np.sort(drive_angles)
     parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}
-    sweep = 0
-    for x, y in bases:
-        for direction in directions:
-            parts["sweep"].append(np.full(angles.size, sweep))
-            parts["direction"].append(np.full(angles.size, direction))
-            parts["base_x"].append(np.full(angles.size, x))
-            parts["base_y"].append(np.full(angles.size, y))
-            parts["drive_angle"].append(angles if direction == "forward" else angles[::-1])
-            sweep += 1
+    sweeps: list[tuple[str, Floats]] = []
+    for drive in drives:
+        if isinstance(drive, Carried):
+            side = drive.side(1.0 if rod is None else rod.length)
+            sweeps.append((side, drive.at(np.linspace(0.0, drive.travels[-1], angles.size))))
+        else:
+            for direction in directions:
+                turned = angles if direction == "forward" else angles[::-1]
+                sweeps.append((direction, np.column_stack([*(np.full(angles.size, v) for v in drive.base), turned])))
+    for sweep, (direction, poses) in enumerate(sweeps):
+        parts["sweep"].append(np.full(len(poses), sweep))
+        parts["direction"].append(np.full(len(poses), direction))
+        for name, column in zip(("base_x", "base_y", "drive_angle"), poses.T, strict=True):
+            parts[name].append(column)
     columns: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
     columns["drive_angle"] = columns["drive_angle"] + load_cell.misread(columns["direction"])
     loads = {name: np.zeros(columns["sweep"].size) for name in CHANNELS}
