@@ -339,7 +339,7 @@ def with_friction(scene: Scene, angle: float) -> Scene:
 def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> _Arrived:
     if lines is None:
         return _Arrived(approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline)
-    near, k, travel = arrival(scene.outline, scene.beam, lines, first_step)
+    near, k, travel = arrival(scene.outline, scene.beam, lines)
     pose = pose_at(line_of(lines, k), travel)
     return _Arrived(near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y))
 

@@ -48,8 +48,8 @@ _ROUNDING = 1e-14
 """Distance from the end of the rod's reach [L] that counts as zero."""
 
 
-_LOOKS, _COARSE = 8, 1e-2
-"""Number of parts of a line between which a carried rod is looked at, and last step of these searches."""
+_LOOKS, _COARSE = 8, 1e-3
+"""Number of parts of a line between which a carried rod is looked at, and last step of searches there."""
 
 _CLOSE = 1e-3
 """Angle [rad] to which first contact of a carried rod is found; a search for the equilibrium there follows."""
@@ -234,73 +234,76 @@ def _turned(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> _Tu
 
 
 @compiled
-def _arrival_on(outline: Outline, beam: Beam, line: Line, is_first: bool, last_step: float) -> tuple[_Turned, float]:
+def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> _Turned:
+    return _turned(outline, beam, pose_at(line, travel), _COARSE)
+
+
+@compiled
+def _arrival_on(outline: Outline, beam: Beam, line: Line, is_first: bool) -> tuple[_Turned, float]:
     """First contact on a line, and its travel; NaN if there is none."""
     size = (line.end - line.travel) / _LOOKS
-    before, looked = line.travel, _turned(outline, beam, pose_at(line, line.travel), _COARSE)
-    nearest, least, was_clear = before, math.inf, looked.gap > 0.0
-    if not was_clear and (is_first or looked.reach == _CUTS_PIVOT or looked.reach == _TOO_CLOSE):
+    before, looked = line.travel, _look(outline, beam, line, line.travel)
+    nearest, least, gap = before, math.inf, looked.gap
+    if gap <= 0.0 and (is_first or looked.reach == _CUTS_PIVOT or looked.reach == _TOO_CLOSE):
         return looked, before
     for k in range(1, _LOOKS + 1):
         travel = line.travel + k * size
-        looked = _turned(outline, beam, pose_at(line, travel), _COARSE)
-        if was_clear and looked.gap <= 0.0:
-            found, at = _between(outline, beam, line, before, travel, last_step)
+        looked = _look(outline, beam, line, travel)
+        if gap > 0.0 and looked.gap <= 0.0:
+            found, at = _between(outline, beam, line, before, gap, travel, looked)
             if found.gap > -_JUMP or found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
                 return found, at
-        elif was_clear and looked.gap < least:
+        elif gap > 0.0 and looked.gap < least:
             nearest, least = travel, looked.gap
-        before, was_clear = travel, looked.gap > 0.0
+        before, gap = travel, looked.gap
     if least == math.inf:
         return looked, math.nan
     low, high = max(nearest - size, line.travel), min(nearest + size, line.end)
     for _ in range(_DEEPEST):
         left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        at_left = _turned(outline, beam, pose_at(line, left), _COARSE)
-        at_right = _turned(outline, beam, pose_at(line, right), _COARSE)
+        at_left, at_right = _look(outline, beam, line, left), _look(outline, beam, line, right)
         if min(at_left.gap, at_right.gap) <= 0.0:
-            found, at = _between(outline, beam, line, low, left if at_left.gap <= 0.0 else right, last_step)
+            inside, looked = (left, at_left) if at_left.gap <= 0.0 else (right, at_right)
+            found, at = _between(outline, beam, line, low, _look(outline, beam, line, low).gap, inside, looked)
             return found, at if found.gap > -_JUMP else math.nan
         if at_left.gap < at_right.gap:
             high = right
         else:
             low = left
-    return _turned(outline, beam, pose_at(line, low), last_step), math.nan
+    return looked, math.nan
 
 
 @compiled
 def _between(
-    outline: Outline, beam: Beam, line: Line, clear: float, inside: float, last_step: float
+    outline: Outline, beam: Beam, line: Line, clear: float, gap: float, inside: float, found: _Turned
 ) -> tuple[_Turned, float]:
     """First contact between two travels, at the second of which the unloaded rod would cut the object."""
-    settled = _LAST * (inside - clear)
-    found = _turned(outline, beam, pose_at(line, inside), last_step)
-    at_clear, at_inside = _turned(outline, beam, pose_at(line, clear), last_step).gap, found.gap
+    settled, at_inside = _LAST * (inside - clear), found.gap
     if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
         return found, inside
     for k in range(_MOST_HALVINGS):
-        share = at_clear / (at_clear - at_inside)
+        share = gap / (gap - at_inside)
         travel = clear + (inside - clear) * (share if k % 3 < 2 else 0.5)
-        looked = _turned(outline, beam, pose_at(line, travel), last_step)
+        looked = _look(outline, beam, line, travel)
         if looked.gap <= 0.0:
             inside, at_inside, found = travel, looked.gap, looked
-            at_clear *= 0.5 if k % 3 == 1 else 1.0
+            gap *= 0.5 if k % 3 == 1 else 1.0
         else:
-            clear, at_clear = travel, looked.gap
+            clear, gap = travel, looked.gap
         if not inside - clear > settled or found.gap > -_CLOSE:
             break
     return found, inside
 
 
 @compiled
-def arrival(outline: Outline, beam: Beam, lines: Floats, last_step: float) -> tuple[Approach, int, float]:
+def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int, float]:
     """First contact of a rod that is carried along lines, the number of the line, and the travel."""
     reach, distance = _TOO_FAR, math.inf
     for k in range(lines.shape[0]):
         if math.isnan(lines[k, 0]):
             break
         line = line_of(lines, k)
-        found, travel = _arrival_on(outline, beam, line, k == 0, last_step)
+        found, travel = _arrival_on(outline, beam, line, k == 0)
         distance = min(distance, found.distance)
         if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
             return Approach(found.reach, found.distance, math.nan, True, math.nan), k, travel

@@ -20,7 +20,7 @@ from tactile_bayes.mechanics.contact_coordinates import (
 from tactile_bayes.mechanics.profile import Rods
 from tactile_bayes.mechanics.surface import Surface
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, carried_sweeps, travels_of
 from tactile_bayes.record.frame import to_fixed_axes
 
 __all__ = ["METHODS", "SOURCES", "Method", "amplification"]
@@ -82,7 +82,8 @@ def amplification(plan: Plan) -> xr.Dataset:
     -------
     xr.Dataset
         Over "sample", the loaded ones of all sweeps, with sweep, direction, drive_angle [rad], contact_phase and the
-        contact (contact_x, contact_y, slope_angle), after_first_contact and before_snap_off [rad]:
+        contact (contact_x, contact_y, slope_angle), after_first_contact and before_snap_off (along the drive: [rad], or
+        [length] in sweeps in which it carries the base):
 
         gain_along, gain_across (reconstruction, sample, source)
             Derivatives of the contact point, along the contour and across it, by a reading [length/(N m), length/N,
@@ -93,7 +94,7 @@ def amplification(plan: Plan) -> xr.Dataset:
             Whether the first order holds at this noise: `reconstruct` of an ideal sample has the status "ok".
 
         Over "event" ("first contact", "snap-off") and "stroke": growth_along and growth_across (reconstruction, stroke,
-        event), the power of the distance in drive angle with which the standard deviation grows toward the event: −1
+        event), the power of the distance along the drive with which the standard deviation grows toward the event: −1
         doubles it at half the distance, 0 leaves it bounded; NaN if too few samples are close.
 
     Notes
@@ -113,7 +114,7 @@ def amplification(plan: Plan) -> xr.Dataset:
     deviations = [[_deviation(gain, contacts, of_angle) for gain in of_method] for of_method in both]
     # Readings are in the units of the record, not in EI/L or EI/L².
     per_unit = rod.length / np.array([*rod.load_units, 1.0])
-    distances = _distances(refined, chosen)
+    distances = _distances(refined, chosen.sweep.values, travels_of(record)[loaded])
     sweeps = [chosen.sweep.values == k for k in range(len(refined.scan.sweeps))]
     growth = np.array(
         [
@@ -155,12 +156,15 @@ def _holds(plan: Plan, method: Method) -> Flags:
 
 
 def _refined(plan: Plan) -> Plan:
-    """Return the plan with drive angles that are dense near first contact and snap-off."""
+    """Return the plan with drive angles that are dense near first contact and snap-off; unchanged without rotations."""
     angles = []
-    for sweep in plan.scan.sweeps:
+    carried = carried_sweeps(plan.scan.record)
+    for number, sweep in enumerate(plan.scan.sweeps):
+        if number in carried:
+            continue
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
         angles += [first + (snap - first) * ways for ways in (_NEAR, 1.0 - _NEAR, _EVENLY)]
-    return replace(plan, drive_angles=np.unique(np.concatenate(angles)))
+    return replace(plan, drive_angles=np.unique(np.concatenate(angles))) if angles else plan
 
 
 def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
@@ -249,13 +253,12 @@ def _deviation(gain: Floats, contacts: _Forward, angle_deviation: float) -> Floa
     return np.asarray(np.sqrt(variance + (gain[:, 3] * angle_deviation) ** 2))
 
 
-def _distances(plan: Plan, chosen: xr.Dataset) -> tuple[Floats, Floats]:
-    """Return the distances in drive angle from first contact and from snap-off [rad]."""
+def _distances(plan: Plan, sweep: Index, travel: Floats) -> tuple[Floats, Floats]:
+    """Return the distances along the drive from first contact and from snap-off [rad or length]."""
     sweeps = plan.scan.sweeps
-    first = np.array([sweep.first_contact.drive_angle for sweep in sweeps])[chosen.sweep.values]
-    snap = np.array([sweep.snap_off.drive_angle for sweep in sweeps])[chosen.sweep.values]
-    angle = chosen.drive_angle.values
-    return np.abs(angle - first), np.abs(snap - angle)
+    first = np.array([one.first_contact.travel for one in sweeps])[sweep]
+    snap = np.array([one.snap_off.travel for one in sweeps])[sweep]
+    return np.abs(travel - first), np.abs(snap - travel)
 
 
 def _growth(deviation: Floats, distance: Floats) -> float:

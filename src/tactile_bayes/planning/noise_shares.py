@@ -16,6 +16,7 @@ from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
 from tactile_bayes.planning.plan import Plan
+from tactile_bayes.record import carried_sweeps, travels_of
 
 __all__ = ["noise_shares"]
 
@@ -108,15 +109,15 @@ def noise_shares(
     columns = ("sweep", "direction", "drive_angle", "base_x", "base_y")
     sweeps = plan.scan.sweeps
     events = {
-        "after_first_contact": np.array([s.first_contact.drive_angle for s in sweeps]),
-        "before_snap_off": np.array([s.snap_off.drive_angle for s in sweeps]),
+        "after_first_contact": np.array([s.first_contact.travel for s in sweeps]),
+        "before_snap_off": np.array([s.snap_off.travel for s in sweeps]),
     }
     return xr.Dataset(
         {
             **{name: ("sample", chosen[name].values, chosen[name].attrs) for name in columns},
             "contact_phase": ("sample", chosen.truth_contact_phase.values),
             **{
-                name: ("sample", np.abs(chosen.drive_angle.values - of[chosen.sweep.values]), {"units": "rad"})
+                name: ("sample", np.abs(chosen.travel.values - of[chosen.sweep.values]), {"units": "rad"})
                 for name, of in events.items()
             },
             "share": ((*dims, "source"), first),
@@ -158,14 +159,34 @@ def _distribution(plan: Plan, source: str, deviation: float) -> Any:
 
 
 def _states(plan: Plan, count: int) -> xr.Dataset:
-    """Return loaded samples at even drive angles between first contact and snap-off of every sweep."""
+    """Return loaded samples at even distances between first contact and snap-off of every sweep."""
+    carried = carried_sweeps(plan.scan.record)
+    if len(carried) == len(plan.scan.sweeps):
+        record = _with_travels(plan.scan.record)
+        loaded = [
+            np.flatnonzero((record.sweep.values == number) & (record.truth_contact_phase.values != "none"))
+            for number in carried
+        ]
+        even = (np.arange(count) + 0.5) / count
+        return record.isel(
+            sample=np.concatenate([rows[(even * rows.size).astype(int)] for rows in loaded if rows.size])
+        )
+    if carried:
+        raise ParameterError(
+            "noise_shares takes rotations or drives that carry the base, not both: plan them one by one, or leave "
+            "noise_shares out of the parts"
+        )
     angles = []
     for sweep in plan.scan.sweeps:
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
         angles.append(first + (snap - first) * (np.arange(count) + 0.5) / count)
-    record = replace(plan, drive_angles=np.concatenate(angles)).scan.record
+    record = _with_travels(replace(plan, drive_angles=np.concatenate(angles)).scan.record)
     near = np.array([np.isin(record.drive_angle.values[i], angles[s]) for i, s in enumerate(record.sweep.values)])
     return record.isel(sample=np.flatnonzero(near & (record.truth_contact_phase.values != "none")))
+
+
+def _with_travels(record: xr.Dataset) -> xr.Dataset:
+    return record.assign(travel=("sample", travels_of(record)))
 
 
 def _errors(quiet: xr.Dataset, plan: Plan, method: Method, noise: dict[str, Floats]) -> Floats:

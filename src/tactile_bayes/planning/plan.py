@@ -25,7 +25,7 @@ from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.family_parameters import family_parameters
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.sweep import Scan, scan
+from tactile_bayes.sweep import Drive, Scan, scan
 
 __all__ = ["Plan"]
 
@@ -42,7 +42,7 @@ class Plan:
         In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
     rod : Rod, optional
         By default the dimensionless rod.
-    base, direction, drive_step, drive_angles
+    drive, base, direction, drive_step, drive_angles
         As in `scan`.
     friction, nuisances, priors
         As in `infer_contour`: a friction that is given is known; by default there is none, and inference treats it as
@@ -57,9 +57,10 @@ class Plan:
     contour: Contour
     load_cell: LoadCell | None = None
     rod: Rod | None = None
+    drive: Drive | Sequence[Drive] | None = None
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0)
     direction: Literal["both", "forward", "backward"] = "both"
-    drive_step: float = float(np.radians(1.0))
+    drive_step: float | None = None
     drive_angles: ArrayLike | None = None
     friction: float | None = None
     nuisances: Sequence[str] = STANDARD
@@ -98,6 +99,7 @@ class Plan:
         """The sweeps without errors."""
         return scan(
             self.contour,
+            drive=self.drive,
             direction=self.direction,
             base=self.base,
             drive_step=self.drive_step,

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
-import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
@@ -23,6 +22,7 @@ from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise
 from tactile_bayes.planning.sensitivity_summary import sensitivity_summary
+from tactile_bayes.sweep import Drive
 from tactile_bayes.tasks import TaskProgress
 
 __all__ = ["PARTS", "sensitivity"]
@@ -39,9 +39,10 @@ def sensitivity(
     seed: int,
     load_cell: LoadCell | None = None,
     rod: Rod | None = None,
+    drive: Drive | Sequence[Drive] | None = None,
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
     direction: Literal["both", "forward", "backward"] = "both",
-    drive_step: float = float(np.radians(1.0)),
+    drive_step: float | None = None,
     drive_angles: ArrayLike | None = None,
     friction: float | None = None,
     nuisances: Sequence[str] = STANDARD,
@@ -63,7 +64,7 @@ def sensitivity(
         Seed of the samples by which Sobol' indices are estimated.
     load_cell : LoadCell, optional
         In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
-    rod, base, direction, drive_step, drive_angles
+    rod, drive, base, direction, drive_step, drive_angles
         As in `scan`.
     friction, nuisances, priors
         As in `infer_contour`: a friction that is given is known; by default there is none, and inference treats it as
@@ -121,6 +122,7 @@ def sensitivity(
         contour,
         load_cell=load_cell,
         rod=rod,
+        drive=drive,
         base=base,
         direction=direction,
         drive_step=drive_step,

@@ -84,12 +84,12 @@ def _sentences(tree: xr.DataTree, si: bool) -> Iterator[str]:
 
 
 def _spacing(grown: xr.Dataset) -> Floats:
-    """Return the spacing of states in drive angle: they are dense near first contact and snap-off."""
+    """Return the spacing of states along the drive: they are dense near first contact and snap-off."""
     spacing = np.empty(grown.sizes["sample"])
     for sweep in np.unique(grown.sweep.values):
         here = np.flatnonzero(grown.sweep.values == sweep)
-        angle = grown.drive_angle.values[here]
-        spacing[here] = np.abs(np.gradient(angle)) if here.size > 1 else 1.0
+        travel = grown.after_first_contact.values[here]
+        spacing[here] = np.abs(np.gradient(travel)) if here.size > 1 else 1.0
     return spacing
 
 

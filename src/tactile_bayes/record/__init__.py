@@ -16,7 +16,7 @@ from tactile_bayes.record.schema import (
     column_of,
     present_channels,
 )
-from tactile_bayes.record.sweep import base_of_sample, bases_of, carried_sweeps
+from tactile_bayes.record.sweep import base_of_sample, bases_of, carried_sweeps, travels_of
 from tactile_bayes.record.units import rod_of, to_dimensionless, to_si, with_rod
 from tactile_bayes.record.validation import validate
 
@@ -42,6 +42,7 @@ __all__ = [
     "rod_of",
     "to_dimensionless",
     "to_si",
+    "travels_of",
     "turned",
     "validate",
     "with_rod",

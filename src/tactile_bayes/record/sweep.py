@@ -16,7 +16,7 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.record.schema import DIRECTIONS
 from tactile_bayes.record.table import Source
 
-__all__ = ["base_of_sample", "bases_of", "carried_sweeps", "refuse_impossible_sweeps"]
+__all__ = ["base_of_sample", "bases_of", "carried_sweeps", "refuse_impossible_sweeps", "travels_of"]
 
 
 def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
@@ -104,6 +104,20 @@ def base_of_sample(record: xr.Dataset) -> tuple[list[tuple[float, float]], Index
     places: dict[tuple[float, float], int] = {}
     index = [places.setdefault(place, len(places)) for place in zip(x.tolist(), y.tolist(), strict=True)]
     return list(places), np.array(index, dtype=np.intp)
+
+
+def travels_of(record: xr.Dataset) -> Floats:
+    """Return how far along the drive of its sweep each sample is, shape (samples,).
+
+    That is the drive angle in rotations [rad], and the way of the base since the first sample of the sweep where it is
+    carried [length].
+    """
+    travels, sweep = record.drive_angle.values.astype(float), record.sweep.values
+    for number in carried_sweeps(record):
+        rows = np.flatnonzero(sweep == number)
+        steps = np.hypot(np.diff(record.base_x.values[rows]), np.diff(record.base_y.values[rows]))
+        travels[rows] = np.append(0.0, np.cumsum(steps))
+    return travels
 
 
 def bases_of(record: xr.Dataset) -> list[tuple[float, float]]:

@@ -1,0 +1,64 @@
+"""Plans of sweeps in which the drive carries the base."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tactile_bayes as tb
+from helpers.refusals import refused
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.planning.amplification import amplification
+from tactile_bayes.planning.noise_shares import noise_shares
+from tactile_bayes.planning.plan import Plan
+
+CIRCLE = tb.contours.Circle(0.3, 0.8)
+SHIFTS = [
+    tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6),
+    tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.1, 1.6),
+]
+CELL = tb.LoadCell(force_noise=0.005, moment_noise=0.002)
+
+
+def test_amplification_is_the_change_of_a_contact_by_a_reading():
+    """Against finite differences of raw Step 2."""
+    plan = Plan(CIRCLE, CELL, drive=SHIFTS)
+    found = amplification(plan)
+    record = plan.scan.record
+    loaded = np.flatnonzero(record.truth_contact_phase.values != "none")
+    assert found.sizes["sample"] == loaded.size
+    step = 1e-7
+    pushed = record.assign(force_y=record.force_y + step)
+    before, after = (tb.reconstruct(one) for one in (record, pushed))
+    change = np.stack([(after[name] - before[name]).values[loaded] / step for name in ("contact_x", "contact_y")])
+    slope = record.truth_slope_angle.values[loaded]
+    along = change[0] * np.cos(slope) + change[1] * np.sin(slope)
+    gain = found.gain_along.sel(reconstruction="raw", source="force_y").values
+    strong = np.hypot(record.force_x, record.force_y).values[loaded] > 0.2
+    assert strong.sum() > 10
+    np.testing.assert_allclose(along[strong], gain[strong], rtol=1e-3, atol=1e-4)
+
+
+def test_distances_are_along_the_drive():
+    plan = Plan(CIRCLE, CELL, drive=SHIFTS[0], drive_step=0.05)
+    found, (sweep,) = amplification(plan), plan.scan.sweeps
+    travel = 0.8 - found.base_x.values
+    np.testing.assert_allclose(found.after_first_contact, travel - sweep.first_contact.travel, atol=1e-12)
+    np.testing.assert_allclose(found.before_snap_off, sweep.snap_off.travel - travel, atol=1e-12)
+
+
+def test_noise_shares_are_of_either_kind_of_drive():
+    shares = noise_shares(Plan(CIRCLE, CELL, drive=SHIFTS), seed=1, samples=16, states=4)
+    assert shares.sizes["sample"] == 8
+    assert np.all(shares.after_first_contact >= 0.0)
+    with refused(ParameterError, "noise_shares"):
+        noise_shares(Plan(CIRCLE, CELL, drive=[tb.Rotation(), SHIFTS[0]]), seed=1, samples=16, states=4)
+
+
+@pytest.mark.parametrize("drive", [SHIFTS, [tb.Rotation(), SHIFTS[0]]])
+def test_sensitivity_tells_what_a_band_would_be(drive):
+    found = tb.sensitivity(CIRCLE, seed=1, drive=drive, parts=["information", "required_noise"])
+    bounds = found["information"].bound
+    assert np.all(np.isfinite(bounds.sel(parameter=["r", "q", "x_c"])))
+    both = tb.sensitivity(CIRCLE, seed=1, drive=[*drive, SHIFTS[1]], parts=["information"])["information"].bound
+    assert np.all(both.sel(parameter=["r", "q", "x_c"]) <= bounds.sel(parameter=["r", "q", "x_c"]) + 1e-12)
