@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import tactile_bayes as tb
 from helpers.refusals import refused
@@ -62,3 +63,17 @@ def test_sensitivity_tells_what_a_band_would_be(drive):
     assert np.all(np.isfinite(bounds.sel(parameter=["r", "q", "x_c"])))
     both = tb.sensitivity(CIRCLE, seed=1, drive=[*drive, SHIFTS[1]], parts=["information"])["information"].bound
     assert np.all(both.sel(parameter=["r", "q", "x_c"]) <= bounds.sel(parameter=["r", "q", "x_c"]) + 1e-12)
+
+
+def test_drives_are_candidates_of_a_design():
+    """Two translations tell more than one of them, and a pivot among drives is what it is among pivots."""
+    priors = {"r": stats.uniform(0.25, 0.1), "q": stats.uniform(0.75, 0.1), "x_c": stats.norm(0.0, 0.02)}
+    options = {"priors": priors, "draws": 4, "seed": 1, "span": (-0.2, 0.2)}
+    found = tb.design("circle", drives=[SHIFTS[0], SHIFTS, tb.Rotation()], **options)
+    assert found.drive.values[0] == "carried from (0.8, 0) to (-0.8, 0) at 63°"
+    assert found.width[1] < found.width[0]
+    assert np.all(found.reached > 0.0)
+    pivot = tb.design("circle", bases=[(0.0, 0.0)], **options)
+    assert float(pivot.width[0]) == pytest.approx(float(found.width[2]), rel=1e-12)
+    with refused(ParameterError, "drive"):
+        tb.design("circle", drives=["left"], **options)

@@ -20,7 +20,7 @@ from tactile_bayes.planning.design import design
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.knowledge import COARSE, empty_record, known_from_posterior, known_from_prior
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.sweep import scan
+from tactile_bayes.sweep import Rotation, scan
 
 PRIORS = {"a": stats.lognorm(0.3, scale=0.6), "q": stats.uniform(0.4, 0.2), "x_c": stats.norm(0.0, 0.05)}
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -43,7 +43,7 @@ def posterior():
 
 def known():
     cell = usual_load_cell(Rod())
-    empty = empty_record([(0.0, 0.0)], COARSE, None, cell)
+    empty = empty_record([Rotation()], COARSE, None, cell)
     experiment = Experiment(empty, "parabola", cell, PRIORS, friction=0.0, nuisances=())
     return known_from_prior(experiment, draws=3, rng=np.random.default_rng(1))
 
@@ -54,7 +54,7 @@ def test_with_one_truth_it_is_the_information_of_its_record():
     point = np.array([0.5, 0.5, 0.0, 1.0])
     one = replace(told, points=point[None], precision=1e-9 * np.eye(4))
     x = np.linspace(-0.5, 0.5, 11)
-    found = expected_of((Question(one, (Candidate((0.0, 0.0), STEP),), x, 0.95, 0, 1), 0))
+    found = expected_of((Question(one, (Candidate((Rotation(),), STEP),), x, 0.95, 0, 1), 0))
     angles = np.arange(np.radians(-30.0), np.radians(210.0), STEP)
     plan = Plan(Parabola(0.5, q=0.5), load_cell=told.experiment.load_cell, drive_angles=angles, nuisances=[])
     bounds = information(plan)
@@ -75,7 +75,7 @@ def test_a_noisier_load_cell_than_stated_leaves_a_wider_band():
     for scale in (1.0, 2.0):
         points = np.array([[0.5, 0.5, 0.0, scale]])
         one = replace(told, points=points, precision=1e-9 * np.eye(4))
-        question = Question(one, (Candidate((0.0, 0.0), STEP),), np.linspace(-0.5, 0.5, 5), 0.9, 0, 1)
+        question = Question(one, (Candidate((Rotation(),), STEP),), np.linspace(-0.5, 0.5, 5), 0.9, 0, 1)
         widths.append(expected_of((question, 0)))
     assert widths[1].width[0] == pytest.approx(2.0 * widths[0].width[0], rel=1e-6)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -19,6 +19,7 @@ from tactile_bayes.planning.expected_band import band_factor, deviation_of_heigh
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge
 from tactile_bayes.planning.record_information import parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.sweep import Carried, Drive, Rotation
 
 __all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
 
@@ -32,12 +33,39 @@ _WIDENING = 1.2
 
 @dataclass(frozen=True)
 class Candidate:
-    """A pivot and a step of the drive for the next record."""
+    """Drives and a step for the next record."""
 
-    base: Base
-    """The pivot [length]."""
+    drives: tuple[Drive, ...]
     drive_step: float
-    """Step of the drive [rad]."""
+    """Step of rotations [rad]; drives that carry the base have as many samples as a rotation with it."""
+
+    @property
+    def base(self) -> Base:
+        """The pivot, or where the first drive begins [length]."""
+        first = self.drives[0]
+        x, y = first.poses[0, :2].tolist() if isinstance(first, Carried) else first.base
+        return x, y
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """Everything that it consists of, as JSON has it."""
+        if all(isinstance(drive, Rotation) for drive in self.drives):
+            return {"base": self.base, "drive_step": self.drive_step}
+        drives = [drive.poses.tolist() if isinstance(drive, Carried) else drive.base for drive in self.drives]
+        return {"drives": drives, "drive_step": self.drive_step}
+
+    @property
+    def words(self) -> str:
+        """What the drives do, in a few words."""
+        return " and ".join(map(_in_words, self.drives))
+
+
+def _in_words(drive: Drive) -> str:
+    if isinstance(drive, Rotation):
+        return f"turned about ({drive.base[0]:g}, {drive.base[1]:g})"
+    begin, end = drive.poses[0], drive.poses[-1]
+    angles = [f"{np.degrees(angle):.3g}°" for angle in sorted({begin[2], end[2]})]
+    return f"carried from ({begin[0]:g}, {begin[1]:g}) to ({end[0]:g}, {end[1]:g}) at {' to '.join(angles)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,15 +106,19 @@ def expected_of(task: tuple[Question, int]) -> Expected:
     """Return the expected results of one candidate, by its index."""
     question, number = task
     candidate = question.candidates[number]
+    model = question.known.model_from(candidate.drives, candidate.drive_step)
+    question = replace(question, known=question.known.of(model))
     known = question.known
-    model = known.model_from([candidate.base], candidate.drive_step)
     wide = band_factor(question.probability)
     usable = model.likelihood.usable(model.contours(known.points), model.rig(known.points))
     rows: dict[str, list[float]] = {
         name: [] for name in ("width", "information", "nested_width", "nested_information", "draws")
     }
     prior_logdet = _logdet(known.precision)
-    rng = np.random.default_rng([question.seed, *np.asarray([*candidate.base, candidate.drive_step]).view(np.uint32)])
+    numbers = np.asarray([*candidate.base, candidate.drive_step])
+    paths = [drive.poses.ravel() for drive in candidate.drives if isinstance(drive, Carried)]
+    numbers = np.concatenate([numbers, *paths])
+    rng = np.random.default_rng([question.seed, *numbers.view(np.uint32)])
     for point, is_usable in zip(known.points, usable, strict=True):
         slopes = height_slopes(model, point, question.x)
         gained = np.zeros_like(known.precision)
@@ -102,7 +134,7 @@ def expected_of(task: tuple[Question, int]) -> Expected:
             found = _nested(question, model, point, precision, rng)
             for name, value in zip(("nested_width", "nested_information", "draws"), found, strict=True):
                 rows[name].append(value)
-    gaps = _gaps(question, candidate, usable)
+    gaps = _gaps(task[0].known, candidate, usable)
     means = {name: _mean(np.array(values)) for name, values in rows.items()}
     return Expected(
         means["width"],
@@ -176,11 +208,10 @@ def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats
     return np.asarray(ends[1] - ends[0])
 
 
-def _gaps(question: Question, candidate: Candidate, usable: Flags) -> Floats:
+def _gaps(known: Knowledge, candidate: Candidate, usable: Flags) -> Floats:
     """Return the width that no sweep touches between the outermost first contacts, for each usable draw."""
-    known = question.known
-    model = known.model_from([*known.bases, candidate.base], COARSE)
-    points = known.points[usable]
+    model = known.model_from([*map(Rotation, known.bases), *candidate.drives], COARSE)
+    points = known.of(model).points[usable]
     if not len(points):
         return np.array([np.nan])
     found = events_of(model.likelihood, model.contours(points), model.rig(points), exact=False)

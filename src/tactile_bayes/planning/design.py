@@ -7,7 +7,6 @@ import json
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from importlib.metadata import version
 from itertools import product
 from typing import Any, Literal
@@ -43,6 +42,7 @@ from tactile_bayes.planning.knowledge import (
     known_from_posterior,
     known_from_prior,
 )
+from tactile_bayes.sweep import Drive, Rotation, drives_of
 from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
 
 __all__ = ["CRITERIA", "design"]
@@ -67,6 +67,7 @@ def design(
     *,
     seed: int,
     bases: Sequence[tuple[float, float]] | None = None,
+    drives: Sequence[Drive | Sequence[Drive]] | None = None,
     drive_steps: Sequence[float] = (float(np.radians(2.0)),),
     criterion: Criterion = "band",
     nested: bool = False,
@@ -98,6 +99,9 @@ def design(
     bases : sequence of (float, float), optional
         Pivots to choose from [length]; by default eleven from half a rod's length to the left of the pivot so far to
         half to the right, at its height and a tenth of the rod's length below and above.
+    drives : sequence of Rotation, Translation, Motion or sequences of them, optional
+        Drives to choose from, beside the pivots that are given; each sequence is one candidate, whose sweeps are one
+        record. Those that carry the base are sampled as often as a rotation from −30° to 210°.
     drive_steps : sequence of float
         Steps of the drive to choose from [rad].
     criterion : {"band", "gap", "information"}
@@ -124,7 +128,8 @@ def design(
     Returns
     -------
     xr.Dataset
-        Over "candidate", with base_x, base_y [length] and drive_step [rad]:
+        Over "candidate", with base_x, base_y (the pivot, or where the first drive begins) [length], drive_step [rad]
+        and drive, in words:
 
         width, width_error
             Expected mean width of the band over the span [length], and its standard error over draws. For objects that
@@ -179,7 +184,7 @@ def design(
     rng = np.random.default_rng([int(seed), 1])
     if isinstance(known, str):
         cell, own = load_cell or usual_load_cell(rod or Rod()), {} if priors is None else priors
-        empty = empty_record([(0.0, 0.0)], COARSE, rod, cell)
+        empty = empty_record([Rotation()], COARSE, rod, cell)
         experiment = Experiment(empty, known, cell, own, rod, friction, nuisances)
         knowledge = known_from_prior(experiment, draws=int(draws), rng=rng)
     else:
@@ -191,7 +196,10 @@ def design(
     correction = "give positive angles in radians, at most 0.5"
     several = drive_steps if np.iterable(drive_steps) else [drive_steps]
     steps = check_numbers("drive_steps", several, correction, shape=(None,), least=TINY, most=0.5)
-    candidates = tuple(Candidate(base, float(step)) for base, step in product(_bases(bases, knowledge), steps))
+    pivots = [] if bases is None and drives is not None else _bases(bases, knowledge)
+    choices: list[tuple[Drive, ...]] = [(Rotation(base),) for base in pivots]
+    choices += [tuple(drives_of(drive, (0.0, 0.0))) for drive in drives or ()]
+    candidates = tuple(Candidate(choice, float(step)) for choice, step in product(choices, steps))
     x = np.linspace(*_span(span, knowledge), _GRID_POINTS)
     question = Question(knowledge, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
     folder = None if out is None else check_path("out", out).resolve()
@@ -254,6 +262,7 @@ def _labelled(question: Question, expected: Sequence[Expected], criterion: Crite
     variables: dict[str, Any] = {
         "base_x": ("candidate", np.array([candidate.base[0] for candidate in candidates]), metres),
         "base_y": ("candidate", np.array([candidate.base[1] for candidate in candidates]), metres),
+        "drive": ("candidate", np.array([candidate.words for candidate in candidates])),
         "drive_step": ("candidate", np.array([candidate.drive_step for candidate in candidates]), {"units": "rad"}),
         "reached": ("candidate", np.array([row.reached for row in expected])),
         "nested_draws": ("candidate", np.array([row.nested_draws for row in expected])),
@@ -293,7 +302,7 @@ def _identity(question: Question) -> dict[str, str]:
     return known.experiment.assumptions | {
         "what is known": hashlib.sha256(known.points.tobytes()).hexdigest(),
         "bases": json.dumps(known.bases),
-        "candidates": json.dumps([asdict(candidate) for candidate in question.candidates]),
+        "candidates": json.dumps([candidate.described for candidate in question.candidates]),
         "span": json.dumps([float(question.x[0]), float(question.x[-1])]),
         "probability": repr(question.probability),
         "nested": repr(question.nested),

@@ -16,11 +16,12 @@ from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.record import rod_of
-from tactile_bayes.sweep import Rotation, record_template
+from tactile_bayes.record import carried_sweeps, rod_of
+from tactile_bayes.sweep import Drive, Rotation, record_template
 
 __all__ = ["COARSE", "Base", "Knowledge", "empty_record", "known_from_posterior", "known_from_prior"]
 
@@ -56,23 +57,35 @@ class Knowledge:
         """The rod of the experiment."""
         return rod_of(self.experiment.record)
 
-    def model_from(self, bases: Sequence[Base], drive_step: float) -> ContourModel:
-        """Return the model of an empty record from these pivots."""
+    def model_from(self, drives: Sequence[Drive], drive_step: float) -> ContourModel:
+        """Return the model of an empty record by these drives."""
         cell = self.experiment.noise.cell
-        return self.model(empty_record(bases, drive_step, self.experiment.rod, cell))
+        return self.model(empty_record(drives, drive_step, self.experiment.rod, cell))
 
     def model(self, record: xr.Dataset) -> ContourModel:
-        """Return the model of a record, empty or measured."""
-        return replace(self.experiment, record=record).model
+        """Return the model of a record, empty or measured, without what it does not tell at all."""
+        nuisances = self.experiment.nuisances
+        if nuisances != STANDARD and len(carried_sweeps(record)) == len(np.unique(record.sweep.values)):
+            nuisances = tuple(name for name in nuisances if name != "backlash")
+        return replace(self.experiment, record=record, nuisances=nuisances).model
+
+    def of(self, model: ContourModel) -> Knowledge:
+        """Return what is known of the parameters of a model, some or all of them."""
+        names = self.experiment.model.names
+        if names == model.names:
+            return self
+        own = np.array([names.index(name) for name in model.names])
+        covariance = np.linalg.inv(self.precision)[np.ix_(own, own)]
+        return replace(self, points=self.points[:, own], precision=np.linalg.inv(covariance))
 
 
-def empty_record(bases: Sequence[Base], drive_step: float, rod: Rod | None, load_cell: LoadCell) -> xr.Dataset:
-    """Return an empty record from these pivots, each swept forward and backward.
+def empty_record(drives: Sequence[Drive], drive_step: float, rod: Rod | None, load_cell: LoadCell) -> xr.Dataset:
+    """Return an empty record by these drives, rotations forward and backward.
 
-    Sweeps go from before any first contact to after any snap-off, where the object lies above the pivot.
+    Rotations go from before any first contact to after any snap-off, where the object lies above the pivot.
     """
     angles = np.arange(np.radians(-30.0), np.radians(210.0) + 1e-9, drive_step)
-    return record_template([Rotation(base) for base in bases], ("forward", "backward"), angles, rod, load_cell)
+    return record_template(drives, ("forward", "backward"), angles, rod, load_cell)
 
 
 def known_from_prior(experiment: Experiment, *, draws: int, rng: np.random.Generator) -> Knowledge:
@@ -132,7 +145,7 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
         columns["noise_scale"] = np.ones(samples[next(iter(unknown))].size)
     nuisances = [name for name in json.loads(attrs.get("nuisances", "[]")) if not name.startswith("base_")]
     bases = tuple((float(x), float(y)) for x, y in pairs)
-    empty, friction = empty_record(bases, COARSE, rod, cell), float(attrs["friction"])
+    empty, friction = empty_record([Rotation(base) for base in bases], COARSE, rod, cell), float(attrs["friction"])
     experiment = Experiment(empty, attrs["family"], cell, rod=rod, friction=friction, nuisances=nuisances)
     every = np.stack([columns[name] for name in experiment.model.names], axis=1)
     if unknown:  # a constant scale would make the covariance singular
