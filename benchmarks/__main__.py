@@ -232,7 +232,7 @@ CARRIED = {
 
 
 def other_rods() -> str:
-    """Time log-likelihoods of other rods and drives than a straight one that is turned; the compilation is not timed."""
+    """Time log-likelihoods of other rods than a straight one that is turned, and of other drives, once compiled."""
     rng, walkers = np.random.default_rng(1), contours(64)
     sampled = Rig(taper=rng.normal(0.0, 0.05, 64), friction=abs(rng.normal(0.0, 0.2, 64)))
     rods = {
