@@ -219,8 +219,20 @@ def sweeps(by_hand: float) -> list[Row]:
     return [Row(f"{what}: solve_ivp and root / ours", n * by_hand, best_time(job) / of) for what, n, job, of in rows]
 
 
+_STEP_OF_TRAVEL = 0.015
+"""Step at which drives that carry the base have as many samples as rotations [L]."""
+
+CARRIED = {
+    "carried along a line": [
+        tb.Translation((0.9, 0.0), np.pi, 1.0, 1.8),
+        tb.Translation((-0.9, 0.0), 0.0, np.pi - 1.0, 1.8),
+    ],
+    "carried and turned": [tb.Motion([0.9, -0.9], 0.0, [0.7, 1.9]), tb.Motion([-0.9, 0.9], 0.0, [2.44, 1.24])],
+}
+
+
 def other_rods() -> str:
-    """Time log-likelihoods of double sweeps of rods that are not straight and uniform; the compilation is not timed."""
+    """Time log-likelihoods of other rods than a straight one that is turned, and of other drives, once compiled."""
     rng, walkers = np.random.default_rng(1), contours(64)
     sampled = Rig(taper=rng.normal(0.0, 0.05, 64), friction=abs(rng.normal(0.0, 0.2, 64)))
     rods = {
@@ -235,6 +247,10 @@ def other_rods() -> str:
         measured = CELL.measure(tb.scan(CONTOUR, drive_angles=ANGLES, rod=rod).record, seed=1)
         likelihood = RecordLikelihood(measured, CELL)
         times[name] = best_time(lambda of=likelihood, rig=rig: of.log_likelihood(walkers, rig=rig), 50) / 64
+    for name, drive in CARRIED.items():
+        measured = CELL.measure(tb.scan(CONTOUR, drive=drive, drive_step=_STEP_OF_TRAVEL).record, seed=1)
+        likelihood = RecordLikelihood(measured, CELL)
+        times[name] = best_time(lambda of=likelihood: of.log_likelihood(walkers), 50) / 64
     straight = times.pop("straight")
     others = ", ".join(f"{name} {taken / straight:.2f}" for name, taken in times.items())
     return f"Log-likelihood of a double sweep, straight rod: {straight * 1e6:.0f} µs; times as long: {others}"

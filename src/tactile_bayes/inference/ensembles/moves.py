@@ -51,7 +51,8 @@ def step_ensembles(
         ]
         densities = np.split(target(np.concatenate([there for there, _ in proposed])), len(points))
         for k, ((there, factors), some, density) in enumerate(zip(proposed, moving, densities, strict=True)):
-            accepted = factors + density - values[k, some] > np.log(randoms[k].rand(len(density)))
+            with np.errstate(invalid="ignore"):  # from an impossible point, where rounding may put one, to another
+                accepted = factors + density - values[k, some] > np.log(randoms[k].rand(len(density)))
             movers = np.flatnonzero(some)[accepted]
             points[k, movers], values[k, movers] = there[accepted], density[accepted]
     return points, values

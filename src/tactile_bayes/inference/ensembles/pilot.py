@@ -108,5 +108,6 @@ def _quality(log_probability: LogProbability, coordinates: Proposing, draws: Flo
     there = target(proposed) - density
     chosen = coordinates.of(draws[rng.permutation(len(draws))[:_QUALITY_DRAWS]])
     here = target(chosen) - proposal.log_density(chosen)
+    here = here[np.isfinite(here)]  # rounding in the coordinates may put a draw beyond the edge of the possible
     accepted = np.exp(np.minimum(0.0, there - here[:, None])).mean(axis=1)
     return float(1.0 / np.mean(1.0 / np.maximum(accepted, _MIN_ACCEPTANCE)))
