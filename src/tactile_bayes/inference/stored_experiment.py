@@ -17,7 +17,7 @@ from tactile_bayes.inference.experiment import Experiment, prior_in_words
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import contour_draws, record_of
 
-__all__ = ["experiment_of", "points_of"]
+__all__ = ["experiment_of", "points_of", "predicted_points"]
 
 _WORDS = re.compile(r"(\w+)\((.*)\)")
 
@@ -82,6 +82,13 @@ def points_of(posterior: xr.DataTree, names: tuple[str, ...]) -> Floats:
     """Return all draws of a posterior as points of its model, shape (chain, draw, parameter)."""
     draws = contour_draws(posterior)
     return np.stack([draws[name].transpose("chain", "draw").values for name in names], axis=-1)
+
+
+def predicted_points(posterior: xr.DataTree, names: tuple[str, ...]) -> Floats:
+    """Return the draws of a posterior of which it holds predicted records, in their order; shape (records, d)."""
+    predicted = posterior["posterior_predictive"].to_dataset()
+    draws = contour_draws(posterior).sel(chain=predicted["chain"], draw=predicted["draw"])
+    return np.stack([draws[name].transpose("chain", "draw").values.ravel() for name in names], axis=-1)
 
 
 def _distribution(name: str, words: str) -> Prior:
