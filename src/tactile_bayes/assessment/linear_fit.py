@@ -135,7 +135,8 @@ class Linearisation:
             for name, known in zip(names, precision, strict=True)
         ]
         self._mean, self._prior = np.array(means), precision * self._scales**2
-        self._ends = model.ends
+        margin, ends = _DIFFERENCE * self._scales, model.ends
+        self._low, self._high = ends.low[: self._count] + margin, ends.high[: self._count] - margin
         self._shared: Whitening | None = None
 
     def fits(self, readings: Floats, starts: Floats) -> list[LinearFit | None]:
@@ -162,8 +163,8 @@ class Linearisation:
             moved = points.copy()
             for halving in range(_HALVINGS):
                 further = points.copy()
-                further[:, : self._count] += 0.5**halving * steps * self._scales
-                further = np.clip(further, self._ends.low, self._ends.high)
+                step = 0.5**halving * steps * self._scales
+                further[:, : self._count] = np.clip(further[:, : self._count] + step, self._low, self._high)
                 tried = np.flatnonzero(open_)
                 if not tried.size:
                     break
@@ -187,11 +188,7 @@ class Linearisation:
         count, encoder = self._count, self.model.likelihood.load_cell.drive_angle_deviation > 0.0
         moves = _DIFFERENCE * np.vstack([np.zeros(count), np.diag(self._scales), -np.diag(self._scales)])
         many = np.repeat(points[:, None], len(moves) + 2 * encoder, axis=1)
-        inside = np.clip(
-            points[:, :count],
-            self._ends.low[:count] + _DIFFERENCE * self._scales,
-            self._ends.high[:count] - _DIFFERENCE * self._scales,
-        )
+        inside = np.clip(points[:, :count], self._low, self._high)
         many[:, 1 : len(moves), :count] = inside[:, None] + moves[1:]
         turns = np.zeros(many.shape[:2])
         if encoder:

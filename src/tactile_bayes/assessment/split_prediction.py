@@ -22,7 +22,7 @@ __all__ = ["FALSE_ALARM", "parts_of", "split_prediction"]
 FALSE_ALARM = 0.01
 """Probability of an alarm if the model holds."""
 
-_RECORDS = 299
+_RECORDS = 199
 """Number of predicted records with which the real one is compared."""
 
 _FEWEST_RECORDS = 99
