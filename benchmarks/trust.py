@@ -37,9 +37,7 @@ Row = Mapping[str, Any]
 
 
 def main(records: int = 10, *names: str) -> None:
-    print(
-        f"{records} records of each rig; bands of {PROBABILITY:.0%}; trust says: holds, the prior sets the gap, do not\n"
-    )
+    print(f"{records} records of each rig; bands of {PROBABILITY:.0%}; shares of conclusions, and of alarms\n")
     heads = ("in the gap", "beside it", "whole", "holds", "prior", "do not", "by parts", "by check", "lost")
     print(f"{'':<46}" + "".join(f"{head:>11}" for head in heads), flush=True)
     every: list[Row] = []
@@ -75,7 +73,7 @@ def one(task: tuple[tuple[str, str], int]) -> Row:
     options = {"load_cell": CELL, "settings": SETTINGS, **run.asked}
     try:
         replicate = partial(calibration_replicate, seed=2031, world=world, probability=PROBABILITY, **options)(number)
-        found = trust(replicate.posterior, replicates=0, priors=run.asked.get("priors"))
+        found = trust(replicate.posterior, replicates=0, assumptions=False, priors=run.asked.get("priors"))
     except TactileBayesError as error:
         return {"conclusion": LOST, "summary": str(error)}
     numbers = replicate.outcome.numbers

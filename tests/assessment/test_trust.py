@@ -14,7 +14,7 @@ from tactile_bayes.inference.result import write_result
 
 @cache
 def right():
-    return trust(posterior(), replicates=0)
+    return trust(posterior(), replicates=0, assumptions=False)
 
 
 def test_a_record_of_the_model_holds_and_says_so():
@@ -32,7 +32,7 @@ def test_a_record_of_the_model_holds_and_says_so():
 
 def test_a_wrong_family_is_not_to_be_relied_on():
     record = CELL.measure(swept(tb.contours.paper_profile("IV", q=0.5)), seed=2)
-    found = trust(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND), replicates=0)
+    found = trust(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND), replicates=0, assumptions=False)
     assert found.attrs["conclusion"] == "do not rely on it"
     assert found.attrs["summary"].startswith("Do not rely on the band, because ")
     assert "the parts of the record contradict one another" in found.attrs["summary"]
@@ -42,7 +42,7 @@ def test_a_narrow_prior_of_the_vertex_sets_the_gap():
     deviation = float(posterior()["posterior"]["q"].std())
     priors = {"q": stats.norm(0.5, 0.2 * deviation)}
     tree = infer_as_stated(measured(), load_cell=CELL, priors=priors, seed=1, settings=SOUND)
-    found = trust(tree, replicates=0, priors=priors)
+    found = trust(tree, replicates=0, assumptions=False, priors=priors)
     assert found.attrs["conclusion"] == "holds, but the prior sets the gap"
     assert "The band in the gap is set by the prior, that of the contour." in found.attrs["words"]
     *_, said, _ = tb.verdicts(tree, trust=found)  # the last one names q, of which the record adds little
@@ -50,7 +50,7 @@ def test_a_narrow_prior_of_the_vertex_sets_the_gap():
 
 
 def test_replicates_give_ranks_coverage_and_factors():
-    found = trust(posterior(), replicates=2, workers=1)
+    found = trust(posterior(), replicates=2, assumptions=False, workers=1)
     assert found.attrs["calibration"] == "too few"
     assert {"rank_p_value", "coverage", "factor", "corrected"} <= set(found.data_vars)
     assert "corrected_lower" not in found
@@ -85,7 +85,7 @@ def test_a_band_is_corrected_about_its_median_where_it_is_too_narrow():
 
 def test_a_run_and_its_file_are_taken_and_other_things_refused(tmp_path):
     write_result(posterior(), tmp_path / "posterior.nc")
-    assert trust(tmp_path, replicates=0).equals(right())
+    assert trust(tmp_path, replicates=0, assumptions=False).equals(right())
     with pytest.raises(InferenceError, match="there is no file"):
         trust(str(tmp_path / "nothing"))
     with pytest.raises(ParameterError, match="this is int"):

@@ -24,7 +24,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def written(folder):
-    return call(folder, "--replicates", 1, "--workers", 1, "--json")
+    return call(folder, "--replicates", 1, "--no-assumptions", "--workers", 1, "--json")
 
 
 def test_it_prints_one_object_and_writes_into_the_run(folder, written):

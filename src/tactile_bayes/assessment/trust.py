@@ -12,12 +12,13 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.assessment.assumptions import alternatives_of, band_by_assumption
 from tactile_bayes.assessment.posterior_calibration import posterior_calibration
 from tactile_bayes.assessment.prior_sensitivity import prior_sensitivity
 from tactile_bayes.assessment.sampling_error import sampling_error
 from tactile_bayes.assessment.split_prediction import split_prediction
 from tactile_bayes.assessment.wording import conclusion, sentences
-from tactile_bayes.checks import check_function, check_probability, check_seed, check_whole_number
+from tactile_bayes.checks import check_function, check_probability, check_seed, check_switch, check_whole_number
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.priors import Prior
@@ -35,6 +36,11 @@ _USUAL = 0.95
 _GRID_POINTS = 9
 """Number of grid points of each region, the gap and both sides of it, at which the effect of the prior is computed."""
 
+_EVERY = 5
+"""Every so many grid points of the band, those of other assumptions are computed."""
+
+_ENDS = ("left", "right")
+
 _OF_CALIBRATION = ("rank_p_value", "coverage", "coverage_error", "coverage_replicates", "noticed_below")
 
 
@@ -42,6 +48,7 @@ def trust(
     run_or_posterior: str | os.PathLike[str] | xr.DataTree,
     *,
     replicates: int = 100,
+    assumptions: bool = True,
     probability: float | None = None,
     priors: Mapping[str, Prior] | None = None,
     seed: int = 1,
@@ -52,12 +59,14 @@ def trust(
 ) -> xr.Dataset:
     """Judge whether the band of a posterior holds for this record, and what it rests on.
 
-    Four questions are answered. *Do parts of the record agree?* Each sweep, each pivot, and the earlier and later half
+    Five questions are answered. *Do parts of the record agree?* Each sweep, each pivot, and the earlier and later half
     of the contacts alone predict the rest (`parts`): this sees what the model lacks, such as friction, a zero that
     moves, a slipped pivot, a wrong family. *Does the computation hold here?* Truths are drawn from this posterior,
     records predicted from them, and both inferred again (posterior simulation-based calibration): this sees a wrong
     sampler, and says how often the intervals hold for objects and rigs like this one. *What does the prior do?* Prior
-    and likelihood are raised to a power near one. *How exact is the sampling?* The Monte-Carlo error of the band.
+    and likelihood are raised to a power near one. *Which assumption matters?* The band is computed again with each
+    nuisance parameter added or fixed, and with each other family. *How exact is the sampling?* The Monte-Carlo error of
+    the band.
 
     Parameters
     ----------
@@ -66,6 +75,8 @@ def trust(
     replicates : int
         Number of truths that are drawn and inferred again, 0 for none; each takes one or two seconds on one core, and
         some tens with a shape-free family.
+    assumptions : bool
+        Whether the band is computed again under other assumptions, which takes some ten seconds each.
     probability : float, optional
         Probability of the band, in (0, 1); by default that of the run, or 0.95.
     priors : mapping of str to frozen scipy.stats distribution, optional
@@ -73,7 +84,7 @@ def trust(
     seed : int
         Seed of all random numbers; the results do not depend on the number of workers.
     out : path-like, optional
-        Folder of the replicates: a run that was killed resumes.
+        Folder of the replicates and alternatives: a run that was killed resumes.
     workers, scheduler, progress
         As in `calibrate`.
 
@@ -90,6 +101,10 @@ def trust(
 
         Over "ranked" and "claim", if there are replicates: rank_p_value (ranked), coverage, coverage_error,
         coverage_replicates, noticed_below (claim), factor and corrected (region): see `posterior_calibration`.
+
+        Over "assumption", if asked for: kind, fits, converged, message; moved_in_gap and moved_beside, the largest
+        distance of the medians over the width of the band there; over "grid" too: other_lower, other_median,
+        other_upper, moved, see `band_by_assumption`.
 
         check_p_value of `check_record`. Attributes: conclusion, "holds", "holds, but the prior sets the gap" or "do not
         rely on it"; summary, a sentence with the reasons; words, all sentences, one in a line; probability;
@@ -122,11 +137,12 @@ def trust(
     >>> for friction in (0.0, 0.3):
     ...     sweep = scan(paper_profile("II", q=0.5), drive_step=0.05, friction=friction).record
     ...     posterior = infer_contour(cell.measure(sweep, seed=1), nuisances=[], seed=1, settings=slippery)
-    ...     print(trust(posterior, replicates=0).attrs["conclusion"])
+    ...     print(trust(posterior, replicates=0, assumptions=False).attrs["conclusion"])
     holds
     do not rely on it
     """
     check_whole_number("replicates", replicates, 0)
+    check_switch("assumptions", assumptions)
     seed = check_seed(seed)
     check_function("progress", progress)
     posterior = _posterior_of(run_or_posterior)
@@ -146,7 +162,14 @@ def trust(
         found = found.merge(parts.rename(p_value="part_p_value", sd="part_sd", overall_p_value="split_p_value"))
         regions = _regions(posterior, x, chance)
         found = found.merge(prior_sensitivity(posterior, experiment.model, regions))
+    others = len(alternatives_of(experiment)) if assumptions else 0
     calibrated: xr.Dataset | None = None
+
+    def report(before: int) -> Callable[[TaskProgress], object] | None:
+        if progress is None:
+            return None
+        return lambda now: progress(now._replace(done=before + now.done, wanted=replicates + others))
+
     if replicates:
         calibrated = posterior_calibration(
             posterior,
@@ -157,11 +180,24 @@ def trust(
             out=out,
             workers=workers,
             scheduler=scheduler,
-            progress=progress,
+            progress=report(0),
         )
         of_claims = calibrated[list(_OF_CALIBRATION)].rename(quantity="ranked")
         found = found.merge(of_claims).merge(calibrated[["factor", "corrected"]])
         found = found.assign(_corrected(found, regions.get("in_gap", np.empty(0))))
+    if assumptions:
+        other = band_by_assumption(
+            posterior,
+            experiment,
+            x[::_EVERY],
+            chance,
+            seed=seed,
+            out=out,
+            workers=workers,
+            scheduler=scheduler,
+            progress=report(replicates),
+        )
+        found = found.merge(other).assign(_moved(other, regions))
     attrs = posterior.attrs
     concluded, summary = conclusion(found, check, parts, calibrated, attrs)
     found.attrs = {
@@ -204,7 +240,18 @@ def _regions(posterior: xr.DataTree, x: Floats, probability: float) -> dict[str,
     return {"in_gap": np.linspace(left, right, _GRID_POINTS + 2)[1:-1], "beside": np.concatenate(flanks)}
 
 
-_ENDS = ("left", "right")
+def _moved(other: xr.Dataset, regions: Mapping[str, Floats]) -> dict[str, xr.DataArray]:
+    """Return the largest distance of the medians in each region, over the width of the band."""
+    x = other["grid_x"].values
+    inside = np.zeros(x.size, dtype=bool)
+    if "in_gap" in regions:
+        inside = (x > regions["in_gap"][0]) & (x < regions["in_gap"][-1])
+    sizes = np.abs(other["moved"].transpose("assumption", "grid").values)
+    found = {}
+    for region, some in (("in_gap", inside), ("beside", ~inside)):
+        known = np.where(some & np.isfinite(sizes), sizes, -1.0).max(axis=1)
+        found[f"moved_{region}"] = xr.DataArray(np.where(known < 0.0, np.nan, known), dims="assumption")
+    return found
 
 
 def _corrected(found: xr.Dataset, in_gap: Floats) -> dict[str, xr.DataArray]:

@@ -84,8 +84,8 @@ def _worst_part(parts: xr.Dataset) -> str:
 
 
 def sentences(found: xr.Dataset, parts: xr.Dataset, calibrated: xr.Dataset | None) -> list[str]:
-    """Return sentences on parts, prior, calibration and sampling."""
-    said = [_of_parts(parts), *_of_prior(found)]
+    """Return sentences on parts, prior, assumptions, calibration and sampling."""
+    said = [_of_parts(parts), *_of_prior(found), *_of_assumptions(found)]
     if calibrated is not None:
         said.append(f"For objects and rigs like this one: {_lower(str(calibrated.attrs['verdict']))}")
         for region, name in (("in_gap", "in the gap"), ("beside", "beside the gap")):
@@ -130,6 +130,23 @@ def _of_prior(found: xr.Dataset) -> list[str]:
     ]
     if by_prior:
         said.append(f"Set by the prior: {', '.join(by_prior)}.")
+    return said
+
+
+def _of_assumptions(found: xr.Dataset) -> list[str]:
+    if "assumption" not in found.dims:
+        return []
+    left = found.isel(assumption=np.flatnonzero(found["fits"].values))
+    count = found.sizes["assumption"]
+    if not left.sizes["assumption"]:
+        return [f"The record rejects all of the {count} other assumptions that were tried."]
+    said = [f"Of {count} other assumptions, the record does not reject {left.sizes['assumption']}."]
+    for region, where in (("in_gap", "in the gap"), ("beside", "beside it")):
+        moved = left[f"moved_{region}"].values
+        if np.isfinite(moved).any():
+            k = int(np.nanargmax(moved))
+            name = str(left["assumption"].values[k])
+            said.append(f"Most of all, “{name}” moves the median of the band {where}: by {moved[k]:.2f} of its width.")
     return said
 
 

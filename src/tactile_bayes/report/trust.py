@@ -58,6 +58,17 @@ def trust_tables(findings: Findings) -> list[Table]:
         ]
         stated = f"stated with {percent(float(found.attrs['probability']))}"
         tables.append(Table("Records like this one, simulated and inferred", [stated, "holds in", "of"], claims))
+    if "assumption" in found.dims:
+        others = [
+            [
+                str(row["assumption"].values),
+                *(fixed(float(row[f"moved_{region}"]), ".2f") for region in ("in_gap", "beside")),
+                "yes" if int(row["fits"]) else "no",
+            ]
+            for row in (found.isel(assumption=k) for k in range(found.sizes["assumption"]))
+        ]
+        heads = ["assumption instead", "in the gap", "beside it", "fits"]
+        tables.append(Table("Distance that the median of the band moves, over its width", heads, others))
     rows = [
         [str(name), *(fixed(float(value), ".3f") for value in row), str(by)]
         for name, row, by in zip(

@@ -37,7 +37,14 @@ from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
 __all__ = ["ContourRun", "analyse"]
 
-_OF_FORMER = ("report.html", "trust.nc", "trust.txt", "trust/replicates.json")
+_OF_FORMER = (
+    "report.html",
+    "trust.nc",
+    "trust.txt",
+    "assumptions.png",
+    "trust/replicates.json",
+    "trust/alternatives.json",
+)
 """Files that belong to the former posterior of a folder."""
 
 
@@ -126,7 +133,7 @@ def analyse(
     out : path-like
         Folder for posterior.nc, contacts.csv, band.csv, summary.txt (which begins with the verdicts), summary.csv and
         the figures; created if missing. Files of these names in it are replaced, and report.html, trust.nc and the
-        replicates of the latter, which would belong to the former posterior, are removed.
+        replicates behind it, which would belong to the former posterior, are removed.
     load_cell, rod, seed, options
         Options of `infer_contour`.
     probability : float

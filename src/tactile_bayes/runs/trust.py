@@ -8,6 +8,7 @@ from typing import Any
 
 import xarray as xr
 
+from tactile_bayes import plotting
 from tactile_bayes.assessment.trust import trust
 from tactile_bayes.runs.folder import Folder, Run, posterior_in
 
@@ -27,7 +28,8 @@ def trust_into(
     run : path-like
         Folder that `tactile-bayes infer` has written.
     out : path-like, optional
-        Folder for trust.nc, trust.txt and the subfolder trust; by default that of the run, whose report then states it.
+        Folder for trust.nc, trust.txt, assumptions.png (if asked for) and the subfolder trust; by default that of the
+        run, whose report then states it.
     options
         Options of `trust`.
 
@@ -46,4 +48,6 @@ def trust_into(
     found = trust(path, out=folder.path / REPLICATES_FOLDER, **options)
     folder.write_netcdf("trust", "trust.nc", found)
     folder.write_lines("words", "trust.txt", (found.attrs["summary"], "", *found.attrs["words"].splitlines()))
+    if "assumption" in found.dims:
+        folder.draw("figure", "assumptions.png", plotting.assumptions, found)
     return Run(found, folder.files)
