@@ -1,10 +1,16 @@
 """The formulas of a linear fit, against predictions that are computed outright."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
 
-from tactile_bayes.assessment.linear_fit import LinearFit
+from helpers.contour_posteriors import CELL, TRUTH, swept
+from tactile_bayes.assessment.linear_fit import LinearFit, Linearisation
+from tactile_bayes.contours import Parabola
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.load_cell import RandomWalk
 
 SAMPLES, CHANNELS, PARAMETERS = 30, 3, 4
 
@@ -75,3 +81,35 @@ def test_the_ratio_has_an_f_distribution_if_the_model_holds():
         found = fit.disagreement(rest)
         p_values.append(stats.f.sf(found.ratio, found.measured, fit.freedom))
     assert stats.kstest(p_values, "uniform").pvalue > 1e-3
+
+
+SCALES = np.array([0.003, 0.002, 0.003, 0.03])
+
+
+@pytest.mark.parametrize(
+    "errors",
+    [
+        {},
+        {"drive_angle_noise": 0.005},
+        {"drift": RandomWalk(moment=0.01, force=0.02)},
+        {"bias_uncertainty": (0.05, 0.05, 0.05)},
+    ],
+    ids=["white noise", "encoder", "drift", "unknown bias"],
+)
+def test_residuals_of_a_record_of_the_model_have_unit_variance(errors):
+    """Some 600 residuals: their mean square scatters by 6 %, and the best of a record away from its start as well."""
+    cell = replace(CELL, **errors)
+    record = cell.measure(swept(Parabola(**TRUTH)), seed=11)
+    model = Experiment(record, load_cell=cell, nuisances=[]).model
+    starts = np.array([[*TRUTH.values(), 1.0], [0.51, 0.495, 0.004, 1.0]])
+    at, away = Linearisation(model, SCALES).fits(np.stack([model.likelihood.measured] * 2), starts)
+    assert at.scatter == pytest.approx(1.0, abs=0.25)
+    assert away.scatter == pytest.approx(at.scatter, rel=0.03)
+    assert at.freedom == pytest.approx(at.residuals.size - 3, abs=0.1)
+
+
+def test_out_of_reach_there_is_no_fit():
+    record = CELL.measure(swept(Parabola(**TRUTH)), seed=11)
+    model = Experiment(record, load_cell=CELL, nuisances=[]).model
+    starts = np.array([[0.5, 3.0, 0.0, 1.0]])
+    assert Linearisation(model, SCALES).fits(model.likelihood.measured[None], starts) == [None]

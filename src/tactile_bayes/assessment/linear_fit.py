@@ -109,8 +109,6 @@ class _Around(NamedTuple):
     fit: LinearFit
     change: Floats
     """Step to the optimum to first order, in scaled parameters."""
-    cost: float
-    """Least-squares cost at the point."""
 
 
 class Linearisation:
@@ -158,7 +156,7 @@ class Linearisation:
         for _ in range(_STEPS):
             around = self._around(readings, points)
             steps = np.array([np.zeros(self._count) if each is None else each.change for each in around])
-            costs = np.array([np.inf if each is None else each.cost for each in around])
+            costs = self._costs(readings, points)
             open_ = np.isfinite(costs)
             moved = points.copy()
             for halving in range(_HALVINGS):
@@ -175,12 +173,13 @@ class Linearisation:
         return [None if each is None else each.fit for each in self._around(readings, points)]
 
     def _costs(self, readings: Floats, points: Floats) -> Floats:
-        """Return the least-squares costs of points, shape (records,); infinite out of reach."""
+        """Return the least-squares costs of points, shape (records,), by the load cell alone; infinite out of reach."""
         here, usable = self._readings(points)
         costs = np.full(len(points), np.inf)
         for k in np.flatnonzero(usable):
             residuals = self._whitening(points[k], here[k], None)[0](self._off(readings[k], here[k]))
-            costs[k] = self._cost(np.clip(residuals, -_CLIPPED, _CLIPPED), points[k])
+            pull = (self._mean - points[k, : self._count]) / self._scales
+            costs[k] = np.sum(np.clip(residuals, -_CLIPPED, _CLIPPED) ** 2) + np.sum(self._prior * pull**2)
         return costs
 
     def _around(self, readings: Floats, points: Floats) -> list[_Around | None]:
@@ -216,11 +215,7 @@ class Linearisation:
         unit = np.broadcast_to(noise * np.eye(noise.size), (*here.shape, noise.size))
         zeros = white(unit)[..., self.model.present]
         fit = LinearFit(by_parameters, left, covariance, np.diag(self._prior), zeros)
-        return _Around(fit, change, self._cost(residuals, point))
-
-    def _cost(self, residuals: Floats, point: Floats) -> float:
-        pull = (self._mean - point[: self._count]) / self._scales
-        return float(np.sum(residuals**2) + np.sum(self._prior * pull**2))
+        return _Around(fit, change)
 
     def _off(self, readings: Floats, expected: Floats) -> Floats:
         return np.nan_to_num(readings - expected)[..., None]
