@@ -36,7 +36,7 @@ CHOSEN = [(name, other) for name, runs in CASES.items() for other, run in runs.i
 Row = Mapping[str, Any]
 
 
-def main(records: int = 10, *names: str) -> None:
+def main(records: int = 6, *names: str) -> None:
     print(f"{records} records of each rig; bands of {PROBABILITY:.0%}; shares of conclusions, and of alarms\n")
     heads = ("in the gap", "beside it", "whole", "holds", "prior", "do not", "by parts", "by check", "lost")
     print(f"{'':<46}" + "".join(f"{head:>11}" for head in heads), flush=True)
@@ -110,4 +110,4 @@ RECORDS = Kind("records", StudyError, dict, lambda row: {name: v for name, v in 
 
 if __name__ == "__main__":
     counts, chosen = [a for a in sys.argv[1:] if a.isdigit()], [a for a in sys.argv[1:] if not a.isdigit()]
-    main(*map(int, counts or ["10"]), *chosen)
+    main(*map(int, counts or ["6"]), *chosen)

@@ -9,6 +9,7 @@ from scipy import stats
 from helpers.contour_posteriors import CELL, TRUTH, swept
 from tactile_bayes.assessment.linear_fit import LinearFit, Linearisation
 from tactile_bayes.contours import Parabola
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.load_cell import RandomWalk
 
@@ -106,6 +107,14 @@ def test_residuals_of_a_record_of_the_model_have_unit_variance(errors):
     assert at.scatter == pytest.approx(1.0, abs=0.25)
     assert away.scatter == pytest.approx(at.scatter, rel=0.03)
     assert at.freedom == pytest.approx(at.residuals.size - 3, abs=0.1)
+
+
+def test_too_many_readings_that_share_errors_are_refused():
+    cell = replace(CELL, drift=RandomWalk(moment=0.01, force=0.02))
+    record = cell.measure(swept(Parabola(**TRUTH), step=np.radians(0.07)), seed=11)
+    model = Experiment(record, load_cell=cell, nuisances=[]).model
+    with pytest.raises(InferenceError, match="2000 are possible"):
+        Linearisation(model, SCALES)
 
 
 def test_out_of_reach_there_is_no_fit():

@@ -7,7 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.planning.error_covariance import Whitening, whitening
 from tactile_bayes.planning.record_information import prior_precision, scaled_cell
@@ -19,6 +21,9 @@ _STEPS = 1
 
 _DIFFERENCE = 0.1
 """Step of differences, in posterior standard deviations."""
+
+_MOST_CORRELATED = 6000
+"""Largest number of readings whose covariance is factorised, in 0.3 GB."""
 
 _TURN = 1e-4
 """Step of differences of the drive angle [rad]."""
@@ -120,6 +125,11 @@ class Linearisation:
         Model of contour and rig.
     scales : ndarray, shape (d,)
         Posterior standard deviations of its parameters.
+
+    Raises
+    ------
+    InferenceError
+        If more than 2000 samples share a drift process, or a bias that is integrated out.
     """
 
     def __init__(self, model: ContourModel, scales: Floats) -> None:
@@ -136,6 +146,12 @@ class Linearisation:
         margin, ends = _DIFFERENCE * self._scales, model.ends
         self._low, self._high = ends.low[: self._count] + margin, ends.high[: self._count] - margin
         self._shared: Whitening | None = None
+        cell, (samples, channels) = model.likelihood.load_cell, model.likelihood.measured.shape
+        if samples * channels > _MOST_CORRELATED and np.any(wandering_deviation(cell, samples)):
+            raise InferenceError(
+                f"readings of {samples} samples that share a drift or an unknown bias are too many to be compared at "
+                f"once, {_MOST_CORRELATED // channels} are possible: infer the bias, or take every so many samples"
+            )
 
     def fits(self, readings: Floats, starts: Floats) -> list[LinearFit | None]:
         """Return the fits of records, each from a start; None where the rod does not reach its contour.

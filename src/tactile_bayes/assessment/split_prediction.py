@@ -66,7 +66,8 @@ def split_prediction(posterior: xr.DataTree, model: ContourModel) -> xr.Dataset:
     Raises
     ------
     InferenceError
-        If the tree has fewer than 99 predicted records.
+        If the tree has fewer than 99 predicted records, or more than 2000 samples share a drift process, or a bias that
+        is integrated out.
 
     Notes
     -----

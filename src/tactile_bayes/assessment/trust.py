@@ -116,7 +116,7 @@ def trust(
         If an argument is impossible.
     InferenceError
         If there is no posterior of a contour with its predictions, or it is one without unloaded samples
-        (``events=False``).
+        (``events=False``), or with more than 2000 samples that share a drift process or a bias that is integrated out.
     CalibrationError
         If `out` holds replicates of another posterior, or another run uses it.
     TaskError
