@@ -19,6 +19,7 @@ from tactile_bayes.assessment.sampling_error import sampling_error
 from tactile_bayes.assessment.split_prediction import split_prediction
 from tactile_bayes.assessment.wording import conclusion, sentences
 from tactile_bayes.checks import check_function, check_probability, check_seed, check_switch, check_whole_number
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.priors import Prior
@@ -203,7 +204,7 @@ def trust(
     found.attrs = {
         "conclusion": concluded,
         "summary": summary,
-        "words": "\n".join(sentences(found, parts, calibrated)),
+        "words": "\n".join(sentences(found, parts, calibrated, mute=family_named(experiment.family).roughness)),
         "probability": chance,
         "seed": seed,
         "replicates": replicates,

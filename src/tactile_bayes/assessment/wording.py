@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -83,9 +83,11 @@ def _worst_part(parts: xr.Dataset) -> str:
     )
 
 
-def sentences(found: xr.Dataset, parts: xr.Dataset, calibrated: xr.Dataset | None) -> list[str]:
-    """Return sentences on parts, prior, assumptions, calibration and sampling."""
-    said = [_of_parts(parts), *_of_prior(found), *_of_assumptions(found)]
+def sentences(
+    found: xr.Dataset, parts: xr.Dataset, calibrated: xr.Dataset | None, mute: Collection[str] = ()
+) -> list[str]:
+    """Return sentences on parts, prior, assumptions, calibration and sampling; `mute` parameters are not named."""
+    said = [_of_parts(parts), *_of_prior(found, mute), *_of_assumptions(found)]
     if calibrated is not None:
         said.append(f"For objects and rigs like this one: {_lower(str(calibrated.attrs['verdict']))}")
         for region, name in (("in_gap", "in the gap"), ("beside", "beside the gap")):
@@ -113,7 +115,7 @@ def _of_parts(parts: xr.Dataset) -> str:
     )
 
 
-def _of_prior(found: xr.Dataset) -> list[str]:
+def _of_prior(found: xr.Dataset, mute: Collection[str]) -> list[str]:
     said = []
     for quantity, name in (("band in_gap", "in the gap"), ("band beside", "beside the gap")):
         if quantity in found.quantity:
@@ -126,7 +128,7 @@ def _of_prior(found: xr.Dataset) -> list[str]:
     by_prior = [
         str(name)
         for name, by in zip(found["quantity"].values, found["set_by"].values, strict=True)
-        if by == "prior" and not str(name).startswith("band ")
+        if by == "prior" and not str(name).startswith("band ") and name not in mute
     ]
     if by_prior:
         said.append(f"Set by the prior: {', '.join(by_prior)}.")
