@@ -13,7 +13,7 @@ export MPLBACKEND ?= Agg
 # Bytecode halves the time that a process takes to start, and tests and notebooks start many.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-lowest test-slow bench coverage calibration shapes recognition misspecification designs efficiency nuisances samplers images docs dist lint clean
+.PHONY: demo test test-lowest test-slow bench coverage calibration shapes recognition misspecification trust designs efficiency nuisances samplers images docs dist lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -51,6 +51,9 @@ recognition: $(READY)
 
 misspecification: $(READY)
 	$(BIN)/python -m benchmarks.misspecification
+
+trust: $(READY)
+	$(BIN)/python -m benchmarks.trust
 
 designs: $(READY)
 	$(BIN)/python -m benchmarks.design

@@ -61,6 +61,7 @@ _HOMES = {
     "scan_many": "sweep",
     "sensitivity": "planning.sensitivity",
     "to_arviz": "inference.result",
+    "trust": "assessment.trust",
     "verdicts": "diagnostics.verdicts",
     "write_record": "record",
     "write_report": "report",
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
     from tactile_bayes import errors as errors
     from tactile_bayes import paper_figures as paper_figures
     from tactile_bayes import plotting as plotting
+    from tactile_bayes.assessment.trust import trust as trust
     from tactile_bayes.calibration.calibrate import calibrate as calibrate
     from tactile_bayes.calibration.calibrate import calibration_replicate as calibration_replicate
     from tactile_bayes.calibration.misspecification import Misspecification as Misspecification

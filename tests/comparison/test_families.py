@@ -9,6 +9,7 @@ from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.contours import Circle, Ellipse, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.uncertainty.band import contour_band
 
 BRIEF = SamplerSettings(ensembles=2, walkers=20, min_ess=100, max_r_hat=1.1, max_steps=40)
 
@@ -37,6 +38,13 @@ def test_the_simpler_of_two_shapes_that_fit_is_more_probable(compared):
     assert abs(float(compared.elpd_difference.min())) < 5.0
     assert compared.weight.sum() == pytest.approx(1.0)
     assert (compared.log_evidence_error < 0.2).all()
+
+
+def test_a_band_can_be_averaged_over_families(compared):
+    band = contour_band(compared, [-0.2, 0.0, 0.2], 0.9)
+    assert band.attrs["averaged_by"] == "evidence"
+    assert (band["lower"] < Circle(0.8, 0.5, 0.0).height(band["x"].values)).all()
+    assert (band["upper"] > Circle(0.8, 0.5, 0.0).height(band["x"].values)).all()
 
 
 def test_wider_priors_are_worse_for_more_parameters(compared):

@@ -19,11 +19,22 @@ from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.found_rig import contact_points
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
 
-__all__ = ["DRAWS", "LOG_LIKELIHOOD", "Outcome", "Replicate", "make_replicate", "replicate"]
+__all__ = [
+    "DRAWS",
+    "LOG_LIKELIHOOD",
+    "Outcome",
+    "Replicate",
+    "compared",
+    "contact_coverage",
+    "grid_points_of",
+    "make_replicate",
+    "replicate",
+]
 
 DRAWS = 99
 """Number of draws among which the truth has a rank, from 0 to this number."""
@@ -136,18 +147,40 @@ def _compared(
     rng: np.random.Generator,
 ) -> Outcome:
     """Compare a posterior with the truth."""
-    tree, draws = result.tree, result.draws
+    likelihood, assumed = experiment.model.likelihood, experiment.assumed
+    read = assumed.record.drive_angle.values, simulation.measured.drive_angle.values
+    known = experiment.load_cell.misread(assumed.record.direction.values)
+    outcome = compared(model, result, simulation, experiment.probability, rng, is_of_family=experiment.is_of_family)
+    numbers = dict(outcome.numbers)
+    if assumed.events:  # without events, inference uses fewer samples
+        true_angles, angles = (each - known for each in read)
+        numbers |= contact_coverage(
+            model, result.draws.samples, simulation, likelihood, true_angles, angles, experiment.probability, rng
+        )
+    numbers |= _checks(result.tree, simulation, experiment)
+    return outcome._replace(numbers=numbers)
+
+
+def compared(
+    model: ContourModel,
+    result: Sampled,
+    simulation: Simulation,
+    probability: float,
+    rng: np.random.Generator,
+    *,
+    is_of_family: bool = True,
+) -> Outcome:
+    """Compare a posterior with a truth: ranks, bands in the gap and beside it, angles of snap-off."""
+    draws = result.draws
     numbers = {
         "converged": float(draws.converged),
         "effective_draws": float(np.min([draws.ess_bulk, draws.ess_tail])),
         "evaluations": float(draws.evaluations),
     }
-    ranks = _ranks(model, draws.samples, simulation.truth, experiment.is_of_family, rng)
-    ranks |= _ranks_of_events(tree, simulation, rng)
-    numbers |= _bands(tree, simulation, experiment.probability)
-    numbers |= _snap_offs(tree, simulation, experiment.probability)
-    numbers |= _contacts(model, draws.samples, simulation, experiment, rng)
-    numbers |= _checks(tree, simulation, experiment)
+    ranks = _ranks(model, draws.samples, simulation.truth, is_of_family, rng)
+    ranks |= _ranks_of_events(result.tree, simulation, rng)
+    numbers |= _bands(result.tree, simulation, probability)
+    numbers |= _snap_offs(result.tree, simulation, probability)
     return Outcome(ranks, numbers, draws.message)
 
 
@@ -166,9 +199,7 @@ def _ranks(
     if not is_of_family:
         return ranks
     point = np.array([truth[name] for name in model.names])
-    every = np.vstack([point, picked])
-    loads, reached = model.loads_with_errors(every)
-    values = model.likelihood.score(loads, reached, model.noise_scale(every))
+    values = model.log_likelihood(np.vstack([point, picked]))
     return ranks | {LOG_LIKELIHOOD: _rank(values[1:], values[0], rng)}
 
 
@@ -214,7 +245,7 @@ def _rank(draws: Floats, truth: float, rng: np.random.Generator) -> int:
 def _bands(tree: xr.DataTree, simulation: Simulation, probability: float) -> dict[str, float]:
     """Compare pointwise and simultaneous bands with the true contour."""
     numbers: dict[str, float] = {}
-    for region, x in _grid_points(simulation).items():
+    for region, x in grid_points_of(simulation).items():
         height = np.asarray(simulation.contour.height(x))
         if not x.size:
             continue
@@ -235,7 +266,7 @@ def _bands(tree: xr.DataTree, simulation: Simulation, probability: float) -> dic
     return numbers
 
 
-def _grid_points(simulation: Simulation) -> dict[str, Floats]:
+def grid_points_of(simulation: Simulation) -> dict[str, Floats]:
     """Return values of x beside the gap, from last to first contact, and in it, between the last contacts.
 
     The gap has none if both directions overlap, or the record has only one.
@@ -259,29 +290,46 @@ def _snap_offs(tree: xr.DataTree, simulation: Simulation, probability: float) ->
     return {"snap_off": float(np.mean((low <= true) & (true <= high)))}
 
 
-def _contacts(
+def contact_coverage(
     model: ContourModel,
     samples: Floats,
     simulation: Simulation,
-    experiment: SimulatedExperiment,
+    likelihood: RecordLikelihood,
+    true_angles: Floats,
+    angles: Floats,
+    probability: float,
     rng: np.random.Generator,
 ) -> dict[str, float]:
-    """Return the share of the chosen contacts that lie in their region."""
-    likelihood = experiment.model.likelihood
-    known = experiment.load_cell.misread(experiment.assumed.record.direction.values)
-    read = experiment.assumed.record.drive_angle.values - known
-    true = contacts_of(likelihood, simulation.contour, simulation.rig, read)
+    """Return the share of the chosen contacts that lie in their region.
+
+    Parameters
+    ----------
+    model : ContourModel
+        Model of the record.
+    samples : ndarray, shape (chain, draw, d)
+        Draws of its posterior.
+    simulation : Simulation
+        The truth.
+    likelihood : RecordLikelihood
+        Likelihood of the true rig, to full accuracy.
+    true_angles, angles : ndarray, shape (samples,)
+        Readings of the drive angle without and with errors of the encoder, corrected by the data sheet [rad].
+    probability : float
+        Probability of the regions.
+    rng : np.random.Generator
+    """
+    true = contacts_of(likelihood, simulation.contour, simulation.rig, true_angles)
     chosen: list[int] = []
     for segment in likelihood.segments:
         in_contact = segment.samples[np.isfinite(true["contact_x"][0, segment.samples])]
         if in_contact.size:
             chosen += [int(in_contact[round(share * (in_contact.size - 1))]) for share in _CONTACTS]
-    if not chosen or not experiment.assumed.events:  # without events, inference uses fewer samples
+    if not chosen:
         return {}
     draws = samples.reshape(-1, samples.shape[-1])
     points = draws[rng.choice(len(draws), min(_CONTACT_DRAWS, len(draws)), replace=False)]
-    asked = np.full(read.size, np.nan)
-    asked[chosen] = (simulation.measured.drive_angle.values - known)[chosen]
+    asked = np.full(angles.size, np.nan)
+    asked[chosen] = angles[chosen]
     found = contacts_of(model.likelihood, model.contours(points), model.rig(points), asked, exact=False)
     dims = ("chain", "draw", "sample")
     columns = {name: (dims, found[name][None][..., chosen]) for name in ("contact_x", "contact_y")}
@@ -289,7 +337,7 @@ def _contacts(
     held = []
     for sample in chosen:
         try:
-            region = contact_region(implied, sample, experiment.probability)
+            region = contact_region(implied, sample, probability)
         except InferenceError:  # too few contours of the posterior are touched there
             held.append(False)
             continue

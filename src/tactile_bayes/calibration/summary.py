@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import xarray as xr
@@ -12,7 +12,6 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.calibration.coverage import coverage_p_value, noticed_coverage
 from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks, uniformity_p_value
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
-from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.verdict import FEWEST, POWER, Tally, conclusion, lost_message, power_message, statement
 
 __all__ = ["CLAIMS", "FALSE_ALARM", "summary"]
@@ -31,6 +30,16 @@ CLAIMS = {
 """Statements that must hold with the stated probability: names and descriptions."""
 
 
+class Described(Protocol):
+    """An experiment that was repeated."""
+
+    @property
+    def identity(self) -> Mapping[str, str]: ...
+
+    @property
+    def probability(self) -> float: ...
+
+
 class _Fault(NamedTuple):
     """A quantity or claim at fault."""
 
@@ -38,7 +47,7 @@ class _Fault(NamedTuple):
     message: str
 
 
-def summary(experiment: SimulatedExperiment, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
+def summary(experiment: Described, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
     """Return the result of a calibration; see `calibrate`."""
     numbers = sorted(outcomes)
     rows = [outcomes[number] for number in numbers]

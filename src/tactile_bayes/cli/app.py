@@ -22,6 +22,7 @@ from tactile_bayes.cli.reconstruction import reconstruct
 from tactile_bayes.cli.report import report
 from tactile_bayes.cli.scanning import scan
 from tactile_bayes.cli.sensitivity import sensitivity
+from tactile_bayes.cli.trust import trust
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -124,6 +125,7 @@ _EXAMPLES: dict[Callable[..., Answer], str] = {
     sensitivity: "sensitivity --profile II --distance 0.5 --out sensitivity/",
     design: "design run/ --base 0.05,0 --base 0.1,0 --out design/",
     figures: "figures --only 3 --distance 0.4 --format pdf --out figures/",
+    trust: "trust run/",
     report: "report run/",
     demo: "demo --out results/demo",
 }

@@ -12,6 +12,7 @@ import xarray as xr
 from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_function, check_mapping, check_names, check_probability, check_switch
 from tactile_bayes.comparison.leave_one_out import difference, stacking_weights
 from tactile_bayes.comparison.left_out import PredictedSamples, predicted_samples
@@ -32,6 +33,7 @@ from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import record_hash, rod_of
 
 __all__ = ["SHAPES", "compare_families"]
@@ -47,6 +49,12 @@ _GIVEN_UP = 100.0
 _HOPELESS = 20.0
 """Distance of the largest log-likelihood of a family without evidence below the best log-evidence from which the
 family's probability is zero."""
+
+
+_KEPT_DRAWS = 2000
+"""Largest number of draws of a contour that are kept of each family."""
+
+_BY_DRAW = ("family", "contour_draw", "contour_parameter")
 
 
 class _Tried(NamedTuple):
@@ -139,6 +147,9 @@ def compare_families(
             sampled, has no probability, and does not fit.
         converged, steps, seconds
             Convergence, number of steps and time [s] of the posterior.
+        contour_draws (family, contour_draw, contour_parameter)
+            Draws of the contour's parameters, in the order of the family's, of which `contour_band` computes a band
+            averaged over families; NaN beyond its number of parameters, and for families that were not sampled.
 
         `log_density` (family, sample) holds the leave-one-out log-densities. Attributes: `verdict`, a sentence;
         `most_probable`; `none_fits` (1 if no family passes the check); `nuisances`, those inferred (JSON); `friction`
@@ -211,7 +222,7 @@ def compare_families(
         tried[name] = _Tried(ceiling, found.draws, evidence, predicted, p_value, passed)
     asked = {name: problem.about[name] for name in ("nuisances", "friction")}
     comparison = _labelled({name: tried[name] for name in names}, asked)
-    return comparison.assign_attrs(data_sha256=record_hash(experiment.record))
+    return comparison.assign_attrs(data_sha256=record_hash(experiment.record), units=experiment.record.attrs["units"])
 
 
 def _ceiling(model: ContourModel, walk: Walk) -> float:
@@ -259,6 +270,7 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
         "steps": ("family", [0 if run is None else run.steps_run for run in runs]),
         "seconds": ("family", [0.0 if run is None else run.seconds for run in runs]),
     }
+    variables["contour_draws"] = (_BY_DRAW, _contour_draws({name: one.draws for name, one in tried.items()}))
     predicted = [one.predicted for one in tried.values()]
     if any(of_family is not None for of_family in predicted):
         variables |= _left_out(predicted)
@@ -269,6 +281,19 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
         "none_fits": int(not result.fits.any()),
     }
     return result
+
+
+def _contour_draws(drawn: Mapping[str, Draws | None]) -> Floats:
+    """Return draws of the contours' parameters, evenly picked, shape (families, draws, parameters)."""
+    sizes = [len(family_named(name).parameters) for name in drawn]
+    kept = [draws.samples.reshape(-1, len(draws.names)) for draws in drawn.values() if draws is not None]
+    count = min([_KEPT_DRAWS, *(len(samples) for samples in kept)])
+    found = np.full((len(sizes), count, max(sizes)), np.nan)
+    for of_family, size, draws in zip(found, sizes, drawn.values(), strict=True):
+        if draws is not None:
+            every = draws.samples.reshape(-1, len(draws.names))
+            of_family[:, :size] = every[evenly_spread(len(every), count), :size]
+    return found
 
 
 def _left_out(predicted: Sequence[PredictedSamples | None]) -> dict[str, Any]:

@@ -24,6 +24,9 @@ from tactile_bayes.record import CHANNELS
 
 __all__ = ["doubtful_sides", "verdicts"]
 
+_HOLDS, _NOT = "holds", "do not rely on it"
+"""Conclusions of `trust`; another one is a reservation."""
+
 _NOISES = ("noise_scale", "moment_noise", "force_noise")
 
 _FACTOR = 2.0
@@ -54,7 +57,9 @@ _CAUSES = {
 }
 
 
-def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tuple[str, ...]:
+def verdicts(
+    posterior: xr.DataTree, contacts: xr.Dataset | None = None, trust: xr.Dataset | None = None
+) -> tuple[str, ...]:
     """Judge a result of `infer_contour`: what is wrong, the most serious first, or that all is well.
 
     Parameters
@@ -63,15 +68,17 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
         From `infer_contour`.
     contacts : xr.Dataset, optional
         From `reconstruct` by method="constrained", whose misfits show whether the loads of a sample agree.
+    trust : xr.Dataset, optional
+        From `tactile_bayes.trust` for this posterior.
 
     Returns
     -------
     tuple of str
         One or more sentences. They report: loads that such a rod cannot have (`check_units_and_signs`); a zero that is
-        off, or that moved; a record unlike the predictions of the posterior (`check_record`); ensembles that have not
-        converged; noise twice as large as stated, or half; loads of a sample that contradict one another; nuisance
-        parameters that are nearly impossible under their prior. The last, which is no fault, names parameters that the
-        record hardly determines.
+        off, or that moved; a record unlike the predictions of the posterior (`check_record`); reasons not to rely on
+        the band (`trust`); ensembles that have not converged; noise twice as large as stated, or half; loads of a
+        sample that contradict one another; nuisance parameters that are nearly impossible under their prior. The last,
+        which are no faults, say that the prior sets the gap, and name parameters that the record hardly determines.
 
     Raises
     ------
@@ -106,6 +113,8 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     ]
     if check is not None and not check.attrs["passed"]:
         against.append(_not_described(posterior, check))
+    if trust is not None and trust.attrs["conclusion"] == _NOT:
+        against.append(str(trust.attrs["summary"]))
     if not posterior.attrs["converged"]:
         against.append(posterior.attrs["message"].replace("not converged", "NOT CONVERGED", 1) + ".")
     noisier = 1.0 if check is None else _neighbours_over_stated(record, check)
@@ -117,7 +126,8 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
         against.append(
             f"All is well: the ensembles agree, and the record agrees with their predictions (p = {p_value:.2g})."
         )
-    return (*against, *_prior_dominated(posterior, known=beyond))
+    doubts = [] if trust is None or trust.attrs["conclusion"] in (_NOT, _HOLDS) else [str(trust.attrs["summary"])]
+    return (*against, *doubts, *_prior_dominated(posterior, known=beyond))
 
 
 def _inferred(posterior: xr.DataTree) -> list[str]:

@@ -175,9 +175,12 @@ class ContourModel:
         values = self.log_prior(points)
         inside = np.flatnonzero(np.isfinite(values))
         for block in blocks(inside.size, self.loads_of_a_point) if inside.size else ():
-            chosen = points[inside[block]]
-            values[inside[block]] += self.likelihood.score(*self.loads_with_errors(chosen), self.noise_scale(chosen))
+            values[inside[block]] += self.log_likelihood(points[inside[block]])
         return values
+
+    def log_likelihood(self, points: Floats) -> Floats:
+        """Return the logarithm of the likelihood, shape (n,), of points within their bounds; −inf out of reach."""
+        return self.likelihood.score(*self.loads_with_errors(points), self.noise_scale(points))
 
     def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:
         """Draw from the prior of contours within reach.

@@ -16,7 +16,14 @@ from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["ReadingSlopes", "RecordInformation", "prior_precision", "reading_slopes", "record_information"]
+__all__ = [
+    "ReadingSlopes",
+    "RecordInformation",
+    "prior_precision",
+    "reading_slopes",
+    "record_information",
+    "scaled_cell",
+]
 
 _STEP = 1e-5
 """Step of finite differences, over the scale of each parameter."""
@@ -118,7 +125,7 @@ def record_information(
         If the rod does not reach the contour in every sweep.
     """
     cell = model.likelihood.load_cell if load_cell is None else load_cell.dimensionless(model.likelihood.rod)
-    cell = _scaled(cell, model.noise_scale(point[None])[0])
+    cell = scaled_cell(cell, model.noise_scale(point[None])[0])
     present = model.present if channels is None else model.present & channels
     loads, by_parameters, by_angle = reading_slopes(model, point) if slopes is None else slopes
     white = whitening(cell, loads, by_angle, present)(by_parameters)
@@ -136,7 +143,7 @@ def record_information(
     return RecordInformation(every, of_noise)
 
 
-def _scaled(cell: LoadCell, factors: Floats) -> LoadCell:
+def scaled_cell(cell: LoadCell, factors: Floats) -> LoadCell:
     """Return the load cell with the white noise of its channels multiplied by factors, shape (3,)."""
     moment, force = float(factors[0]), float(factors[1])
     return replace(

@@ -6,6 +6,7 @@ its settings do not change, and no figure is shown. `style` is a context manager
 or for the screen.
 """
 
+from tactile_bayes.plotting.assumption_dots import assumptions
 from tactile_bayes.plotting.calibration_panels import calibration_ranks, coverage
 from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
 from tactile_bayes.plotting.contour_map import band_detail, contour, gap
@@ -27,6 +28,7 @@ from tactile_bayes.plotting.touch_map import touched
 __all__ = [
     "PALETTE",
     "amplification",
+    "assumptions",
     "band_detail",
     "calibration_ranks",
     "contact_ellipses",

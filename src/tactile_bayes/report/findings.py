@@ -10,6 +10,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from tactile_bayes.assessment.trust import draws_digest
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import DriftWarning, InferenceError
@@ -63,6 +64,8 @@ class Findings:
         Unloaded stretches, from `zero_load`.
     comparison : xr.Dataset or None
         Comparison of families.
+    trust : xr.Dataset or None
+        Result of `tactile-bayes trust`.
     posterior_sha256, record_sha256 : str
         Digests of the file, and of the record in it (`record_hash`).
     probability : float
@@ -80,6 +83,7 @@ class Findings:
     check: xr.Dataset | None
     zero: xr.Dataset
     comparison: xr.Dataset | None
+    trust: xr.Dataset | None
     posterior_sha256: str
     record_sha256: str
     probability: float
@@ -117,6 +121,7 @@ def findings_of(
     posterior = _contour_posterior(path)
     record = record_of(posterior)
     comparison = _comparison_in(run, compare, str(posterior.attrs["data_sha256"]))
+    trust = _trust_in(run, posterior)
     probability = float(posterior.attrs.get("probability", _USUAL))
     progress(1)
     contacts = contact_points(record, None, posterior)
@@ -138,10 +143,11 @@ def findings_of(
         interval=predictive_interval(posterior, probability),
         edges=edges,
         numbers=summary(posterior, probability, edges),
-        verdicts=verdicts(posterior, contacts),
+        verdicts=verdicts(posterior, contacts, trust),
         check=check,
         zero=zero,
         comparison=comparison,
+        trust=trust,
         posterior_sha256=hashlib.sha256(content).hexdigest(),
         record_sha256=record_hash(record),
         probability=probability,
@@ -161,6 +167,17 @@ def _contour_posterior(path: Path) -> xr.DataTree:
             "`tactile-bayes infer`"
         )
     return posterior
+
+
+def _trust_in(run: Path, posterior: xr.DataTree) -> xr.Dataset | None:
+    path = run / "trust.nc"
+    if not path.is_file():
+        return None
+    again = "run `tactile-bayes trust` again, or remove it"
+    found = read_netcdf(path, xr.open_dataset, lambda what: InferenceError(f"{path} {what}: {again}"))
+    if found.attrs.get("draws_sha256") != draws_digest(posterior):
+        raise InferenceError(f"{path} is of another posterior: {again}")
+    return found
 
 
 def _comparison_in(run: Path, compare: Path | None, data_sha256: str) -> xr.Dataset | None:

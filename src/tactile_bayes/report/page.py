@@ -15,7 +15,7 @@ from tactile_bayes.report.frames import motion_of
 from tactile_bayes.report.meanings import FORMULAS, is_direction, meaning_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
-from tactile_bayes.report.trust import check_messages, check_table, contacts_messages, convergence
+from tactile_bayes.report.trust import check_messages, check_table, contacts_messages, convergence, trust_tables
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as, spread
 
 __all__ = ["page_of"]
@@ -51,6 +51,9 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "parameters": _parameters(findings, mute=True),
         "is_well": _is_well(findings),
         "verdicts": findings.verdicts,
+        "trust": [] if findings.trust is None else str(findings.trust.attrs["words"]).splitlines(),
+        "trust_summary": "" if findings.trust is None else str(findings.trust.attrs["summary"]),
+        "trust_tables": trust_tables(findings),
         "convergence": convergence(findings),
         "check_messages": check_messages(findings),
         "check": check_table(findings),

@@ -7,6 +7,7 @@ from collections import Counter
 
 import numpy as np
 
+from tactile_bayes.calibration.summary import CLAIMS
 from tactile_bayes.diagnostics.record_check import DISCREPANCIES
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, present_channels
@@ -14,7 +15,7 @@ from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.readings_figure import channel_names
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as
 
-__all__ = ["check_messages", "check_table", "contacts_messages", "convergence"]
+__all__ = ["check_messages", "check_table", "contacts_messages", "convergence", "trust_tables"]
 
 
 def convergence(findings: Findings) -> list[str]:
@@ -28,6 +29,54 @@ def convergence(findings: Findings) -> list[str]:
         "their proposals."
     )
     return said
+
+
+def trust_tables(findings: Findings) -> list[Table]:
+    """Return the tables of `tactile-bayes trust`: parts, claims, effect of the prior; none if it was not run."""
+    found = findings.trust
+    if found is None:
+        return []
+    parts = []
+    for name in found["part"].values:
+        row = found.sel(part=name)
+        moves = row["moves"].values
+        most = "" if np.isnan(moves).all() else str(found["parameter"].values[np.nanargmax(np.abs(moves))])
+        by = fixed(float(np.nanmax(np.abs(moves))), ".1f") if most else ""
+        parts.append([str(name), chance(float(row["part_p_value"])), fixed(float(row["part_sd"]), ".1f"), by, most])
+    heads = ["this part alone", "p", "off by [sd]", "moves by [sd]", "most"]
+    tables = [Table("What each part of the record says of the rest", heads, parts)]
+    if "claim" in found.dims:
+        claims = [
+            [CLAIMS[str(name)], f"{percent(round(share, 3))} ± {percent(round(error, 3))}", str(int(count))]
+            for name, share, error, count in zip(
+                found["claim"].values,
+                found["coverage"].values,
+                found["coverage_error"].values,
+                found["coverage_replicates"].values,
+                strict=True,
+            )
+        ]
+        stated = f"stated with {percent(float(found.attrs['probability']))}"
+        tables.append(Table("Records like this one, simulated and inferred", [stated, "holds in", "of"], claims))
+    if "assumption" in found.dims:
+        others = [
+            [
+                str(row["assumption"].values),
+                *(fixed(float(row[f"moved_{region}"]), ".2f") for region in ("in_gap", "beside")),
+                "yes" if int(row["fits"]) else "no",
+            ]
+            for row in (found.isel(assumption=k) for k in range(found.sizes["assumption"]))
+        ]
+        heads = ["assumption instead", "in the gap", "beside it", "fits"]
+        tables.append(Table("Distance that the median of the band moves, over its width", heads, others))
+    rows = [
+        [str(name), *(fixed(float(value), ".3f") for value in row), str(by)]
+        for name, row, by in zip(
+            found["quantity"].values, found["sensitivity"].values, found["set_by"].values, strict=True
+        )
+    ]
+    heads = ["quantity", "contour's prior", "rig's prior", "record", "set by"]
+    return [*tables, Table("Sensitivity to prior and record (0.05 matters)", heads, rows)]
 
 
 def check_messages(findings: Findings) -> list[str]:

@@ -37,6 +37,16 @@ from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
 __all__ = ["ContourRun", "analyse"]
 
+_OF_FORMER = (
+    "report.html",
+    "trust.nc",
+    "trust.txt",
+    "assumptions.png",
+    "trust/replicates.json",
+    "trust/alternatives.json",
+)
+"""Files that belong to the former posterior of a folder."""
+
 
 @dataclass(frozen=True)
 class ContourRun:
@@ -122,8 +132,8 @@ def analyse(
         A record.
     out : path-like
         Folder for posterior.nc, contacts.csv, band.csv, summary.txt (which begins with the verdicts), summary.csv and
-        the figures; created if missing. Files of these names in it are replaced, and a report.html, which would belong
-        to the former posterior, is removed.
+        the figures; created if missing. Files of these names in it are replaced, and report.html, trust.nc and the
+        replicates behind it, which would belong to the former posterior, are removed.
     load_cell, rod, seed, options
         Options of `infer_contour`.
     probability : float
@@ -151,7 +161,8 @@ def analyse(
 
     def keep(posterior: xr.DataTree) -> None:
         posterior.attrs |= origin
-        (folder.path / "report.html").unlink(missing_ok=True)  # first, so that it is never beside another posterior
+        for name in _OF_FORMER:  # first, so that they are never beside another posterior
+            (folder.path / name).unlink(missing_ok=True)
         folder.files["posterior"] = folder.path / "posterior.nc"
         write_result(posterior, folder.files["posterior"])
         drawn.append(posterior)

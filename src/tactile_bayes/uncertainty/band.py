@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import json
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -16,6 +17,7 @@ from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import evenly_spread
+from tactile_bayes.uncertainty.averaged_contours import averaged_heights, family_weights
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
 __all__ = ["contour_band", "contour_heights", "contours_drawn", "grid_points", "length_unit"]
@@ -27,14 +29,15 @@ _NUMBERS_PER_HEIGHT = 12
 
 
 def contour_band(
-    posterior: xr.DataTree, x: ArrayLike, probability: float = 0.95, simultaneous: bool = False
+    posterior: xr.DataTree | xr.Dataset, x: ArrayLike, probability: float = 0.95, simultaneous: bool = False
 ) -> xr.Dataset:
     """Return the band in which the contour lies with a given probability, and the median contour height.
 
     Parameters
     ----------
-    posterior : xr.DataTree
-        From `infer_contour`.
+    posterior : xr.DataTree or xr.Dataset
+        From `infer_contour`, or from `compare_families`: the band is then averaged over families, by their
+        probabilities from evidence, or by stacking weights if an evidence is missing.
     x : array_like, shape (n,)
         Grid points of the band, in the record's unit of length.
     probability : float
@@ -47,12 +50,15 @@ def contour_band(
     -------
     xr.Dataset
         Over "x": lower, upper, median [length]; share_reaching, the share of contours that extend to x; status, "ok"
-        or the reason why the band is NaN.
+        or the reason why the band is NaN. An average has the attributes averaged_by, "evidence" or "stacking", and
+        weights, of the families (JSON).
 
     Raises
     ------
     ParameterError
         If the probability is not in (0, 1), or x is not a list of finite numbers.
+    InferenceError
+        If families are to be averaged of which none fits the record, or that have no weights.
 
     See Also
     --------
@@ -68,7 +74,14 @@ def contour_band(
     array([0.3, 0.8])
     """
     at = grid_points(x)
-    heights = contour_heights(posterior, at)
+    average: dict[str, str] = {}
+    if isinstance(posterior, xr.Dataset) and "probability" in posterior:
+        weights, source = family_weights(posterior)
+        by_name = dict(zip(posterior["family"].values.tolist(), weights.tolist(), strict=True))
+        average = {"averaged_by": source, "weights": json.dumps(by_name)}
+        heights = averaged_heights(posterior, at, _DRAWS)
+    else:
+        heights = contour_heights(cast(xr.DataTree, posterior), at)  # which refuses other datasets
     share = np.isfinite(heights).mean(axis=0)
     lower, median, upper = quantile_band(heights, probability, simultaneous)
     status = np.select([share == 1.0, share > 0.0], ["ok", "some contours end before"], "all contours end before")
@@ -82,7 +95,7 @@ def contour_band(
             "status": ("x", status),
         },
         coords={"x": ("x", at, unit)},
-        attrs={"probability": probability, "simultaneous": int(simultaneous)},
+        attrs={"probability": probability, "simultaneous": int(simultaneous), **average},
     )
 
 
@@ -117,6 +130,6 @@ def grid_points(x: ArrayLike) -> Floats:
     return np.atleast_1d(numbers)
 
 
-def length_unit(posterior: xr.DataTree) -> dict[str, Any]:
+def length_unit(posterior: xr.DataTree | xr.Dataset) -> dict[str, Any]:
     """Attributes of lengths in the record's unit."""
     return {"units": "1" if posterior.attrs["units"] == "dimensionless" else "m"}

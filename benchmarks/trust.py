@@ -1,0 +1,113 @@
+"""Prints how often the conclusion of `tb.trust` is right, over simulated records of right and of wrong rigs.
+
+Every row is one of the cases of `benchmarks.misspecification`: a parabola is drawn from the default prior, swept,
+measured and inferred as in that table, and `trust` judges the posterior, without replicates, which test the computation
+alone. A band of 95 % is compared with the truth: in the gap and beside it at grid points, and as a whole. The last rows
+count all records. Records are kept in results/trust, from which a stopped run resumes.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections import Counter
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+import tactile_bayes as tb
+from benchmarks.misspecification import CASES, CELL, SETTINGS
+from tactile_bayes.assessment.trust import trust
+from tactile_bayes.calibration.calibrate import calibration_replicate
+from tactile_bayes.errors import StudyError, TactileBayesError
+from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
+
+OUT = Path("results/trust")
+PROBABILITY = 0.95
+LOST = "lost"
+
+CHOSEN = [(name, other) for name, runs in CASES.items() for other, run in runs.items() if "family" not in run.asked]
+"""Cases, with the ways to infer them that take parabolas."""
+
+Row = Mapping[str, Any]
+
+
+def main(records: int = 6, *names: str) -> None:
+    print(f"{records} records of each rig; bands of {PROBABILITY:.0%}; shares of conclusions, and of alarms\n")
+    heads = ("in the gap", "beside it", "whole", "holds", "prior", "do not", "by parts", "by check", "lost")
+    print(f"{'':<46}" + "".join(f"{head:>11}" for head in heads), flush=True)
+    every: list[Row] = []
+    for name, other in CHOSEN:
+        if names and name not in names:
+            continue
+        rows = made(name, other, records)
+        every += rows
+        print(line(f"{name} {other}", rows), flush=True)
+    counted = Counter((bool(row["whole"]), row["conclusion"]) for row in every if row["conclusion"] != LOST)
+    print(f"\n{'the band as a whole':<24}" + "".join(f"{said:>40}" for said in CONCLUSIONS))
+    for held in (True, False):
+        print(f"{'did hold' if held else 'did not hold':<24}" + "".join(f"{counted[held, s]:>40}" for s in CONCLUSIONS))
+
+
+CONCLUSIONS = ("holds", "holds, but the prior sets the gap", "do not rely on it")
+
+
+def made(name: str, other: str, records: int) -> list[Row]:
+    identity = {"case": f"{name} {other}", "probability": repr(PROBABILITY)}
+    folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in f"{name} {other}".strip())
+    with open_results_store(identity, folder, RECORDS) as store:
+        kept = keep_outcomes(store, one, (name, other), records, workers=None, scheduler=None, progress=None)
+    return [kept[number] for number in range(records)]
+
+
+def one(task: tuple[tuple[str, str], int]) -> Row:
+    """Return the conclusion on one record, and whether its band held."""
+    (name, other), number = task
+    run = CASES[name][other]
+    as_stated = {"noise_scale": stats.lognorm(s=1e-9)}
+    world = tb.Misspecification(**{**run.world, "priors": as_stated | run.world.get("priors", {})})
+    options = {"load_cell": CELL, "settings": SETTINGS, **run.asked}
+    try:
+        replicate = partial(calibration_replicate, seed=2031, world=world, probability=PROBABILITY, **options)(number)
+        found = trust(replicate.posterior, replicates=0, assumptions=False, priors=run.asked.get("priors"))
+    except TactileBayesError as error:
+        return {"conclusion": LOST, "summary": str(error)}
+    numbers = replicate.outcome.numbers
+    wholes = [numbers.get(f"simultaneous_{region}", math.nan) for region in ("in_gap", "beside")]
+    return {
+        "conclusion": found.attrs["conclusion"],
+        "summary": found.attrs["summary"],
+        "split_p_value": float(found.split_p_value),
+        "check_p_value": float(found.check_p_value),
+        "in_gap": numbers.get("pointwise_in_gap", math.nan),
+        "beside": numbers.get("pointwise_beside", math.nan),
+        "whole": float(np.nanmin(wholes)),
+        "converged": numbers["converged"],
+    }
+
+
+def line(name: str, rows: list[Row]) -> str:
+    left = [row for row in rows if row["conclusion"] != LOST]
+    means = [_mean(row[key] for row in left) for key in ("in_gap", "beside", "whole")]
+    shares = [np.mean([row["conclusion"] == said for row in left]) for said in CONCLUSIONS] if left else [math.nan] * 3
+    shares += [_mean(row["split_p_value"] <= 0.01 for row in left), _mean(row["check_p_value"] <= 1e-3 for row in left)]
+    cells = [f"{mean:.2f}" for mean in means] + [f"{share:.0%}" for share in shares] + [str(len(rows) - len(left))]
+    return f"{name:<46}" + "".join(f"{cell:>11}" for cell in cells)
+
+
+def _mean(values: Any) -> float:
+    """Return the mean of the numbers that are known; NaN if there are none."""
+    known = [float(value) for value in values if value is not None and not math.isnan(value)]
+    return float(np.mean(known)) if known else math.nan
+
+
+RECORDS = Kind("records", StudyError, dict, lambda row: {name: v for name, v in row.items() if name != "number"})
+
+
+if __name__ == "__main__":
+    counts, chosen = [a for a in sys.argv[1:] if a.isdigit()], [a for a in sys.argv[1:] if not a.isdigit()]
+    main(*map(int, counts or ["6"]), *chosen)

@@ -1,0 +1,220 @@
+"""Which assumption matters: the band again with each nuisance added or fixed, and with each other family."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_path
+from tactile_bayes.comparison.families import SHAPES
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.errors import ParameterError, StudyError, TactileBayesError
+from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour_problem import contour_problem
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.misfit import is_inferred
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.uncertainty.band import contour_band, length_unit
+
+__all__ = ["Alternative", "alternatives_of", "band_by_assumption"]
+
+_NUISANCES = (*STANDARD, "base", "drift", "gain", "suspension_compliance", "rest_curvature", "taper")
+"""Nuisance parameters, or groups of them, each of which is added or fixed."""
+
+_SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
+
+_EDGES = ("lower", "median", "upper")
+
+
+class Alternative(NamedTuple):
+    """An experiment that differs from another in one assumption."""
+
+    name: str
+    """What is assumed, such as "friction as stated"."""
+    kind: str
+    """"fixed", "added" or "family"."""
+    experiment: Experiment
+
+
+class _Outcome(NamedTuple):
+    """Band of an alternative."""
+
+    band: tuple[tuple[float, ...], ...]
+    """Lower ends, medians and upper ends at the grid points; empty if there is none."""
+    fits: bool
+    """True if the record passes its check."""
+    converged: bool
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Study:
+    """Alternatives, and the grid points of their bands."""
+
+    alternatives: tuple[Alternative, ...]
+    x: Floats
+    probability: float
+    seed: int
+    settings: SamplerSettings = field(default=_SETTINGS)
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """Everything that determines the results, as text, for the results store."""
+        return {each.name: repr(sorted(each.experiment.about.items())) for each in self.alternatives} | {
+            "x": repr(self.x.tolist()),
+            "probability": repr(self.probability),
+            "seed": repr(self.seed),
+            "settings": repr(self.settings),
+            "version of tactile-bayes": version("tactile-bayes"),
+        }
+
+
+def band_by_assumption(
+    posterior: xr.DataTree,
+    experiment: Experiment,
+    x: Floats,
+    probability: float = 0.95,
+    *,
+    seed: int,
+    out: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[TaskProgress], object] | None = None,
+) -> xr.Dataset:
+    """Infer a record again under every other assumption, and compare the bands.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    experiment : Experiment
+        Its experiment.
+    x : ndarray, shape (n,)
+        Grid points of the bands [length].
+    probability : float
+        Probability of the bands, in (0, 1).
+    seed, out, workers, scheduler, progress
+        As in `calibrate`.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "assumption": kind ("fixed": a nuisance parameter is taken as stated; "added": a further one is inferred;
+        "family": another family, under its default priors), fits (1 if the record passes its check), converged (0 or
+        1), message (the sampler's, or the error by which there is no band). Over "assumption" and "grid": other_lower,
+        other_median, other_upper [length], and moved, the distance of the medians over the width of the band of the
+        posterior there. The coordinate grid_x holds x.
+
+    Raises
+    ------
+    StudyError
+        If `out` holds alternatives of another posterior, or another run uses it.
+    TaskError
+        As in `calibrate`.
+    """
+    study = _Study(tuple(alternatives_of(experiment)), x, probability, seed)
+    folder = None if out is None else check_path("out", out).resolve()
+    count = len(study.alternatives)
+    with open_results_store(study.identity, folder, _ALTERNATIVES) as store:
+        kept = keep_outcomes(store, _inferred, study, count, workers=workers, scheduler=scheduler, progress=progress)
+    outcomes = [kept[number] for number in range(count)]
+    bands = np.full((count, len(_EDGES), x.size), np.nan)
+    for k, outcome in enumerate(outcomes):
+        if outcome.band:
+            bands[k] = outcome.band
+    own = contour_band(posterior, x, probability)
+    width = (own["upper"] - own["lower"]).values
+    unit = length_unit(posterior)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moved = (bands[:, 1] - own["median"].values) / width
+    edges = {f"other_{name}": (("assumption", "grid"), bands[:, i], unit) for i, name in enumerate(_EDGES)}
+    return xr.Dataset(
+        {
+            "kind": ("assumption", [each.kind for each in study.alternatives]),
+            "fits": ("assumption", [int(each.fits) for each in outcomes]),
+            "converged": ("assumption", [int(each.converged) for each in outcomes]),
+            "message": ("assumption", [each.message for each in outcomes]),
+            "moved": (("assumption", "grid"), moved, {"units": "1"}),
+            **edges,
+        },
+        coords={"assumption": [each.name for each in study.alternatives], "grid_x": ("grid", x, unit)},
+        attrs={"probability": probability},
+    )
+
+
+def alternatives_of(experiment: Experiment) -> list[Alternative]:
+    """Return the experiments that differ in one assumption, except those that the record cannot identify.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> record = scan(paper_profile("II", q=0.5)).record
+    >>> [each.name for each in alternatives_of(Experiment(record, nuisances=["friction"]))][:3]
+    ['rigidity_scale inferred', 'drive_angle_offset inferred', 'bias inferred']
+    """
+    names, found = experiment.rig.names, []
+    for group in _NUISANCES:
+        members = {name for name in names if is_inferred(group, [name])}
+        left = [name for name in names if name not in members]
+        if members:
+            found.append(Alternative(f"{group} as stated", "fixed", _with(experiment, nuisances=left)))
+            continue
+        label = f"{group} inferred"
+        if group == "gain" and "rigidity_scale" in names:  # which has the same effect as all gains
+            left.remove("rigidity_scale")
+            label += " for rigidity_scale"
+        try:
+            other = _with(experiment, nuisances=[*left, group])
+            if set(other.rig.names) - set(names):
+                found.append(Alternative(label, "added", other))
+        except ParameterError:  # the record cannot identify it, or it is known
+            continue
+    families = [name for name in SHAPES if name != experiment.family]
+    return [*found, *(Alternative(f"family {name}", "family", _with(experiment, family=name)) for name in families)]
+
+
+def _with(experiment: Experiment, **changes: Any) -> Experiment:
+    """Return the experiment with other fields, and the given priors of the parameters that remain."""
+    other = replace(experiment, **changes, priors={})
+    of_contour = family_named(experiment.family).parameters if other.family != experiment.family else ()
+    kept = {n: p for n, p in experiment.priors.items() if n in other.default_priors and n not in of_contour}
+    return replace(other, priors=kept)
+
+
+def _inferred(task: tuple[_Study, int]) -> _Outcome:
+    """Return the band of an alternative; an error is an outcome as well."""
+    study, number = task
+    try:
+        problem = contour_problem(study.alternatives[number].experiment)
+        seed = np.random.SeedSequence(study.seed, spawn_key=(number,))
+        found = sampled(problem, seed=seed, settings=study.settings, with_prior=False)
+        found.draws.refuse_interrupted(study.alternatives[number].name)
+        band = contour_band(found.tree, study.x, study.probability)
+        fits = bool(check_record(found.tree).attrs["passed"])
+    except TactileBayesError as error:
+        return _Outcome((), False, False, f"{type(error).__name__}: {error}")
+    edges = tuple(tuple(band[name].values.tolist()) for name in _EDGES)
+    return _Outcome(edges, fits, found.draws.converged, found.draws.message)
+
+
+def _decode(row: dict[str, Any]) -> _Outcome:
+    band = tuple(tuple(np.nan if v is None else float(v) for v in edge) for edge in row["band"])
+    return _Outcome(band, bool(row["fits"]), bool(row["converged"]), str(row["message"]))
+
+
+def _encode(outcome: _Outcome) -> dict[str, Any]:
+    return outcome._asdict()
+
+
+_ALTERNATIVES = Kind("alternatives", StudyError, _encode, _decode)

@@ -1,0 +1,258 @@
+"""The fit of a record to first order: whitened residuals and slopes of its readings at the least-squares optimum."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.load_cell.covariance import wandering_deviation
+from tactile_bayes.numerics.blocks import blocks
+from tactile_bayes.planning.error_covariance import Whitening, whitening
+from tactile_bayes.planning.record_information import prior_precision, scaled_cell
+
+__all__ = ["Disagreement", "LinearFit", "Linearisation"]
+
+_STEPS = 1
+"""Number of Gauss-Newton steps before the last; starts are draws of the posterior, or truths of predicted records."""
+
+_DIFFERENCE = 0.1
+"""Step of differences, in posterior standard deviations."""
+
+_MOST_CORRELATED = 6000
+"""Largest number of readings whose covariance is factorised, in 0.3 GB."""
+
+_TURN = 1e-4
+"""Step of differences of the drive angle [rad]."""
+
+_JUMP = 0.01
+"""Second difference over a step, in standard deviations of the noise, above which a reading may jump at an event."""
+
+_HALVINGS = 3
+"""Largest number of times that a step is halved."""
+
+_CLIPPED = 4.0
+"""Standard deviations at which residuals are clipped: a sample beside an event may be loaded on either side of it."""
+
+_SINGULAR = 1e-7
+"""Eigenvalue of a covariance of standardised sums of residuals below which a direction is not measured."""
+
+
+class Disagreement(NamedTuple):
+    """Disagreement of one part of a record with what the other part predicts."""
+
+    ratio: float
+    """Mean square of the surprise over that of all residuals: F-distributed if the model holds."""
+    measured: int
+    """Number of directions of parameter space that the part measures, the first degrees of freedom of the ratio."""
+    moves: Floats
+    """Change of each parameter by the part, over its standard deviation as expected before; shape (parameters,)."""
+
+
+class LinearFit(NamedTuple):
+    """A record around its least-squares optimum, in scaled parameters with independent readings of unit variance."""
+
+    slopes: Floats
+    """Derivatives of the readings, shape (samples, channels, parameters)."""
+    residuals: Floats
+    """Residuals at the optimum, shape (samples, channels)."""
+    covariance: Floats
+    """Covariance of the parameters, shape (parameters, parameters)."""
+    prior: Floats
+    """Precision of the prior, shape (parameters, parameters)."""
+    zeros: Floats
+    """Derivatives of the readings by the zero of each channel, shape (samples, channels, channels)."""
+
+    @property
+    def freedom(self) -> float:
+        """Number of readings less that of the effective parameters."""
+        used = np.trace(self.covariance @ self._information(np.ones(len(self.residuals), dtype=bool)))
+        return float(self.residuals.size - used)
+
+    @property
+    def scatter(self) -> float:
+        """Mean square of the residuals per degree of freedom; 1 if the noise is as assumed."""
+        return float(np.sum(self.residuals**2) / self.freedom)
+
+    def disagreement(self, rest: Flags) -> Disagreement:
+        """Compare the samples `rest`, a mask of shape (samples,), with what all others predict.
+
+        With r the residuals of the rest at the joint optimum, J their slopes and C the joint covariance, r is normal
+        with covariance 1 − J C Jᵀ before the rest is read. It is projected on J, and on the zeros of the channels, also
+        if these are taken as stated and are no parameters. The change of the parameters by the rest is C(1 + I C')Jᵀr,
+        where I is the information of the rest and C' the covariance without it.
+        """
+        slopes = self.slopes[rest].reshape(-1, self.slopes.shape[-1])
+        projected = np.hstack([slopes, self.zeros[rest].reshape(len(slopes), -1)])
+        score = projected.T @ self.residuals[rest].ravel()
+        shared = projected.T @ slopes
+        expected = projected.T @ projected - shared @ self.covariance @ shared.T
+        scale = np.sqrt(np.maximum(np.sum(projected**2, axis=0), 1e-300))
+        values, axes = np.linalg.eigh(expected / np.outer(scale, scale))
+        measured = values > _SINGULAR
+        squares = (axes.T @ (score / scale))[measured] ** 2 / values[measured]
+        score, own = score[: slopes.shape[1]], shared[: slopes.shape[1]]
+        before = np.linalg.inv(self._information(~rest) + self.prior)
+        change = self.covariance @ (score + own @ (before @ score))
+        spread = np.sqrt(np.maximum(np.diag(before - self.covariance), 0.0))
+        count = int(np.count_nonzero(measured))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            moves = np.where(spread > 1e-6, change / spread, 0.0)
+        return Disagreement(float(squares.sum() / max(count, 1) / self.scatter), count, moves / np.sqrt(self.scatter))
+
+    def _information(self, some: Flags) -> Floats:
+        flat = self.slopes[some].reshape(-1, self.slopes.shape[-1])
+        return np.asarray(flat.T @ flat)
+
+
+class _Around(NamedTuple):
+    """A record around a point of its parameters."""
+
+    fit: LinearFit
+    change: Floats
+    """Step to the optimum to first order, in scaled parameters."""
+
+
+class Linearisation:
+    """Linear fits of records that were measured as that of a model.
+
+    Parameters
+    ----------
+    model : ContourModel
+        Model of contour and rig.
+    scales : ndarray, shape (d,)
+        Posterior standard deviations of its parameters.
+
+    Raises
+    ------
+    InferenceError
+        If more than 2000 samples share a drift process, or a bias that is integrated out.
+    """
+
+    def __init__(self, model: ContourModel, scales: Floats) -> None:
+        self.model = model
+        self._count = len(model.forward_parameters)
+        self._scales = np.maximum(scales[: self._count], 1e-12)
+        precision = prior_precision(model)[: self._count]
+        names = model.forward_parameters
+        means = [
+            float(model.priors[name].mean()) if known > 0.0 else 0.0  # type: ignore[attr-defined]
+            for name, known in zip(names, precision, strict=True)
+        ]
+        self._mean, self._prior = np.array(means), precision * self._scales**2
+        margin, ends = _DIFFERENCE * self._scales, model.ends
+        self._low, self._high = ends.low[: self._count] + margin, ends.high[: self._count] - margin
+        self._shared: Whitening | None = None
+        cell, (samples, channels) = model.likelihood.load_cell, model.likelihood.measured.shape
+        if samples * channels > _MOST_CORRELATED and np.any(wandering_deviation(cell, samples)):
+            raise InferenceError(
+                f"readings of {samples} samples that share a drift or an unknown bias are too many to be compared at "
+                f"once, {_MOST_CORRELATED // channels} are possible: infer the bias, or take every so many samples"
+            )
+
+    def fits(self, readings: Floats, starts: Floats) -> list[LinearFit | None]:
+        """Return the fits of records, each from a start; None where the rod does not reach its contour.
+
+        Parameters
+        ----------
+        readings : ndarray, shape (records, samples, 3)
+            Dimensionless, NaN where a channel is missing.
+        starts : ndarray, shape (records, d)
+        """
+        found: list[LinearFit | None] = []
+        numbers = (2 * self._count + 3) * readings[0].size
+        for block in blocks(len(readings), numbers):
+            found += self._fits(readings[block], starts[block])
+        return found
+
+    def _fits(self, readings: Floats, points: Floats) -> list[LinearFit | None]:
+        for _ in range(_STEPS):
+            around = self._around(readings, points)
+            steps = np.array([np.zeros(self._count) if each is None else each.change for each in around])
+            costs = self._costs(readings, points)
+            open_ = np.isfinite(costs)
+            moved = points.copy()
+            for halving in range(_HALVINGS):
+                further = points.copy()
+                step = 0.5**halving * steps * self._scales
+                further[:, : self._count] = np.clip(further[:, : self._count] + step, self._low, self._high)
+                tried = np.flatnonzero(open_)
+                if not tried.size:
+                    break
+                better = tried[self._costs(readings[tried], further[tried]) < costs[tried]]
+                moved[better] = further[better]
+                open_[better] = False
+            points = moved
+        return [None if each is None else each.fit for each in self._around(readings, points)]
+
+    def _costs(self, readings: Floats, points: Floats) -> Floats:
+        """Return the least-squares costs of points, shape (records,), by the load cell alone; infinite out of reach."""
+        here, usable = self._readings(points)
+        costs = np.full(len(points), np.inf)
+        for k in np.flatnonzero(usable):
+            residuals = self._whitening(points[k], here[k], None)[0](self._off(readings[k], here[k]))
+            pull = (self._mean - points[k, : self._count]) / self._scales
+            costs[k] = np.sum(np.clip(residuals, -_CLIPPED, _CLIPPED) ** 2) + np.sum(self._prior * pull**2)
+        return costs
+
+    def _around(self, readings: Floats, points: Floats) -> list[_Around | None]:
+        """Return the fit around each point; None where the rod does not reach it."""
+        count, encoder = self._count, self.model.likelihood.load_cell.drive_angle_deviation > 0.0
+        moves = _DIFFERENCE * np.vstack([np.zeros(count), np.diag(self._scales), -np.diag(self._scales)])
+        many = np.repeat(points[:, None], len(moves) + 2 * encoder, axis=1)
+        inside = np.clip(points[:, :count], self._low, self._high)
+        many[:, 1 : len(moves), :count] = inside[:, None] + moves[1:]
+        turns = np.zeros(many.shape[:2])
+        if encoder:
+            turns[:, -2:] = _TURN, -_TURN
+        flat, usable = self._readings(many.reshape(-1, many.shape[-1]), turns.ravel())
+        values = flat.reshape(*many.shape[:2], *flat.shape[1:])
+        is_usable = usable.reshape(turns.shape)[:, 0]
+        return [self._at(*each) if ok else None for *each, ok in zip(readings, points, values, is_usable, strict=True)]
+
+    def _at(self, readings: Floats, point: Floats, values: Floats) -> _Around:
+        """Return the fit around a point, from the readings at it and around it, shape (2 d + 1 or 2 d + 3, n, 3)."""
+        count = self._count
+        here, more, less = values[0], values[1 : count + 1], values[count + 1 : 2 * count + 1]
+        by_angle = (values[-2] - values[-1]) / (2.0 * _TURN) if len(values) > 2 * count + 1 else None
+        white, noise = self._whitening(point, here, by_angle)
+        jump = np.abs(more + less - 2.0 * here) / noise
+        slopes = np.where(jump > np.maximum(_JUMP, 0.5 * np.abs(more - less) / noise), 0.0, more - less)
+        by_parameters = white(np.moveaxis(slopes, 0, -1) / (2.0 * _DIFFERENCE))
+        residuals = np.clip(white(self._off(readings, here)), -_CLIPPED, _CLIPPED)
+        pull = (self._mean - point[:count]) / self._scales
+        flat = by_parameters.reshape(-1, count)
+        covariance = np.asarray(np.linalg.inv(flat.T @ flat + np.diag(self._prior)), dtype=np.float64)
+        change = covariance @ (flat.T @ residuals.ravel() + self._prior * pull)
+        left = np.asarray(residuals[..., 0] - by_parameters @ change, dtype=np.float64)
+        unit = np.broadcast_to(noise * np.eye(noise.size), (*here.shape, noise.size))
+        zeros = white(unit)[..., self.model.present]
+        fit = LinearFit(by_parameters, left, covariance, np.diag(self._prior), zeros)
+        return _Around(fit, change)
+
+    def _off(self, readings: Floats, expected: Floats) -> Floats:
+        return np.nan_to_num(readings - expected)[..., None]
+
+    def _whitening(self, point: Floats, expected: Floats, by_angle: Floats | None) -> tuple[Whitening, Floats]:
+        """Return the whitening at a point, and the standard deviation of each channel, shape (3,)."""
+        cell = scaled_cell(self.model.likelihood.load_cell, self.model.noise_scale(point[None])[0])
+        noise = np.asarray(np.where(cell.noise > 0.0, cell.noise, 1.0), dtype=np.float64)
+        if self._shared is not None:
+            return self._shared, noise
+        turned = np.zeros_like(expected) if by_angle is None else by_angle
+        white = whitening(cell, expected, turned, self.model.present)
+        if white.together is not None:  # errors that samples share make it costly
+            self._shared = white
+        return white, noise
+
+    def _readings(self, points: Floats, turns: Floats | float = 0.0) -> tuple[Floats, Flags]:
+        """Return expected readings, shape (points, samples, 3), and which points the rod reaches, shape (points,)."""
+        model = self.model
+        rig = model.rig(points)
+        rig = rig._replace(drive_angle_offset=np.asarray(rig.drive_angle_offset) - turns)
+        loads, usable = model.likelihood.predict(model.contours(points), rig)
+        loads = model.nuisances.sensed(loads, model.values(points), model.likelihood.load_cell)
+        return model.likelihood.load_cell.expected(loads), usable

@@ -1,0 +1,321 @@
+"""Simulation-based calibration around one record: do its intervals hold for objects and rigs like this one."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.calibration.coverage import coverage_p_value
+from tactile_bayes.calibration.replicate import Outcome, compared, contact_coverage, grid_points_of
+from tactile_bayes.calibration.simulation import Simulation
+from tactile_bayes.calibration.store import REPLICATES
+from tactile_bayes.calibration.summary import summary
+from tactile_bayes.checks import check_path
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour_events import events_of
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_problem import ContourProblem
+from tactile_bayes.inference.contour_start import Walk
+from tactile_bayes.inference.ensembles import (
+    Mixture,
+    Proposal,
+    SamplerSettings,
+    approximate,
+    in_coordinates,
+    scatter_walkers,
+)
+from tactile_bayes.inference.ensembles.proposal import flattened
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.stored_experiment import points_of, predicted_points
+from tactile_bayes.numerics.selection import evenly_spread
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.tasks import TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.uncertainty.band import contour_band
+
+__all__ = ["JointModel", "PosteriorExperiment", "posterior_calibration"]
+
+_SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
+_FEWEST_WALKERS, _MORE_WALKERS = 20, 2
+"""As in `calibrate`, with more steps: shape-free posteriors take some thousand."""
+
+_STARTS = 400
+"""Number of posterior draws of which the start of a joint posterior is made."""
+
+_LEAST_EFFECTIVE = 4
+"""Least number of effective starting draws per parameter."""
+
+_RATIO = "ratio"
+"""Beginning of the names of numbers that hold distances over half widths of the band."""
+
+
+class JointModel(ContourModel):
+    """Prior times likelihood of a record and of further readings at the same drive angles."""
+
+    def __init__(self, model: ContourModel, further: ContourModel) -> None:
+        self.__dict__.update(vars(model))
+        self._further = further
+
+    def log_likelihood(self, points: Floats) -> Floats:
+        predicted, scale = self.loads_with_errors(points), self.noise_scale(points)
+        return self.likelihood.score(*predicted, scale) + self._further.likelihood.score(*predicted, scale)
+
+
+@dataclass(frozen=True, eq=False)
+class PosteriorExperiment:
+    """A record with its posterior, and truths and records drawn from that.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        The experiment of the posterior.
+    truths : ndarray, shape (replicates, d)
+        Draws of the posterior.
+    readings : ndarray, shape (replicates, samples, 3)
+        Predicted readings of each, in the record's units; NaN where a channel is missing.
+    starts : ndarray, shape (n, d)
+        Draws of the posterior from which the start of a joint posterior is made.
+    settings : SamplerSettings
+    probability : float
+        Probability of the intervals that are tested.
+    seed : int
+    """
+
+    experiment: Experiment
+    truths: Floats
+    readings: Floats
+    starts: Floats
+    probability: float
+    seed: int
+    settings: SamplerSettings = field(default=_SETTINGS)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields alone: the model is built again where it is needed."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    @cached_property
+    def model(self) -> ContourModel:
+        """Model of the record."""
+        return self.experiment.model
+
+    @cached_property
+    def exact_model(self) -> ContourModel:
+        """The same with loads to full accuracy."""
+        model = replace(self.experiment).model
+        model.likelihood.exact = True
+        return model
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """Everything that determines the results, as text, for the results store."""
+        return {name: str(value) for name, value in self.experiment.about.items()} | {
+            "draws": hashlib.sha256(self.starts.tobytes()).hexdigest(),
+            "probability": repr(self.probability),
+            "seed": repr(self.seed),
+            "settings": repr(self.settings),
+            "version of tactile-bayes": version("tactile-bayes"),
+        }
+
+
+def posterior_calibration(
+    posterior: xr.DataTree,
+    experiment: Experiment,
+    *,
+    seed: int,
+    replicates: int = 100,
+    probability: float = 0.95,
+    out: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[TaskProgress], object] | None = None,
+) -> xr.Dataset:
+    """Test whether the intervals of a posterior hold here: for truths drawn from it, and records predicted from them.
+
+    Each truth is inferred from the record and the predicted one together. If posterior and sampler are right, its rank
+    among the draws is uniform (posterior simulation-based calibration: Säilynoja, Schmitt, Bürkner & Vehtari 2025,
+    arXiv:2502.03279). In contrast to `calibrate`, truths are like the object and rig at hand. It is no test of the
+    assumptions, which are those of the simulation as well.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`, with predictions.
+    experiment : Experiment
+        Its experiment.
+    seed : int
+        Seed of all random numbers.
+    replicates : int
+        Number of truths.
+    probability : float
+        Probability of the intervals that are tested, in (0, 1).
+    out, workers, scheduler, progress
+        As in `calibrate`.
+
+    Returns
+    -------
+    xr.Dataset
+        As from `calibrate`, and over "region" (in_gap, beside): factor, by which the half widths of the band would hold
+        with the stated probability, and corrected (0 or 1), whether its coverage shows that this is needed.
+
+    Raises
+    ------
+    InferenceError
+        If the tree holds fewer predictions than replicates.
+    CalibrationError
+        If `out` holds replicates of another experiment, or another run uses it.
+    TaskError
+        As in `calibrate`.
+    """
+    task = _task(posterior, experiment, replicates, probability, seed)
+    folder = None if out is None else check_path("out", out).resolve()
+    with open_results_store(task.identity, folder, REPLICATES) as store:
+        kept = keep_outcomes(
+            store, _replicate, task, replicates, workers=workers, scheduler=scheduler, progress=progress
+        )
+    return _summary(task, kept)
+
+
+def _task(
+    posterior: xr.DataTree, experiment: Experiment, replicates: int, probability: float, seed: int
+) -> PosteriorExperiment:
+    """Return the truths and their records, from the predictions of the posterior."""
+    names = experiment.model.names
+    points = points_of(posterior, names)
+    predicted = posterior["posterior_predictive"].to_dataset().transpose("chain", "draw", "sample")
+    available = predicted.sizes["chain"] * predicted.sizes["draw"]
+    if available < replicates:
+        raise InferenceError(f"the posterior holds {available} predictions of the record, {replicates} are needed")
+    chosen = np.random.default_rng([seed, 1]).permutation(available)[:replicates]
+    readings = np.full((replicates, predicted.sizes["sample"], len(CHANNELS)), np.nan)
+    for i, name in enumerate(CHANNELS):
+        if name in predicted:
+            readings[..., i] = predicted[name].values.reshape(available, -1)[chosen]
+    every = points.reshape(-1, points.shape[-1])
+    return PosteriorExperiment(
+        experiment,
+        predicted_points(posterior, names)[chosen],
+        readings,
+        every[evenly_spread(len(every), _STARTS)],
+        probability,
+        seed,
+        replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * points.shape[-1] + _MORE_WALKERS)),
+    )
+
+
+def _replicate(task: tuple[PosteriorExperiment, int]) -> Outcome:
+    """Return the outcome of one replicate; an error is an outcome as well."""
+    experiment, number = task
+    began = time.perf_counter()
+    try:
+        outcome = _made(experiment, number)
+    except Exception as error:
+        outcome = Outcome({}, {}, f"{type(error).__name__}: {error}", traceback.format_exc())
+    return outcome._replace(numbers={"seconds": time.perf_counter() - began, **outcome.numbers})
+
+
+def _made(experiment: PosteriorExperiment, number: int) -> Outcome:
+    for_start, for_posterior, for_ranks = np.random.SeedSequence(experiment.seed, spawn_key=(number,)).spawn(3)
+    model, rng = experiment.model, np.random.default_rng(for_ranks)
+    simulation = _simulation(experiment, number)
+    joint = JointModel(model, replace(experiment.experiment, record=simulation.measured).model)
+    walk = _walk(joint, experiment, for_start)
+    loaded = np.zeros(len(model.likelihood.measured), dtype=bool)
+    problem = ContourProblem(joint, experiment.experiment.about, loaded)
+    result = sampled(problem, seed=for_posterior, settings=experiment.settings, walk=walk, with_prior=False)
+    result.draws.refuse_interrupted(f"replicate {number}")
+    outcome = compared(joint, result, simulation, experiment.probability, rng)
+    record = experiment.experiment.record
+    angles = record.drive_angle.values - experiment.experiment.noise.cell.misread(record.direction.values)
+    numbers = dict(outcome.numbers)
+    exact = experiment.exact_model.likelihood
+    numbers |= contact_coverage(
+        joint, result.draws.samples, simulation, exact, angles, angles, experiment.probability, rng
+    )
+    return outcome._replace(numbers=numbers | _ratios(result.tree, simulation, experiment.probability))
+
+
+def _simulation(experiment: PosteriorExperiment, number: int) -> Simulation:
+    """Return a truth and its record."""
+    model, record = experiment.exact_model, experiment.experiment.record
+    point = experiment.truths[number][None]
+    columns = {
+        name: ("sample", experiment.readings[number, :, i], record[name].attrs) for i, name in enumerate(CHANNELS)
+    }
+    truth = {name: float(value[0]) for name, value in model.values(point).items()}
+    contour, rig = model.contours(point), model.rig(point)
+    events = {name: found[0] for name, found in events_of(model.likelihood, contour, rig).items()}
+    return Simulation(record.assign(columns), truth, contour, rig, events)
+
+
+def _walk(joint: JointModel, experiment: PosteriorExperiment, seed: np.random.SeedSequence) -> Walk:
+    """Return the start of the walkers, from draws of the posterior weighted by the further readings."""
+    rng, size = np.random.default_rng(seed), len(joint.names)
+    coordinates = joint.coordinates
+    target = in_coordinates(joint.log_probability, coordinates)
+    draws = coordinates.of(experiment.starts)
+    surplus = joint.log_probability(experiment.starts) - experiment.model.log_probability(experiment.starts)
+    if not np.isfinite(surplus).any():
+        raise InferenceError("no draw of the posterior is possible together with a record that it predicts")
+    ends = joint.walked_ends
+    fitted = Proposal.fitted(draws, flattened(surplus, _LEAST_EFFECTIVE * size), ends)
+    proposal = approximate(target, fitted.mean, fitted.root @ fitted.root.T, rng, ends=ends)
+    start = scatter_walkers(
+        lambda points: joint.log_probability(coordinates.parameters(points)[0]),
+        lambda rng, count: proposal.draw_unbounded(rng, count),
+        parameters=size,
+        seed=seed,
+        settings=experiment.settings,
+    )
+    return Walk(start, coordinates.with_proposal(Mixture((proposal,))))
+
+
+def _ratios(tree: xr.DataTree, simulation: Simulation, probability: float) -> dict[str, float]:
+    """Return the distances of the true contour from the band's median, over its half width on that side."""
+    numbers: dict[str, float] = {}
+    for region, x in grid_points_of(simulation).items():
+        band = contour_band(tree, x, probability)
+        off = np.asarray(simulation.contour.height(x)) - band["median"].values
+        half = np.where(off > 0.0, (band.upper - band["median"]).values, (band["median"] - band.lower).values)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = np.abs(off) / half
+        numbers |= {f"{_RATIO}_{region}_{k}": float(ratio) for k, ratio in enumerate(ratios)}
+    return numbers
+
+
+def _summary(task: PosteriorExperiment, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
+    """Return the result of a calibration, and factors of the band."""
+    plain = {
+        k: row._replace(numbers={name: v for name, v in row.numbers.items() if not name.startswith(_RATIO)})
+        for k, row in outcomes.items()
+    }
+    found = summary(task, plain)
+    regions, factors, needed = ("in_gap", "beside"), [], []
+    for region in regions:
+        start = f"{_RATIO}_{region}_"
+        ratios = np.array([v for row in outcomes.values() for name, v in row.numbers.items() if name.startswith(start)])
+        ratios = ratios[np.isfinite(ratios)]
+        factors.append(float(np.quantile(ratios, task.probability)) if ratios.size else np.nan)
+        claim = f"pointwise_{region}"
+        needed.append(claim in found.claim and _is_too_narrow(found.sel(claim=claim), found.attrs))
+    return found.assign_coords(region=list(regions)).assign(
+        factor=("region", factors), corrected=("region", np.array(needed, dtype=int))
+    )
+
+
+def _is_too_narrow(claim: xr.Dataset, attrs: Mapping[Any, Any]) -> bool:
+    """Return True if a band holds less often than stated, at the level of the calibration."""
+    share, count, stated = float(claim.coverage), int(claim.coverage_replicates), float(attrs["probability"])
+    if not share < stated:
+        return False
+    return bool(coverage_p_value(share, count, stated, is_whole=False) <= attrs["level"])

@@ -1,0 +1,119 @@
+"""What the prior does: sensitivity of parameters and band to power-scaling of prior and likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from arviz_stats.base.array import array_stats
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.stored_experiment import points_of
+from tactile_bayes.uncertainty.band import contour_heights
+
+__all__ = ["COMPONENTS", "SENSITIVE", "prior_sensitivity", "what_sets"]
+
+COMPONENTS = ("contour", "rig", "likelihood")
+"""Components that are scaled: the prior of the contour, that of rig and noise, and the likelihood."""
+
+SENSITIVE = 0.05
+"""Sensitivity from which a component matters (Kallioinen et al. 2024)."""
+
+_POWERS = (0.99, 1.01)
+
+_LOST = 20.0
+"""Log-probability below the median beyond which a draw belongs to a lost walker and is left out."""
+
+
+def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapping[str, Floats]) -> xr.Dataset:
+    """Return how much the posterior changes if prior or likelihood is raised to a power near one.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    model : ContourModel
+        Its model.
+    regions : mapping of str to ndarray, shape (n,)
+        Grid points of x by region of the band, such as "in_gap" and "beside".
+
+    Returns
+    -------
+    xr.Dataset
+        Over "quantity" (parameters, and a band for each region, as "band in_gap") and "component" (the prior of the
+        contour, that of rig and noise, the likelihood): sensitivity. Over "quantity": set_by, "record", "both" or
+        "prior", see `what_sets`.
+
+    Notes
+    -----
+    The sensitivity is the cumulative Jensen–Shannon distance of the scaled posterior from the posterior, over the
+    change of the logarithm of the power, from Pareto-smoothed weights of the draws (Kallioinen, Paananen, Bürkner &
+    Vehtari 2024, doi 10.1007/s11222-023-10366-5); that of a band is the largest of its heights. Limits of reach have no
+    power, and do not count.
+    """
+    points = points_of(posterior, model.names)
+    every = posterior["sample_stats"].to_dataset()["lp"].transpose("chain", "draw").values
+    by_name = {name: model.priors[name].logpdf(points[..., i]) for i, name in enumerate(model.names)}
+    own = model.family.parameters
+    of_contour = sum((by_name[name] for name in own), np.zeros(every.shape))
+    of_rig = sum((value for name, value in by_name.items() if name not in own), np.zeros(every.shape))
+    parts = {"contour": of_contour, "rig": of_rig, "likelihood": every - of_contour - of_rig}
+    heights = {name: _heights(posterior, x, every.shape) for name, x in regions.items() if x.size}
+    rows = {name: points[..., i][None] for i, name in enumerate(model.names)}
+    rows |= {f"band {name}": values for name, values in heights.items()}
+    kept = np.flatnonzero((every > np.median(every) - _LOST).all(axis=0))
+    found = np.zeros((len(rows), len(COMPONENTS)))
+    for k, name in enumerate(COMPONENTS):
+        weights = [_weights(parts[name][:, kept], power) for power in _POWERS]
+        for row, values in zip(found, rows.values(), strict=True):
+            row[k] = max(_sensitivity(each[:, kept], weights) for each in values)
+    return xr.Dataset(
+        {
+            "sensitivity": (("quantity", "component"), found, {"units": "1"}),
+            "set_by": ("quantity", [what_sets(*row) for row in found]),
+        },
+        coords={"quantity": list(rows), "component": list(COMPONENTS)},
+    )
+
+
+def what_sets(contour: float, rig: float, likelihood: float) -> str:
+    """Return "record", "both" or "prior", whichever sets a quantity, from the sensitivities to the three components.
+
+    Examples
+    --------
+    >>> what_sets(0.01, 0.02, 0.2), what_sets(0.01, 0.06, 0.2), what_sets(0.1, 0.0, 0.06)
+    ('record', 'both', 'prior')
+    """
+    prior = max(contour, rig)
+    if prior < SENSITIVE:
+        return "record"
+    return "both" if likelihood > prior else "prior"
+
+
+def _heights(posterior: xr.DataTree, x: Floats, shape: tuple[int, ...]) -> Floats:
+    """Return heights of all contours at the grid points that all of them reach, shape (x, chain, draw)."""
+    heights = contour_heights(posterior, x, most=shape[0] * shape[1])
+    reached = heights[:, np.isfinite(heights).all(axis=0)]
+    return np.asarray(reached.T.reshape(-1, *shape))
+
+
+def _weights(log_density: Floats, power: float) -> Floats:
+    """Return Pareto-smoothed weights of draws, of sum one, for a component raised to a power."""
+    if np.ptp(log_density) == 0.0:  # a flat prior
+        return np.full(log_density.shape, 1.0 / log_density.size)
+    logs = array_stats.power_scale_lw(log_density.ravel(), alpha=power)
+    weights = np.exp(logs - logs.max()).reshape(log_density.shape)
+    return np.asarray(weights / weights.sum())
+
+
+def _sensitivity(values: Floats, weights: list[Floats]) -> float:
+    lower, upper = weights
+    if np.ptp(values) == 0.0:
+        return 0.0
+    return float(
+        array_stats.power_scale_sense(
+            values, lower_w=lower, upper_w=upper, lower_alpha=_POWERS[0], upper_alpha=_POWERS[1]
+        )
+    )

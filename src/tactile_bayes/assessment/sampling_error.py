@@ -1,0 +1,94 @@
+"""The Monte-Carlo error of a band: how well its ends are known from the draws of a posterior."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+from arviz_stats.base.array import array_stats
+from numpy.typing import ArrayLike
+
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.result import contour_draws
+from tactile_bayes.uncertainty.band import contour_heights, grid_points, length_unit
+from tactile_bayes.uncertainty.quantiles import central_levels
+
+__all__ = ["WANTED_SHARE", "sampling_error"]
+
+WANTED_SHARE = 0.1
+"""Monte-Carlo error of an end over the width of the band, above which more draws are advised."""
+
+
+def sampling_error(posterior: xr.DataTree, x: ArrayLike, probability: float = 0.95) -> xr.Dataset:
+    """Return the Monte-Carlo standard errors of the ends of a band, and the draws for an error of a tenth of the band.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    x : array_like, shape (n,)
+        Grid points of the band [length].
+    probability : float
+        Probability of the band, in (0, 1).
+
+    Returns
+    -------
+    xr.Dataset
+        Over "x": lower_error, median_error, upper_error, the standard errors of the ends and of the median of
+        `contour_band` [length]; share, the larger error of an end over the width of the band there; NaN where some
+        contours end before. Scalars: draws, of which the band is computed, at most 4000; effective_draws, the least
+        effective sample size of an end; draws_needed, for which the largest share would be 0.1.
+
+    Raises
+    ------
+    ParameterError
+        If the probability is not in (0, 1), or x is not a list of finite numbers.
+    InferenceError
+        If no grid point is reached by all contours.
+
+    Notes
+    -----
+    Errors of quantiles follow from the effective sample size of the indicator of a quantile (Vehtari et al. 2021, doi
+    10.1214/20-BA1221), with an ensemble as a chain.
+
+    Examples
+    --------
+    >>> q = np.random.default_rng(1).normal(0.3, 0.01, (4, 1000))
+    >>> draws = {"a": np.full_like(q, 0.5), "q": q, "x_c": np.zeros_like(q)}
+    >>> tree = xr.DataTree.from_dict({"posterior": xr.Dataset({k: (("chain", "draw"), v) for k, v in draws.items()})})
+    >>> tree.attrs = {"family": "parabola", "units": "dimensionless"}
+    >>> found = sampling_error(tree, [0.0])
+    >>> round(float(found.share[0]), 2), int(found.draws)
+    (0.01, 4000)
+    """
+    at, (low, middle, high) = grid_points(x), central_levels(probability)
+    chains = contour_draws(posterior).sizes["chain"]
+    heights = contour_heights(posterior, at)
+    heights = heights[: len(heights) // chains * chains].reshape(chains, -1, at.size).transpose(2, 0, 1)
+    known = np.isfinite(heights).all(axis=(1, 2))
+    if not known.any():
+        raise InferenceError("no grid point is reached by all contours of the posterior: give other x")
+    errors = np.full((3, at.size), np.nan)
+    for row, level in zip(errors, (low, middle, high), strict=True):
+        row[known] = array_stats.mcse(heights[known], method="quantile", prob=level)
+    ends = np.quantile(heights[known], [low, high], axis=(1, 2))
+    share = np.full(at.size, np.nan)
+    with np.errstate(invalid="ignore"):  # a band without width has no error either
+        share[known] = np.nan_to_num(np.maximum(errors[0], errors[2])[known] / (ends[1] - ends[0]))
+    effective = [array_stats.ess(heights[known], method="quantile", prob=level) for level in (low, high)]
+    draws = heights[0].size
+    needed = math.ceil(draws * (float(np.nanmax(share)) / WANTED_SHARE) ** 2)
+    unit = length_unit(posterior)
+    names = ("lower_error", "median_error", "upper_error")
+    return xr.Dataset(
+        {
+            **{name: ("x", row, unit) for name, row in zip(names, errors, strict=True)},
+            "share": ("x", share, {"units": "1"}),
+            "draws": draws,
+            "effective_draws": float(np.nanmin(effective)),
+            "draws_needed": needed,
+        },
+        coords={"x": ("x", at, unit)},
+        attrs={"probability": probability},
+    )

@@ -1,0 +1,161 @@
+"""What one part of a record says of the other: each sweep, pivot or half alone predicts the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from scipy import stats
+
+from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.assessment.linear_fit import LinearFit, Linearisation
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.stored_experiment import points_of, predicted_points
+from tactile_bayes.numerics.selection import evenly_spread
+from tactile_bayes.record import CHANNELS
+
+__all__ = ["FALSE_ALARM", "parts_of", "split_prediction"]
+
+FALSE_ALARM = 0.01
+"""Probability of an alarm if the model holds."""
+
+_RECORDS = 199
+"""Number of predicted records with which the real one is compared."""
+
+_FEWEST_RECORDS = 99
+"""Least number of predicted records: with fewer an alarm would be impossible."""
+
+_NOISE = "noise"
+
+
+class _Row(NamedTuple):
+    """Disagreements of one record, by part."""
+
+    ratios: Floats
+    """Shape (parts,)."""
+    measured: Floats
+    """Degrees of freedom of the ratios, shape (parts,)."""
+    moves: Floats
+    """Shape (parts, parameters)."""
+    freedom: float
+    scatter: float
+
+
+def split_prediction(posterior: xr.DataTree, model: ContourModel) -> xr.Dataset:
+    """Predict each part of a record from all others, and compare.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`, with predictions.
+    model : ContourModel
+        Its model.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "part" (see `parts_of`, and "noise"): p_value, the probability of so large a disagreement if the model
+        holds, and sd, the same as standard deviations of a normal distribution. Over "part" and "parameter": moves,
+        the change of each parameter by the samples that the part lacks, in standard deviations expected before; NaN
+        for "noise". Scalar overall_p_value: share of predicted records, this one included, of which some part
+        disagrees at least as much. Attributes: false_alarm, passed (0 or 1), records (number of predicted ones).
+
+    Raises
+    ------
+    InferenceError
+        If the tree has fewer than 99 predicted records, or more than 2000 samples share a drift process, or a bias that
+        is integrated out.
+
+    Notes
+    -----
+    At the joint optimum the score of the rest is normal, with a covariance that follows from the slopes of the readings
+    to first order: its quadratic form over the scatter of all residuals has an F distribution. The zeros of the
+    channels are compared as well, whether they are inferred or not. No alternative model is fitted. The F statistics of
+    records that the posterior predicts, each fitted like the real one, correct their mean (Bartlett 1937, doi
+    10.1098/rspa.1937.0109), and calibrate the least p-value of all parts, so that the share of false alarms is as
+    stated with few samples as well. "noise" compares the scatter with that of predicted records: it differs only if
+    the noise is known, since noise that is inferred explains any misfit.
+    """
+    points = points_of(posterior, model.names)
+    predicted = posterior["posterior_predictive"].to_dataset().transpose("chain", "draw", "sample")
+    chosen = evenly_spread(predicted.sizes["chain"] * predicted.sizes["draw"], _RECORDS)
+    if chosen.size < _FEWEST_RECORDS:
+        raise InferenceError(f"the posterior holds {chosen.size} predictions of the record, too few: sample longer")
+    parts, linear = parts_of(model), Linearisation(model, points.std(axis=(0, 1)))
+    every = posterior["sample_stats"].to_dataset()["lp"].transpose("chain", "draw").values
+    best = points[np.unravel_index(int(np.argmax(every)), every.shape)].copy()
+    best[len(model.forward_parameters) :] = np.median(points, axis=(0, 1))[len(model.forward_parameters) :]
+    starts = predicted_points(posterior, model.names)[chosen]
+    records = np.full((1 + chosen.size, *model.likelihood.measured.shape), np.nan)
+    records[0] = model.likelihood.measured
+    for i, (name, unit) in enumerate(zip(CHANNELS, model.likelihood.rod.load_units, strict=True)):
+        if name in predicted:
+            records[1:, :, i] = predicted[name].values.reshape(-1, records.shape[1])[chosen] / unit
+    fits = linear.fits(records, np.vstack([best[None], starts]))
+    if fits[0] is None:
+        raise InferenceError("the most probable contour of the posterior is out of reach: infer it again")
+    rows = [_row(fit, parts) for fit in fits if fit is not None]
+    return _labelled(rows, list(parts), model.forward_parameters)
+
+
+def parts_of(model: ContourModel) -> dict[str, Flags]:
+    """Return the parts of a record that predict the rest, masks of shape (samples,) by name.
+
+    They are each sweep segment, as "sweep 1" and so on, if there are several; each pivot likewise; and the earlier and
+    the later half of the samples of every segment, which divide its contacts in the middle.
+    """
+    likelihood = model.likelihood
+    of_sample, count = likelihood.segment_of_sample, len(likelihood.segments)
+    parts = {f"sweep {k + 1}": of_sample == k for k in range(count)} if count > 1 else {}
+    bases = list(dict.fromkeys(segment.base for segment in likelihood.segments))
+    if 1 < len(bases) < count:
+        at = np.array([bases.index(segment.base) for segment in likelihood.segments])[of_sample]
+        parts |= {f"pivot {k + 1}": at == k for k in range(len(bases))}
+    loaded, early = ~model.found["unloaded"].values, np.zeros(of_sample.size, dtype=bool)
+    for segment in likelihood.segments:
+        samples = np.sort(segment.samples)
+        inside = samples[loaded[samples]] if loaded[samples].any() else samples
+        early[samples[samples < inside[inside.size // 2]]] = True
+    return parts | {"earlier half": early, "later half": ~early}
+
+
+def _row(fit: LinearFit, parts: Mapping[str, Flags]) -> _Row:
+    found = [fit.disagreement(~part) for part in parts.values()]
+    return _Row(
+        np.array([each.ratio for each in found]),
+        np.array([float(max(each.measured, 1)) for each in found]),
+        np.array([each.moves for each in found]),
+        fit.freedom,
+        fit.scatter,
+    )
+
+
+def _labelled(rows: list[_Row], parts: list[str], parameters: tuple[str, ...]) -> xr.Dataset:
+    """Return the result for the first of the records, with the others as reference."""
+    ratios, measured = (np.stack([getattr(row, name) for row in rows]) for name in ("ratios", "measured"))
+    freedom = np.array([[row.freedom] for row in rows])
+    if len(rows) <= _FEWEST_RECORDS:
+        raise InferenceError(f"only {len(rows) - 1} predicted records can be fitted, too few: sample longer")
+    expected = freedom / np.maximum(freedom - 2.0, 1.0)
+    inflated = np.mean((ratios / expected)[1:], axis=0)
+    p_values = stats.f.sf(ratios / inflated, measured, freedom)
+    scatter = np.array([row.scatter for row in rows])
+    typical = scatter[1:].mean()
+    below = stats.chi2.cdf(scatter / typical * freedom[:, 0], freedom[:, 0])
+    p_values = np.column_stack([p_values, 2.0 * np.minimum(below, 1.0 - below)])
+    least = p_values.min(axis=1)
+    overall = float(np.mean(least <= least[0]))
+    moves = np.vstack([rows[0].moves, np.full((1, len(parameters)), np.nan)])
+    return xr.Dataset(
+        {
+            "p_value": ("part", p_values[0]),
+            "sd": ("part", stats.norm.isf(0.5 * np.maximum(p_values[0], 1e-300))),
+            "moves": (("part", "parameter"), moves),
+            "overall_p_value": overall,
+        },
+        coords={"part": [*parts, _NOISE], "parameter": list(parameters)},
+        attrs={"false_alarm": FALSE_ALARM, "passed": int(overall > FALSE_ALARM), "records": len(rows) - 1},
+    )

@@ -1,0 +1,270 @@
+"""Trust in a posterior for one record: does its band hold here, and what does it rest on."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from threadpoolctl import threadpool_limits
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.assessment.assumptions import alternatives_of, band_by_assumption
+from tactile_bayes.assessment.posterior_calibration import posterior_calibration
+from tactile_bayes.assessment.prior_sensitivity import prior_sensitivity
+from tactile_bayes.assessment.sampling_error import sampling_error
+from tactile_bayes.assessment.split_prediction import split_prediction
+from tactile_bayes.assessment.wording import conclusion, sentences
+from tactile_bayes.checks import check_function, check_probability, check_seed, check_switch, check_whole_number
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.result import contour_draws, read_result
+from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.tasks import TaskProgress
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.summary import gap_if_any, reach
+
+__all__ = ["draws_digest", "trust"]
+
+_USUAL = 0.95
+"""Probability of the band if a posterior does not state one."""
+
+_GRID_POINTS = 9
+"""Number of grid points of each region, the gap and both sides of it, at which the effect of the prior is computed."""
+
+_EVERY = 5
+"""Every so many grid points of the band, those of other assumptions are computed."""
+
+_ENDS = ("left", "right")
+
+_OF_CALIBRATION = ("rank_p_value", "coverage", "coverage_error", "coverage_replicates", "noticed_below")
+
+
+def trust(
+    run_or_posterior: str | os.PathLike[str] | xr.DataTree,
+    *,
+    replicates: int = 100,
+    assumptions: bool = True,
+    probability: float | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    seed: int = 1,
+    out: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[TaskProgress], object] | None = None,
+) -> xr.Dataset:
+    """Judge whether the band of a posterior holds for this record, and what it rests on.
+
+    Five questions are answered. *Do parts of the record agree?* Each sweep, each pivot, and the earlier and later half
+    of the contacts alone predict the rest (`parts`): this sees what the model lacks, such as friction, a zero that
+    moves, a slipped pivot, a wrong family. *Does the computation hold here?* Truths are drawn from this posterior,
+    records predicted from them, and both inferred again (posterior simulation-based calibration): this sees a wrong
+    sampler, and says how often the intervals hold for objects and rigs like this one. *What does the prior do?* Prior
+    and likelihood are raised to a power near one. *Which assumption matters?* The band is computed again with each
+    nuisance parameter added or fixed, and with each other family. *How exact is the sampling?* The Monte-Carlo error of
+    the band.
+
+    Parameters
+    ----------
+    run_or_posterior : path-like or xr.DataTree
+        Folder that `tactile-bayes infer` has written, its posterior.nc, or a result of `infer_contour`.
+    replicates : int
+        Number of truths that are drawn and inferred again, 0 for none; each takes one or two seconds on one core, and
+        some tens with a shape-free family.
+    assumptions : bool
+        Whether the band is computed again under other assumptions, which takes some ten seconds each.
+    probability : float, optional
+        Probability of the band, in (0, 1); by default that of the run, or 0.95.
+    priors : mapping of str to frozen scipy.stats distribution, optional
+        The argument of `infer_contour`, if its text does not determine them, as for histograms.
+    seed : int
+        Seed of all random numbers; the results do not depend on the number of workers.
+    out : path-like, optional
+        Folder of the replicates and alternatives: a run that was killed resumes.
+    workers, scheduler, progress
+        As in `calibrate`.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "x": lower, median, upper, the band [length], and lower_error, median_error, upper_error, share, see
+        `sampling_error`; draws, effective_draws, draws_needed. Where the calibration shows that the band is too narrow,
+        corrected_lower and corrected_upper, its ends farther from the median by the factor of each region.
+
+        Over "part": part_p_value, part_sd; moves (part, parameter); split_p_value: see `split_prediction`.
+
+        Over "quantity": sensitivity (quantity, component), set_by: see `prior_sensitivity`.
+
+        Over "ranked" and "claim", if there are replicates: rank_p_value (ranked), coverage, coverage_error,
+        coverage_replicates, noticed_below (claim), factor and corrected (region): see `posterior_calibration`.
+
+        Over "assumption", if asked for: kind, fits, converged, message; moved_in_gap and moved_beside, the largest
+        distance of the medians over the width of the band there; over "grid" too: other_lower, other_median,
+        other_upper, moved, see `band_by_assumption`.
+
+        check_p_value of `check_record`. Attributes: conclusion, "holds", "holds, but the prior sets the gap" or "do not
+        rely on it"; summary, a sentence with the reasons; words, all sentences, one in a line; probability;
+        draws_sha256 of the posterior.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is impossible.
+    InferenceError
+        If there is no posterior of a contour with its predictions, or it is one without unloaded samples
+        (``events=False``), or with more than 2000 samples that share a drift process or a bias that is integrated out.
+    CalibrationError
+        If `out` holds replicates of another posterior, or another run uses it.
+    TaskError
+        As in `calibrate`.
+
+    Notes
+    -----
+    The alarm of the parts has a probability of at most 1 % if the model holds, that of the check 0.1 %, and that of the
+    calibration 1 %. Faults that leave the readings as they are, such as a shift of pivot and object together, are
+    unobservable for any of them.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> slippery = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.05)
+    >>> for friction in (0.0, 0.3):
+    ...     sweep = scan(paper_profile("II", q=0.5), drive_step=0.05, friction=friction).record
+    ...     posterior = infer_contour(cell.measure(sweep, seed=1), nuisances=[], seed=1, settings=slippery)
+    ...     print(trust(posterior, replicates=0, assumptions=False).attrs["conclusion"])
+    holds
+    do not rely on it
+    """
+    check_whole_number("replicates", replicates, 0)
+    check_switch("assumptions", assumptions)
+    seed = check_seed(seed)
+    check_function("progress", progress)
+    posterior = _posterior_of(run_or_posterior)
+    stated = posterior.attrs.get("probability", _USUAL) if probability is None else probability
+    chance = check_probability("probability", stated)
+    experiment = experiment_of(posterior, priors)
+    if not experiment.events:
+        raise InferenceError("the posterior leaves unloaded samples out (events=False): infer it with them")
+    x = reach(posterior)
+    with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
+        found = sampling_error(posterior, x, chance)
+        band = contour_band(posterior, x, chance)
+        found = found.assign({name: band[name] for name in ("lower", "median", "upper")})
+        check = check_record(posterior)
+        found["check_p_value"] = check.overall_p_value
+        parts = split_prediction(posterior, experiment.model)
+        found = found.merge(parts.rename(p_value="part_p_value", sd="part_sd", overall_p_value="split_p_value"))
+        regions = _regions(posterior, x, chance)
+        found = found.merge(prior_sensitivity(posterior, experiment.model, regions))
+    others = len(alternatives_of(experiment)) if assumptions else 0
+    calibrated: xr.Dataset | None = None
+
+    def report(before: int) -> Callable[[TaskProgress], object] | None:
+        if progress is None:
+            return None
+        return lambda now: progress(now._replace(done=before + now.done, wanted=replicates + others))
+
+    if replicates:
+        calibrated = posterior_calibration(
+            posterior,
+            experiment,
+            seed=seed,
+            replicates=replicates,
+            probability=chance,
+            out=out,
+            workers=workers,
+            scheduler=scheduler,
+            progress=report(0),
+        )
+        of_claims = calibrated[list(_OF_CALIBRATION)].rename(quantity="ranked")
+        found = found.merge(of_claims).merge(calibrated[["factor", "corrected"]])
+        found = found.assign(_corrected(found, regions.get("in_gap", np.empty(0))))
+    if assumptions:
+        other = band_by_assumption(
+            posterior,
+            experiment,
+            x[::_EVERY],
+            chance,
+            seed=seed,
+            out=out,
+            workers=workers,
+            scheduler=scheduler,
+            progress=report(replicates),
+        )
+        found = found.merge(other).assign(_moved(other, regions))
+    attrs = posterior.attrs
+    concluded, summary = conclusion(found, check, parts, calibrated, attrs)
+    found.attrs = {
+        "conclusion": concluded,
+        "summary": summary,
+        "words": "\n".join(sentences(found, parts, calibrated, mute=family_named(experiment.family).roughness)),
+        "probability": chance,
+        "seed": seed,
+        "replicates": replicates,
+        "calibration": "" if calibrated is None else str(calibrated.attrs["conclusion"]),
+        "draws_sha256": draws_digest(posterior),
+    }
+    return found
+
+
+def draws_digest(posterior: xr.DataTree) -> str:
+    """Return the SHA-256 of the draws of a posterior."""
+    digest = hashlib.sha256()
+    for name, values in contour_draws(posterior).data_vars.items():
+        digest.update(str(name).encode() + values.transpose("chain", "draw").values.tobytes())
+    return digest.hexdigest()
+
+
+def _posterior_of(given: str | os.PathLike[str] | xr.DataTree) -> xr.DataTree:
+    if isinstance(given, xr.DataTree):
+        return given
+    if not isinstance(given, str | os.PathLike):
+        raise ParameterError(f"this is {type(given).__name__}: give the folder of a run, or a result of infer_contour")
+    path = Path(given)
+    return read_result(path / "posterior.nc" if path.is_dir() else path)
+
+
+def _regions(posterior: xr.DataTree, x: Floats, probability: float) -> dict[str, Floats]:
+    """Return grid points in the gap and beside it; only beside, if the sweeps overlap or have one direction."""
+    edges = gap_if_any(posterior, probability)
+    left, right = (np.nan, np.nan) if edges is None else (float(edges[end].sel(bound="median")) for end in _ENDS)
+    if not left < right:
+        return {"beside": np.linspace(x[0], x[-1], 2 * _GRID_POINTS)}
+    flanks = [np.linspace(x[0], left, _GRID_POINTS), np.linspace(right, x[-1], _GRID_POINTS)]
+    return {"in_gap": np.linspace(left, right, _GRID_POINTS + 2)[1:-1], "beside": np.concatenate(flanks)}
+
+
+def _moved(other: xr.Dataset, regions: Mapping[str, Floats]) -> dict[str, xr.DataArray]:
+    """Return the largest distance of the medians in each region, over the width of the band."""
+    x = other["grid_x"].values
+    inside = np.zeros(x.size, dtype=bool)
+    if "in_gap" in regions:
+        inside = (x > regions["in_gap"][0]) & (x < regions["in_gap"][-1])
+    sizes = np.abs(other["moved"].transpose("assumption", "grid").values)
+    found = {}
+    for region, some in (("in_gap", inside), ("beside", ~inside)):
+        known = np.where(some & np.isfinite(sizes), sizes, -1.0).max(axis=1)
+        found[f"moved_{region}"] = xr.DataArray(np.where(known < 0.0, np.nan, known), dims="assumption")
+    return found
+
+
+def _corrected(found: xr.Dataset, in_gap: Floats) -> dict[str, xr.DataArray]:
+    """Return the band with its half widths multiplied by the factors of regions that are corrected; {} if none is."""
+    needed = found["corrected"].values.astype(bool)
+    if not needed.any():
+        return {}
+    factor = dict(zip(found["region"].values.tolist(), np.where(needed, found["factor"].values, 1.0), strict=True))
+    x = found["x"].values
+    inside = (x > in_gap[0]) & (x < in_gap[-1]) if in_gap.size else np.zeros(x.size, dtype=bool)
+    wide = xr.DataArray(np.where(inside, factor["in_gap"], factor["beside"]), dims="x")
+    return {
+        f"corrected_{end}": (found["median"] + wide * (found[end] - found["median"])).assign_attrs(found[end].attrs)
+        for end in ("lower", "upper")
+    }

@@ -1,0 +1,160 @@
+"""Conclusion and sentences on the trust in a posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.assessment.sampling_error import WANTED_SHARE
+
+__all__ = ["HOLDS", "NOT", "PRIOR", "conclusion", "sentences"]
+
+HOLDS = "holds"
+PRIOR = "holds, but the prior sets the gap"
+NOT = "do not rely on it"
+
+_LARGEST = 2.0
+"""Change of a parameter, in standard deviations, from which it is named."""
+
+_SETS = {
+    "record": "is set by the record",
+    "both": "depends on the record, and on the prior as well",
+    "prior": "is set by the prior",
+}
+
+
+def conclusion(
+    found: xr.Dataset,
+    check: xr.Dataset,
+    parts: xr.Dataset,
+    calibrated: xr.Dataset | None,
+    attrs: Mapping[Any, Any],
+) -> tuple[str, str]:
+    """Return the conclusion, and a sentence with its reasons.
+
+    Parameters
+    ----------
+    found : xr.Dataset
+        Results of `trust` so far.
+    check, parts : xr.Dataset
+        From `check_record` and `split_prediction`.
+    calibrated : xr.Dataset, optional
+        From `posterior_calibration`.
+    attrs : mapping
+        Attributes of the posterior.
+    """
+    share = f"{found.attrs['probability']:.3g}"
+    reasons = []
+    if not check.attrs["passed"]:
+        reasons.append(
+            f"the record is unlike those that the posterior predicts (p = {_p(float(check.overall_p_value))})"
+        )
+    if not parts.attrs["passed"]:
+        reasons.append(_worst_part(parts))
+    if calibrated is not None and calibrated.attrs["conclusion"] == "not calibrated":
+        reasons.append("intervals do not hold for records like this one, so that sampler or likelihood is at fault")
+    if not attrs.get("converged", 1):
+        reasons.append("the ensembles have not converged")
+    if reasons:
+        return NOT, f"Do not rely on the band, because {'; '.join(reasons)}."
+    if "band in_gap" in found.quantity and str(found.set_by.sel(quantity="band in_gap").values) == "prior":
+        return PRIOR, (
+            f"The band of probability {share} holds beside the gap, as far as this record shows, but in the gap it is "
+            "set by the prior: it is as right as the prior is there."
+        )
+    return HOLDS, f"The band of probability {share} holds, as far as this record shows."
+
+
+def _worst_part(parts: xr.Dataset) -> str:
+    worst = parts.isel(part=int(np.argmin(parts["p_value"].values)))
+    name, deviations = str(worst["part"].values), float(worst["sd"])
+    if name == "noise":
+        return f"the noise is not as stated ({deviations:.1f} standard deviations)"
+    moves = worst["moves"]
+    by_size = sorted(zip(parts["parameter"].values, moves.values, strict=True), key=lambda each: -abs(each[1]))
+    named = [f"{parameter} by {move:+.1f}" for parameter, move in by_size[:2] if abs(move) > _LARGEST]
+    further = f", where the rest moves {' and '.join(named)} standard deviations" if named else ""
+    return (
+        f"the parts of the record contradict one another: the {name} alone predicts the rest wrongly by "
+        f"{deviations:.1f} standard deviations (p = {_p(float(parts['overall_p_value']))} for all parts){further}"
+    )
+
+
+def sentences(
+    found: xr.Dataset, parts: xr.Dataset, calibrated: xr.Dataset | None, mute: Collection[str] = ()
+) -> list[str]:
+    """Return sentences on parts, prior, assumptions, calibration and sampling; `mute` parameters are not named."""
+    said = [_of_parts(parts), *_of_prior(found, mute), *_of_assumptions(found)]
+    if calibrated is not None:
+        said.append(f"For objects and rigs like this one: {_lower(str(calibrated.attrs['verdict']))}")
+        for region, name in (("in_gap", "in the gap"), ("beside", "beside the gap")):
+            of_region = calibrated.sel(region=region)
+            if int(of_region["corrected"]):
+                said.append(
+                    f"Corrected: the band {name} is too narrow here, and its half widths are multiplied by "
+                    f"{float(of_region['factor']):.2f}."
+                )
+    largest = float(np.nanmax(found["share"].values))
+    enough = f"{int(found['draws'])} draws, {float(found['effective_draws']):.0f} effective ones at its ends"
+    if largest > WANTED_SHARE:
+        enough += f"; for a tenth, draw {int(found['draws_needed'])}"
+    return [*said, f"The sampling error of the ends of the band is at most {largest:.1%} of its width ({enough})."]
+
+
+def _of_parts(parts: xr.Dataset) -> str:
+    named = ", ".join(
+        f"{name} {sd:.1f}" for name, sd in zip(parts["part"].values, parts["sd"].values, strict=True) if name != "noise"
+    )
+    agree = "agree" if parts.attrs["passed"] else "disagree"
+    return (
+        f"The parts of the record {agree} (p = {_p(float(parts['overall_p_value']))}, of {parts.attrs['records']} "
+        f"predicted records): what each alone says of the rest is off by, in standard deviations, {named}."
+    )
+
+
+def _of_prior(found: xr.Dataset, mute: Collection[str]) -> list[str]:
+    said = []
+    for quantity, name in (("band in_gap", "in the gap"), ("band beside", "beside the gap")):
+        if quantity in found.quantity:
+            row = found.sel(quantity=quantity)
+            which = ""
+            if str(row["set_by"].values) != "record":
+                of_contour, of_rig = (float(row["sensitivity"].sel(component=c)) for c in ("contour", "rig"))
+                which = f", that of the {'contour' if of_contour >= of_rig else 'rig'}"
+            said.append(f"The band {name} {_SETS[str(row['set_by'].values)]}{which}.")
+    by_prior = [
+        str(name)
+        for name, by in zip(found["quantity"].values, found["set_by"].values, strict=True)
+        if by == "prior" and not str(name).startswith("band ") and name not in mute
+    ]
+    if by_prior:
+        said.append(f"Set by the prior: {', '.join(by_prior)}.")
+    return said
+
+
+def _of_assumptions(found: xr.Dataset) -> list[str]:
+    if "assumption" not in found.dims:
+        return []
+    left = found.isel(assumption=np.flatnonzero(found["fits"].values))
+    count = found.sizes["assumption"]
+    if not left.sizes["assumption"]:
+        return [f"The record rejects all of the {count} other assumptions that were tried."]
+    said = [f"Of {count} other assumptions, the record does not reject {left.sizes['assumption']}."]
+    for region, where in (("in_gap", "in the gap"), ("beside", "beside it")):
+        moved = left[f"moved_{region}"].values
+        if np.isfinite(moved).any():
+            k = int(np.nanargmax(moved))
+            name = str(left["assumption"].values[k])
+            said.append(f"Most of all, “{name}” moves the median of the band {where}: by {moved[k]:.2f} of its width.")
+    return said
+
+
+def _p(value: float) -> str:
+    return f"{value:.2g}"
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,127 @@
+"""The command `trust`: whether the band of a run holds for its record, and what it rests on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactile_bayes.cli.answer import Answer, columns_of, table_of
+from tactile_bayes.cli.command import Output, Seed
+from tactile_bayes.cli.interrupts import resumable
+from tactile_bayes.cli.task_bar import step_bar
+from tactile_bayes.cli.worker_options import WorkerOptions
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from rich.table import Table
+
+    from tactile_bayes.tasks import TaskProgress
+
+__all__ = ["trust"]
+
+
+def trust(
+    *,
+    run: Annotated[Path, typer.Argument(help="Folder of a run of infer.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the results; the run's own if left out, for its report.", file_okay=False),
+    ] = None,
+    replicates: Annotated[
+        int,
+        typer.Option(
+            help="Number of truths like this one that are simulated and inferred again; 0 leaves this out.", min=0
+        ),
+    ] = 100,
+    assumptions: Annotated[
+        bool,
+        typer.Option(
+            "--assumptions/--no-assumptions",
+            help="Compute the band again with each nuisance added or fixed, and with each other shape.",
+        ),
+    ] = True,
+    probability: Annotated[
+        float | None, typer.Option(help="Probability of the band; that of the run if left out.")
+    ] = None,
+    work: WorkerOptions,
+    seed: Seed = 1,
+    output: Output,
+) -> Answer:
+    """Judge whether the band of a run holds for its record, and what it rests on: record, prior, sampling."""
+    from tactile_bayes.runs.trust import REPLICATES_FOLDER, trust_into
+
+    def have() -> str:
+        return f"replicates so far are in {(out or run) / REPLICATES_FOLDER}"
+
+    with resumable(have) as raise_lost, step_bar(output.is_silent, "posterior", has_rate=True) as show:
+
+        def note(done: TaskProgress) -> None:
+            show(done.done, done.wanted)
+            raise_lost()
+
+        made = trust_into(
+            run,
+            out,
+            replicates=replicates,
+            assumptions=assumptions,
+            probability=probability,
+            seed=seed,
+            progress=note,
+            **vars(work),
+        )
+    found = made.result
+    words = [found.attrs["summary"], *found.attrs["words"].splitlines()]
+    names = ("conclusion", "probability", "calibration")
+    return Answer(
+        [words[0], "", *words[1:], "", _table(found), "", *_assumptions(found), made.files],
+        lambda: {
+            "words": words,
+            **{name: found.attrs[name] for name in names},
+            "split_p_value": float(found["split_p_value"]),
+            "check_p_value": float(found["check_p_value"]),
+            "parts": columns_of(found, "part"),
+            "quantities": columns_of(found, "quantity"),
+            "claims": columns_of(found, "claim") if "claim" in found.dims else [],
+            "regions": columns_of(found, "region") if "region" in found.dims else [],
+            "assumptions": columns_of(found, "assumption") if "assumption" in found.dims else [],
+            "draws_needed": int(found["draws_needed"]),
+            "files": made.files,
+        },
+    )
+
+
+def _table(found: xr.Dataset) -> Table:
+    """Return the sensitivities of parameters and bands."""
+    rows = [
+        (str(name), *(f"{value:.3f}" for value in row), str(by))
+        for name, row, by in zip(
+            found["quantity"].values, found["sensitivity"].values, found["set_by"].values, strict=True
+        )
+    ]
+    heads = ["sensitivity of", *(f"to {_NAMES[str(name)]}" for name in found["component"].values), "set by"]
+    return table_of(heads, rows, left=["sensitivity of", "set by"])
+
+
+def _assumptions(found: xr.Dataset) -> list[Table | str]:
+    """Return how far the median of the band moves under other assumptions."""
+    if "assumption" not in found.dims:
+        return []
+    rows = [
+        (row["assumption"], *(_moved(row[f"moved_{region}"]) for region in ("in_gap", "beside")), _yes(row["fits"]))
+        for row in columns_of(found, "assumption")
+    ]
+    heads = ["assumption instead", "moves in the gap", "beside it [band widths]", "fits"]
+    return [table_of(heads, rows, left=["assumption instead", "fits"]), ""]
+
+
+def _moved(value: float) -> str:
+    return "–" if value != value else f"{value:.2f}"
+
+
+def _yes(value: int) -> str:
+    return "yes" if value else "no"
+
+
+_NAMES = {"contour": "the contour's prior", "rig": "the rig's prior", "likelihood": "the record"}

@@ -1,0 +1,53 @@
+"""The trust in a run, in its folder."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from tactile_bayes import plotting
+from tactile_bayes.assessment.trust import trust
+from tactile_bayes.runs.folder import Folder, Run, posterior_in
+
+__all__ = ["REPLICATES_FOLDER", "trust_into"]
+
+REPLICATES_FOLDER = "trust"
+"""Subfolder of the replicates, from which a stopped run resumes."""
+
+
+def trust_into(
+    run: str | os.PathLike[str], out: str | os.PathLike[str] | None = None, **options: Any
+) -> Run[xr.Dataset]:
+    """Judge the posterior of a run, and write the result.
+
+    Parameters
+    ----------
+    run : path-like
+        Folder that `tactile-bayes infer` has written.
+    out : path-like, optional
+        Folder for trust.nc, trust.txt, assumptions.png (if asked for) and the subfolder trust; by default that of the
+        run, whose report then states it.
+    options
+        Options of `trust`.
+
+    Returns
+    -------
+    Run
+        The result of `trust`, and the files.
+
+    Raises
+    ------
+    InferenceError, ParameterError, CalibrationError, TaskError
+        As in `trust`.
+    """
+    path = posterior_in(Path(run))
+    folder = Folder(path.parent if out is None else out)
+    found = trust(path, out=folder.path / REPLICATES_FOLDER, **options)
+    folder.write_netcdf("trust", "trust.nc", found)
+    folder.write_lines("words", "trust.txt", (found.attrs["summary"], "", *found.attrs["words"].splitlines()))
+    if "assumption" in found.dims:
+        folder.draw("figure", "assumptions.png", plotting.assumptions, found)
+    return Run(found, folder.files)

@@ -1,0 +1,101 @@
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+import tactile_bayes as tb
+from helpers.contour_posteriors import CELL, SOUND, infer_as_stated, measured, posterior, swept
+from tactile_bayes.assessment.trust import draws_digest, trust
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.result import write_result
+
+
+@cache
+def right():
+    return trust(posterior(), replicates=0, assumptions=False)
+
+
+def test_a_record_of_the_model_holds_and_says_so():
+    found = right()
+    assert found.attrs["conclusion"] == "holds"
+    assert found.attrs["summary"].startswith("The band of probability 0.95 holds")
+    words = found.attrs["words"].splitlines()
+    assert words[0].startswith("The parts of the record agree (p = ")
+    assert words[1:3] == ["The band in the gap is set by the record.", "The band beside the gap is set by the record."]
+    assert "% of its width (" in words[-1]
+    assert found.attrs["draws_sha256"] == draws_digest(posterior())
+    band = tb.contour_band(posterior(), found.x.values)
+    assert found["lower"].equals(band["lower"].drop_attrs(deep=False)) or np.allclose(found["lower"], band["lower"])
+
+
+def test_a_wrong_family_is_not_to_be_relied_on():
+    record = CELL.measure(swept(tb.contours.paper_profile("IV", q=0.5)), seed=2)
+    found = trust(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND), replicates=0, assumptions=False)
+    assert found.attrs["conclusion"] == "do not rely on it"
+    assert found.attrs["summary"].startswith("Do not rely on the band, because ")
+    assert "the parts of the record contradict one another" in found.attrs["summary"]
+
+
+def test_a_narrow_prior_of_the_vertex_sets_the_gap():
+    deviation = float(posterior()["posterior"]["q"].std())
+    priors = {"q": stats.norm(0.5, 0.2 * deviation)}
+    tree = infer_as_stated(measured(), load_cell=CELL, priors=priors, seed=1, settings=SOUND)
+    found = trust(tree, replicates=0, assumptions=False, priors=priors)
+    assert found.attrs["conclusion"] == "holds, but the prior sets the gap"
+    assert "The band in the gap is set by the prior, that of the contour." in found.attrs["words"]
+    *_, said, _ = tb.verdicts(tree, trust=found)  # the last one names q, of which the record adds little
+    assert said.startswith("The band of probability 0.95 holds beside the gap")
+
+
+def test_replicates_give_ranks_coverage_and_factors():
+    found = trust(posterior(), replicates=2, assumptions=False, workers=1)
+    assert found.attrs["calibration"] == "too few"
+    assert {"rank_p_value", "coverage", "factor", "corrected"} <= set(found.data_vars)
+    assert "corrected_lower" not in found
+
+
+def test_verdicts_use_it():
+    found = right()
+    assert tb.verdicts(posterior(), trust=found) == tb.verdicts(posterior())
+    against = found.assign_attrs(conclusion="do not rely on it", summary="Do not rely on the band, because of this.")
+    assert tb.verdicts(posterior(), trust=against)[0] == "Do not rely on the band, because of this."
+
+
+def test_a_band_is_corrected_about_its_median_where_it_is_too_narrow():
+    from tactile_bayes.assessment.trust import _corrected
+
+    x = np.linspace(-1.0, 1.0, 5)
+    found = xr.Dataset(
+        {
+            "lower": ("x", np.full(5, -1.0)),
+            "median": ("x", np.zeros(5)),
+            "upper": ("x", np.full(5, 2.0)),
+            "factor": ("region", [1.5, 3.0]),
+            "corrected": ("region", [1, 0]),
+        },
+        coords={"x": x, "region": ["in_gap", "beside"]},
+    )
+    wider = _corrected(found, np.array([-0.6, 0.6]))
+    assert wider["corrected_lower"].values.tolist() == [-1.0, -1.5, -1.5, -1.5, -1.0]
+    assert wider["corrected_upper"].values.tolist() == [2.0, 3.0, 3.0, 3.0, 2.0]
+    assert _corrected(found.assign(corrected=("region", [0, 0])), x) == {}
+
+
+def test_a_run_and_its_file_are_taken_and_other_things_refused(tmp_path):
+    write_result(posterior(), tmp_path / "posterior.nc")
+    assert trust(tmp_path, replicates=0, assumptions=False).equals(right())
+    with pytest.raises(InferenceError, match="there is no file"):
+        trust(str(tmp_path / "nothing"))
+    with pytest.raises(ParameterError, match="this is int"):
+        trust(3)
+    with pytest.raises(ParameterError, match="replicates"):
+        trust(posterior(), replicates=-1)
+
+
+def test_a_posterior_of_contacts_alone_is_refused():
+    tree = posterior().copy()
+    tree.attrs = {**tree.attrs, "events": 0}
+    with pytest.raises(InferenceError, match="events=False"):
+        trust(tree)

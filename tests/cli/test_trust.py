@@ -1,0 +1,65 @@
+"""The command trust, and what the report says of it."""
+
+import json
+from functools import partial
+
+import pytest
+
+from helpers import commands
+from helpers.contour_posteriors import posterior
+from helpers.report_pages import Page
+from tactile_bayes.inference.result import write_result
+from tactile_bayes.runs.contour import _OF_FORMER
+
+call = partial(commands.call, "trust")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("trust") / "run"
+    folder.mkdir()
+    write_result(posterior(), folder / "posterior.nc")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def written(folder):
+    return call(folder, "--replicates", 1, "--no-assumptions", "--workers", 1, "--json")
+
+
+def test_it_prints_one_object_and_writes_into_the_run(folder, written):
+    assert written.exit_code == 0, written.output
+    said = json.loads(written.stdout)
+    assert said["conclusion"] == "holds"
+    assert said["words"][0] == "The band of probability 0.95 holds, as far as this record shows."
+    assert said["parts"][0]["part"] == "sweep 1"
+    assert {claim["claim"] for claim in said["claims"]} >= {"pointwise_in_gap", "contact_region"}
+    assert said["files"] == {"trust": str(folder / "trust.nc"), "words": str(folder / "trust.txt")}
+    assert (folder / "trust.txt").read_text(encoding="utf-8").splitlines()[0] == said["words"][0]
+    assert {name for name in _OF_FORMER if (folder / name).exists()} == {
+        "trust.nc",
+        "trust.txt",
+        "trust/replicates.json",
+    }
+
+
+@pytest.mark.usefixtures("written")
+def test_the_report_states_it(folder):
+    assert commands.call("report", folder).exit_code == 0
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    assert "Does the band hold for this record?" in page.texts["h3"]
+    assert "The band of probability 0.95 holds, as far as this record shows." in page.texts["p"]
+    assert any(caption.startswith("What each part") for caption in page.texts["caption"])
+
+
+@pytest.mark.usefixtures("written")
+def test_the_report_refuses_that_of_another_posterior(folder, tmp_path):
+    tree = posterior().copy()
+    tree["posterior"] = tree["posterior"].to_dataset() * 1.0000001
+    write_result(tree, tmp_path / "posterior.nc")
+    (tmp_path / "trust.nc").write_bytes((folder / "trust.nc").read_bytes())
+    commands.assert_refused(commands.call("report", tmp_path), "is of another posterior")
+
+
+def test_a_folder_without_a_posterior_is_refused(tmp_path):
+    commands.assert_refused(call(tmp_path), "holds no posterior.nc")
