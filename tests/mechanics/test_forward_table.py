@@ -86,6 +86,19 @@ def test_poses_of_a_rod(rod, sign):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_poses_of_a_rod_with_a_bend_need_a_fine_table(sign):
+    profile = profile_of(lambda s: 1.5 + 1.5 * np.tanh((s - 0.65) / 0.2))._replace(sign=sign)
+    box = Box((0.0, 0.0), (0.0, 0.0), (0.0, 0.5))
+    assert tabulated(profile, box) is NO_TABLE
+    table = tabulated(profile, box, fine=True)
+    compared(profile, table, 0.3)
+    far = np.array([[-0.7, 1.0, 1.0], [2.5, 1.0, 1.0], [0.2, 1.0, 21.0]]).T
+    held, found = poses(profile, table, 0.0, *far, True)
+    assert held
+    np.testing.assert_array_equal(found, poses(profile, NO_TABLE, 0.0, *far, True)[1])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_poses_of_rods_between_nodes_and_at_the_ends_of_ranges(sign):
     profile = profile_of(lambda s: 0.5 - s, 1.0, 0.5)
     table = tabulated(profile, Box((0.35, 0.65), (-0.2, 0.2), (0.0, 0.5)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -282,8 +283,8 @@ class RecordLikelihood:
             return NO_TABLE
         varied = bool(np.any(rig.taper)), bool(np.any(rig.rest_curvature)), bool(np.any(rig.friction != self.friction))
         if varied not in self._tables:
-            for width in _TAPERS if varied[0] else (0.0,):
-                self._tables[varied] = forward_table(profile, self._box(width, *varied[1:]))
+            for fine, width in product((False, True), _TAPERS if varied[0] else (0.0,)):
+                self._tables[varied] = forward_table(profile, self._box(width, *varied[1:]), fine)
                 if self._tables[varied] is not NO_TABLE:
                     break
         return self._tables[varied]

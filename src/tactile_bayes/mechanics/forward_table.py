@@ -31,13 +31,16 @@ from tactile_bayes.numerics import chebyshev
 
 __all__ = ["NO_TABLE", "Box", "ForwardTable", "RestChord", "chord_in", "forward_table", "pose_in", "prepare", "sheet"]
 
-_ROWS, _TERMS = 16, 24
-"""Terms in ψ1 or s1, and in the force and the distance of the rod at rest."""
+_ROWS, _MOST_ROWS, _TERMS = 16, 26, 24
+"""Terms in ψ1 or s1, also of a fine table, and in the force and the distance of the rod at rest."""
 
 _COLUMNS = 3 * _TERMS
 
-_TANGENTIAL, _BEYOND_TIP, _AT_REST, _POSE = _ROWS, 2 * _ROWS, 3 * _ROWS, 3 * _ROWS + 2
+_TANGENTIAL, _BEYOND_TIP, _AT_REST, _POSE = _MOST_ROWS, 2 * _MOST_ROWS, 3 * _MOST_ROWS, 3 * _MOST_ROWS + 2
 """First rows of a rod's coefficients; those in tip contact come first, and the mirror image has its own at rest."""
+
+_RANGES = _POSE + 3
+"""Row with the number of terms in ψ1 or s1, and the ranges of a table."""
 
 _WORST = 1e-5
 """Largest error of the pose with which a table is of use."""
@@ -53,13 +56,15 @@ _NEGLIGIBLE, _AT_ONSET = 2e-7, 100.0
 _PSI1, _FORCE, _BEYOND = (-1.0, 1.4), 36.0, 0.6
 """Range of ψ1, largest f Λ², and largest Λ beyond the tip, over Λ(1)."""
 
+
 _THRUST = 20.0
 """f Λ² before which sweeps end with a thrust through the pivot; their last series may go on."""
 
+_BELOW, _FINE_PSI1 = 0.1, 2.4
+"""How far ψ1 goes below that of tangential contact in a fine table, and its largest value."""
+
 _SCALE = 10.0
 """f Λ² from which on polynomials are in its logarithm."""
-
-_SPAN = math.log1p(_FORCE / _SCALE)
 
 _ACROSS = 1e-6
 """Cosine of the angle of a chord to the rod that counts as zero."""
@@ -103,6 +108,10 @@ class ForwardTable(NamedTuple):
     """Least and largest taper, bend and friction angle, shape (3, 2)."""
     slenderness: float
     """Λ(1) without the taper."""
+    psi1: tuple[float, float]
+    """Range of ψ1 in tip contact."""
+    span: float
+    """Logarithm of 1 + f Λ²/10 at the largest force."""
 
 
 class RestChord(NamedTuple):
@@ -116,32 +125,40 @@ class RestChord(NamedTuple):
 
 _NONE = Terms(np.zeros((0, 3), dtype=np.intp), np.zeros((2, 0, 0, 0)))
 
-NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 1.0)
+NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 1.0, _PSI1, 1.0)
 """Table without any rod."""
 
 
 def sheet() -> Floats:
     """Return an array for the coefficients of one rod and those of one pose."""
-    return np.zeros((_POSE + 3, _COLUMNS))
+    return np.zeros((_RANGES + 1, _COLUMNS))
 
 
-def forward_table(profile: Profile, box: Box) -> ForwardTable:
-    """Return the table of a profile, or `NO_TABLE` if it would need too many terms."""
-    table = _tabulated(profile, box)
+def forward_table(profile: Profile, box: Box, fine: bool = False) -> ForwardTable:
+    """Return the table of a profile, or `NO_TABLE` if it would need too many terms.
+
+    A fine table has more terms, and smaller ranges of force and ψ1 except that rods curved backward touch at larger
+    ψ1: it holds rods of strong and uneven curvature, and costs more.
+    """
+    table = _tabulated(profile, box, fine)
     return table if _errors(profile, table).max() <= _WORST else NO_TABLE
 
 
-def _tabulated(profile: Profile, box: Box) -> ForwardTable:
+def _tabulated(profile: Profile, box: Box, fine: bool) -> ForwardTable:
     work = workspace()
+    rows, (low, high), most = _ROWS, _PSI1, _FORCE
+    if fine:
+        rows, (low, high), most = _MOST_ROWS, (-box.friction_angle[1] - _BELOW, _FINE_PSI1), _THRUST
+    span = math.log1p(most / _SCALE)
     shares = [chebyshev.nodes(count if high > low else 1) for count, (low, high) in zip(_OUTER, box, strict=True)]
     tapers, bends, deltas = (low + (high - low) * z for z, (low, high) in zip(shares, box, strict=True))
     outer = tapers.size, bends.size, deltas.size
     slenderness = _slenderness(profile)
-    ways, loading = chebyshev.nodes(_ROWS), np.concatenate([[0.0], chebyshev.nodes(_TERMS - 1)])
-    forces = _SCALE * np.expm1(_SPAN * loading)
-    tip, tangential = np.empty((2, *outer[:2], _ROWS, _TERMS, 3)), np.empty((2, *outer, 2, _ROWS, _TERMS, 3))
+    ways, loading = chebyshev.nodes(rows), np.concatenate([[0.0], chebyshev.nodes(_TERMS - 1)])
+    forces = _SCALE * np.expm1(span * loading)
+    tip, tangential = np.empty((2, *outer[:2], rows, _TERMS, 3)), np.empty((2, *outer, 2, rows, _TERMS, 3))
     chord, distances = np.empty((2, outer[1], 3, _TERMS)), chebyshev.nodes(_TERMS)
-    psi1, at_tip = _PSI1[0] + (_PSI1[1] - _PSI1[0]) * ways, np.ones(_ROWS)
+    psi1, at_tip = low + (high - low) * ways, np.ones(rows)
     for (i, sign), (b, bend) in product(enumerate((1.0, -1.0)), enumerate(bends)):
         for a, taper in enumerate(tapers):
             rod = profile._replace(taper=taper, bend=bend, sign=sign)
@@ -159,6 +176,8 @@ def _tabulated(profile: Profile, box: Box) -> ForwardTable:
         _terms(chord[:, None, :, None, None], _AT_ONSET, (-1, distances)),
         np.array(box, dtype=float),
         slenderness,
+        (low, high),
+        span,
     )
 
 
@@ -232,6 +251,8 @@ def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet:
         sheet[_POSE + c, 0], sheet[_POSE + c, 1] = 1.0, x
         for k in range(2, _MOST):
             sheet[_POSE + c, k] = 2.0 * x * sheet[_POSE + c, k - 1] - sheet[_POSE + c, k - 2]
+    sheet[_RANGES, 0], sheet[_RANGES, 3] = table.tip.coefficients.shape[2], table.span
+    sheet[_RANGES, 1], sheet[_RANGES, 2] = table.psi1
     mirrored = 0 if profile.sign > 0.0 else 1
     _contract(table.tip, mirrored, sheet, 0)
     _contract(table.tangential, mirrored, sheet, _TANGENTIAL)
@@ -260,12 +281,13 @@ def pose_in(
 ) -> tuple[bool, Pose, Pose, Pose]:
     """Whether there is a pose; the pose, and its derivatives by ψ1 or the arc length, and by the force."""
     length, rate = _length(slenderness, taper, arclength)
-    scaled = force * length * length
-    z, by_scaled = 2.0 / _SPAN * math.log1p(scaled / _SCALE) - 1.0, 2.0 / (_SPAN * (_SCALE + scaled))
+    scaled, span = force * length * length, sheet[_RANGES, 3]
+    z, by_scaled = 2.0 / span * math.log1p(scaled / _SCALE) - 1.0, 2.0 / (span * (_SCALE + scaled))
     by_force = by_scaled * length * length
     if tip:
-        by_x = 2.0 / (_PSI1[1] - _PSI1[0])
-        x = (psi1 - _PSI1[0]) * by_x - 1.0
+        least, most = sheet[_RANGES, 1], sheet[_RANGES, 2]
+        by_x = 2.0 / (most - least)
+        x = (psi1 - least) * by_x - 1.0
         inside = -1.0 <= x <= 1.0 and z <= 1.0
         here, in_x, in_z = _sums(sheet, 0, x, z)
         return inside, here, _times(by_x, in_x), _times(by_force, in_z)
@@ -298,9 +320,10 @@ def _stretched(factor: float, pose: Pose) -> Pose:
 @compiled
 def _sums(sheet: Floats, row: int, x: float, z: float) -> tuple[Pose, Pose, Pose]:
     """Three polynomials in two variables, and their derivatives."""
+    rows = int(sheet[_RANGES, 0])
     for j in range(_COLUMNS):
-        at, by = sheet[row + _ROWS - 1, j], 0.0
-        for i in range(_ROWS - 2, -1, -1):
+        at, by = sheet[row + rows - 1, j], 0.0
+        for i in range(rows - 2, -1, -1):
             by = by * x + at
             at = at * x + sheet[row + i, j]
         sheet[_POSE, j], sheet[_POSE + 1, j] = at, by
@@ -353,9 +376,9 @@ def _write_errors(
         delta = box[2, 0] + at[k, 2] * (box[2, 1] - box[2, 0])
         sign, tip = (1.0 if at[k, 3] < 0.5 else -1.0), at[k, 4] < 0.5
         rod = Profile(profile.edges, profile.curvature, profile.rigidity, taper, bend, sign)
-        psi1, arclength = (at[k, 5] * (_PSI1[1] + delta) - delta, 1.0) if tip else (-delta, at[k, 5])
+        psi1, arclength = (at[k, 5] * (table.psi1[1] + delta) - delta, 1.0) if tip else (-delta, at[k, 5])
         length = _length(table.slenderness, taper, arclength)[0]
-        force = _SCALE * math.expm1(_SPAN * at[k, 6]) / (length * length)
+        force = _SCALE * math.expm1(table.span * at[k, 6]) / (length * length)
         exact = pose_along(rod, psi1, arclength, force, work)
         prepare(table, rod, delta, sheet)
         _, found, _, _ = pose_in(sheet, table.slenderness, taper, psi1, arclength, force, tip)

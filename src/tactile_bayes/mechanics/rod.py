@@ -206,9 +206,8 @@ class Rod:
     ) -> Rod:
         """Rod whose rest curvature follows from points traced along it while nothing touches it.
 
-        The rest curvature is the polynomial in the arc length that explains the points, with one term more than the
-        least number on which, by the Bayesian information criterion (Schwarz 1978, doi 10.1214/aos/1176344136), the
-        next do not improve strongly.
+        The rest curvature is the posterior mean for a smooth random function of the arc length, an integrated Wiener
+        process; how smooth it is follows from the points (`mechanics.traced`).
 
         Parameters
         ----------

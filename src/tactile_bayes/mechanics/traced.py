@@ -1,10 +1,11 @@
 """Rest curvature of a rod from points traced along it while nothing touches it.
 
-The rest curvature is a Chebyshev series in the arc length. With the pivot and the direction of the base it determines
-the centreline, which is fitted to the points by least squares of their distances from it: the arc length at which a
-point belongs to the rod is that of its foot. The number of terms is one more than the least on which, by the
-Bayesian information criterion, the next do not improve strongly: the standard deviation of the curvature is then that
-of its errors, which were 0.8 to 1.25 standard deviations in drawn rods, and up to three without the further term.
+The prior of the rest curvature is an integrated Wiener process in the arc length, with a vague level and trend: its
+second derivative is white noise, so that the posterior mean is a smoothing spline (Wahba 1978, doi
+10.1111/j.2517-6161.1978.tb01050.x). With the pivot and the direction of the base the curvature determines the
+centreline, from which the points have normally distributed distances; these are linearised at the posterior mean. How
+smooth the curvature is follows from the strength of the noise. It is marginalised, as is the scatter of the points
+unless it is given: the logarithm of their ratio is uniform, from where the noise no longer matters.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Chebyshev
+from numpy.polynomial.legendre import legvander
 from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
@@ -27,13 +29,16 @@ from tactile_bayes.numerics import chebyshev
 __all__ = ["TracedRod", "traced_rod"]
 
 _FEWEST = 8
-"""Least number of points: three for an arc, and five for their scatter."""
+"""Least number of points: four for a linear curvature, and four for their scatter."""
 
-_MOST_TERMS = 9
+_FREE = 4
+"""Unknowns without a prior: the offset of the base and its direction, level and trend of the curvature."""
 
-_STRONG = 10.0
-"""Difference of the Bayesian information criterion that is very strong evidence (Kass and Raftery 1995, doi
-10.1080/01621459.1995.10476572); for less no terms are added, since polynomials of high degree swing at the ends."""
+_TERMS = 20
+"""Terms of the curvature, if there are points enough to estimate their scatter beside so many."""
+
+_STRENGTHS = np.geomspace(0.1, 1e17, 400)
+"""Strengths of the noise over that which moves points by a root mean square of their scatter."""
 
 _NODES = 48
 """Nodes at which slopes of the centreline are interpolated."""
@@ -126,50 +131,29 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None) -> T
         scatter = check_positive("scatter", scatter, "give a positive number, in the unit of x and y, or None")
     points = np.stack(columns, axis=1)
     _refuse_turns(points)
-    start = _start_of(points)
-    scaled = (points - points[0]) / start.length
-    fits = [_fitted(scaled, start, terms) for terms in range(1, min(_MOST_TERMS, points.shape[0] - 6) + 1)]
-    criteria = np.array([fit.criterion for fit in fits])
-    best = _enough(criteria)
-    if fits[best].criterion == math.inf:
-        raise ParameterError(
-            "no smooth rod can be fitted to the points: give those of one rod in order, from the base to the tip"
-        )
-    # One more term, so that the standard deviation holds what is left out.
-    fit = fits[best + 1 if best + 1 < len(fits) and fits[best + 1].criterion < math.inf else best]
-    found = start.length * fit.scatter
-    length = start.length * float(fit.feet[-1])
-    if not found <= _THICKEST * length:
+    fit = _fitted(points, None)
+    found = fit.length * fit.posterior.scatter
+    if not found <= _THICKEST * fit.length:
         raise ParameterError(
             f"the points are off the smoothest rod through them by {found:.3g} (root mean square), and the rod is "
-            f"{length:.3g} long: trace one rod, its points in order"
+            f"{fit.length:.3g} long: trace one rod, its points in order"
         )
-    used = found if scatter is None else scatter
-    _refuse_backward(fit.feet, used / start.length)
-    if scatter is not None and fit.freedom * (found / scatter) ** 2 > chi2.isf(_FALSE_ALARM, fit.freedom):
-        raise ParameterError(
-            f"the points are off a smooth rod by {found:.3g} (root mean square), and their scatter is given as "
-            f"{scatter:.3g}: give a larger one, or None to estimate it"
-        )
-    share = float(fit.feet[-1])
-    terms = fit.curvature.size
-    # From lengths of the first guess to the rod's own, whose ends are known to the scatter along it.
-    nodes = chebyshev.nodes(terms)
-    own = share * chebyshev.coefficients(chebyshev.basis(terms, share * nodes))
-    curvature = own @ fit.curvature
-    value = chebyshev.evaluate(curvature, nodes)
-    rate = chebyshev.evaluate(chebyshev.derivative(curvature), nodes) if terms > 1 else np.zeros(1)
-    ends = chebyshev.coefficients(np.array([(1.0 - nodes) * rate - value, nodes * rate + value])) / share
-    covariance = (used / start.length) ** 2 * (own @ fit.covariance @ own.T + ends @ ends.T)
-    return TracedRod(length, used, curvature, covariance)
-
-
-def _enough(criteria: Floats) -> int:
-    """Index of the first fit on which neither of the next two improves strongly."""
-    for best, criterion in enumerate(criteria):
-        if criterion < math.inf and not np.any(criteria[best + 1 : best + 3] < criterion - _STRONG):
-            return best
-    return 0
+    if scatter is not None:
+        if fit.posterior.probability_below(scatter / fit.length) < _FALSE_ALARM:
+            raise ParameterError(
+                f"the points are off a smooth rod by {found:.3g} (root mean square), and their scatter is given as "
+                f"{scatter:.3g}: give a larger one, or None to estimate it"
+            )
+        fit = _fitted(points, scatter)
+    used = fit.posterior.scatter if scatter is None else scatter / fit.length
+    _refuse_backward(fit.feet, used)
+    # The ends are known to the scatter along the rod.
+    nodes = chebyshev.nodes(fit.curvature.size)
+    value = chebyshev.evaluate(fit.curvature, nodes)
+    rate = chebyshev.evaluate(chebyshev.derivative(fit.curvature), nodes)
+    ends = chebyshev.coefficients(np.array([(1.0 - nodes) * rate - value, nodes * rate + value]))
+    covariance = fit.covariance + used**2 * (ends @ ends.T)
+    return TracedRod(fit.length, fit.length * used if scatter is None else scatter, fit.curvature, covariance)
 
 
 def _refuse_turns(points: Floats) -> None:
@@ -217,35 +201,94 @@ def _start_of(points: Floats) -> _Start:
     return _Start(float(arc[-1]), np.interp(chain, z, arc) / arc[-1], np.interp(even, arc, slopes))
 
 
-class _Fit(NamedTuple):
-    """A rod fitted to points, in lengths of the first guess."""
+class _Posterior(NamedTuple):
+    """Unknowns of a linear model, with the strength of the noise marginalised."""
 
+    mean: Floats
+    covariance: Floats
+    weights: Floats
+    """Posterior probabilities of `_STRENGTHS`."""
+    squares: Floats
+    """Sums of squares that each leaves to the scatter."""
+    freedom: int
+
+    @property
+    def scatter(self) -> float:
+        """Estimated scatter."""
+        return math.sqrt(float(self.weights @ self.squares) / self.freedom)
+
+    def probability_below(self, scatter: float) -> float:
+        """Return the probability that the scatter is smaller than a value, if it was not given."""
+        return float(self.weights @ chi2.sf(self.squares / scatter**2, self.freedom))
+
+
+def _posterior(by: Floats, target: Floats, scatter: float | None) -> _Posterior:
+    """Posterior of a linear model, whose first unknowns are free and whose others are white noise."""
+    count, terms = by.shape[0], by.shape[1] - _FREE
+    freedom = count - _FREE
+    turn, upper = np.linalg.qr(by[:, :_FREE], mode="complete")
+    rotated, data = turn.T @ by[:, _FREE:], turn.T @ target
+    left, sizes, right = np.linalg.svd(rotated[_FREE:])
+    seen = left.T @ data[_FREE:]
+    sizes, along = (np.pad(of[:terms], (0, max(0, terms - freedom))) for of in (sizes, seen))
+    rest = max(float(np.sum(seen[terms:] ** 2)), freedom * _ROUNDING**2)
+    strengths = _STRENGTHS[:, None] / sizes[0]
+    variances = 1.0 + (strengths * sizes) ** 2
+    squares = rest + np.sum(along**2 / variances, axis=1)
+    fit = freedom * np.log(squares) if scatter is None else squares / scatter**2
+    evidence = -0.5 * (fit + np.log(variances).sum(axis=1))
+    weights = np.exp(evidence - evidence.max())
+    weights /= weights.sum()
+    variance = squares / (freedom - 2) if scatter is None else np.full_like(squares, scatter**2)
+    means = strengths**2 * sizes / variances * along
+    mean = weights @ means
+    inner = (weights[:, None] * (means - mean)).T @ (means - mean)
+    inner += np.diag((weights * variance) @ (strengths**2 / variances))
+    inverse = np.linalg.inv(upper[:_FREE])
+    onto = np.concatenate([-inverse @ rotated[:_FREE], np.eye(terms)]) @ right.T
+    free = np.concatenate([inverse, np.zeros((terms, _FREE))])
+    covariance = onto @ inner @ onto.T + weights @ variance * (free @ free.T)
+    return _Posterior(free @ data[:_FREE] + onto @ mean, covariance, weights, squares, freedom)
+
+
+def _smooth(terms: int) -> Floats:
+    """Chebyshev coefficients of the level, the trend, and the double integrals of orthonormal polynomials."""
+    nodes = chebyshev.nodes(terms - 2)
+    white = legvander(2.0 * nodes - 1.0, terms - 3) * np.sqrt(2.0 * np.arange(terms - 2) + 1.0)
+    rough = chebyshev.integral(chebyshev.integral(chebyshev.coefficients(white.T)))
+    return np.concatenate([np.eye(terms)[:, :2], rough], axis=1)
+
+
+class _Fit(NamedTuple):
+    """A rod fitted to points, in its own lengths."""
+
+    length: float
+    feet: Floats
     curvature: Floats
     covariance: Floats
-    """Covariance of its coefficients for a scatter of one."""
-    feet: Floats
-    scatter: float
-    freedom: int
-    criterion: float
-    """Bayesian information criterion; infinite if the fit did not converge."""
+    posterior: _Posterior
 
 
-def _fitted(points: Floats, start: _Start, terms: int) -> _Fit:
+def _fitted(given: Floats, scatter: float | None) -> _Fit:
     """Gauss–Newton steps for the offset of the base from the first point, its direction, and the curvature."""
-    guess = Chebyshev.fit(np.linspace(0.0, 1.0, start.slopes.size), start.slopes, terms, domain=[0.0, 1.0])
-    unknown = np.concatenate([[0.0, guess(0.0)], guess.deriv().coef])
-    feet = start.feet
-    turns = chebyshev.integral(np.eye(terms))
+    start = _start_of(given)
+    length, feet = start.length, start.feet
+    terms = min(_TERMS, given.shape[0] - _FREE) if scatter is None else _TERMS
+    smooth, nodes = _smooth(terms), chebyshev.nodes(terms)
+    guess = Chebyshev.fit(np.linspace(0.0, 1.0, start.slopes.size), start.slopes, _FREE, domain=[0.0, 1.0])
+    offset, base, curvature = 0.0, float(guess(0.0)), np.zeros(terms)
+    curvature[:_FREE] = guess.deriv().coef
+    turns = chebyshev.integral(smooth)
     at_nodes = chebyshev.polynomials(terms + 1, chebyshev.nodes(_NODES)) @ turns
     for _ in range(_MOST_STEPS):
-        offset, base, curvature = unknown[0], unknown[1], unknown[2:]
-        slope = base + at_nodes @ curvature
+        before = np.concatenate([[offset, base], np.linalg.solve(smooth, curvature)])
+        slope = base + at_nodes @ before[2:]
         cos, sin = np.cos(slope), np.sin(slope)
         kinds = np.concatenate([[cos, sin], -sin * at_nodes.T, cos * at_nodes.T])
         ways = chebyshev.polynomials(_NODES + 1, feet) @ chebyshev.integral(chebyshev.coefficients(kinds))
-        slope = base + chebyshev.polynomials(terms + 1, feet) @ turns @ curvature
+        slope = base + chebyshev.polynomials(terms + 1, feet) @ turns @ before[2:]
         cos, sin = np.cos(slope), np.sin(slope)
-        away = points - ways[:, :2] - offset * np.array([-np.sin(base), np.cos(base)])
+        away = (given - given[0]) / length - ways[:, :2] - offset * np.array([-np.sin(base), np.cos(base)])
         ahead, aside = away[:, 0] * cos + away[:, 1] * sin, away[:, 1] * cos - away[:, 0] * sin
         by = np.column_stack(
             [
@@ -254,20 +297,18 @@ def _fitted(points: Floats, start: _Start, terms: int) -> _Fit:
                 ways[:, 2 + terms :] * cos[:, None] - ways[:, 2 : 2 + terms] * sin[:, None],
             ]
         )
-        step = np.linalg.lstsq(by, aside)[0]
-        unknown = unknown + step
-        feet = np.clip(feet + ahead, -0.5, 1.5)
+        found = _posterior(by, aside + by @ before, None if scatter is None else scatter / length)
+        step = found.mean - before
+        step[2:], feet = smooth @ step[2:], np.clip(feet + ahead, -0.5, 1.5)
         settled = bool(max(np.abs(step).max(), np.abs(ahead).max()) < _SETTLED)
-        if settled or not np.abs(unknown).max() < _WILD:
+        # From lengths of the last guess to those of this one.
+        share = float(feet[-1])
+        feet, length, offset, base = feet / share, length * share, (offset + step[0]) / share, base + step[1]
+        curvature = share * chebyshev.coefficients(chebyshev.evaluate(curvature + step[2:], share * nodes))
+        if settled:
+            return _Fit(length, feet - feet[0], curvature, smooth @ found.covariance[2:, 2:] @ smooth.T, found)
+        if not np.abs(curvature).max() < _WILD:
             break
-    inverse = np.linalg.pinv(by)
-    count, square = points.shape[0], float(np.sum(aside**2))
-    freedom = count - unknown.size
-    return _Fit(
-        unknown[2:],
-        (inverse @ inverse.T)[2:, 2:],
-        feet - feet[0],
-        math.sqrt(square / freedom),
-        freedom,
-        count * math.log(square / count + _ROUNDING**2) + unknown.size * math.log(count) if settled else math.inf,
+    raise ParameterError(
+        "no smooth rod can be fitted to the points: give those of one rod in order, from the base to the tip"
     )

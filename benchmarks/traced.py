@@ -1,0 +1,96 @@
+"""Prints how often the rest curvature of a drawn rod lies in the interval of 90 % that points along it imply.
+
+Rods of nine kinds, from straight to sharply bent, are traced with 8 to 80 points, whose scatter is a 10,000th to a
+200th of the length, and estimated or given. Columns: at eleven places, at both ends, in the mean; root mean square of
+the errors over the standard deviations.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+from scipy.integrate import cumulative_simpson
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.traced import traced_rod
+
+PLACES, FINE = np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 2001)
+POINTS, SCATTERS = (8, 12, 30, 80), (1e-4, 1e-3, 5e-3)
+QUANTILE = 1.645
+
+Curvature = Callable[[Floats], Floats]
+
+
+def waves(rng: np.random.Generator, length: float) -> Curvature:
+    """Draw a random function with a correlation length."""
+    rates, phases = rng.normal(0.0, 1.0 / length, 40), rng.uniform(0.0, 2.0 * np.pi, 40)
+    size = rng.uniform(0.3, 2.0) * np.sqrt(2.0 / 40.0)
+    return lambda s: np.asarray(size * np.cos(np.multiply.outer(s, rates) + phases).sum(axis=-1))
+
+
+def polynomial(rng: np.random.Generator, *sizes: float) -> Curvature:
+    powers = rng.normal(0.0, sizes)
+    return lambda s: np.asarray(np.polynomial.polynomial.polyval(s - 0.5, powers))
+
+
+def bend(rng: np.random.Generator) -> Curvature:
+    where, size = rng.uniform(0.5, 0.8), rng.uniform(1.0, 3.0)
+    return lambda s: 0.5 * size * (1.0 + np.tanh((s - where) / 0.1))
+
+
+def wavy(rng: np.random.Generator) -> Curvature:
+    phase = rng.uniform(0.0, 2.0 * np.pi)
+    return lambda s: 2.0 * np.cos(5.0 * s + phase)
+
+
+KINDS: dict[str, Callable[[np.random.Generator], Curvature]] = {
+    "straight": lambda rng: polynomial(rng, 0.0),
+    "arc": lambda rng: polynomial(rng, 1.0),
+    "linear": lambda rng: polynomial(rng, 1.0, 2.0),
+    "quadratic": lambda rng: polynomial(rng, 1.0, 2.0, 4.0),
+    "wavy": wavy,
+    "bent within a fifth": bend,
+    **{f"smooth over {length}": lambda rng, length=length: waves(rng, length) for length in (0.2, 0.5, 1.0)},
+}
+
+
+def main(rods: int = 12) -> None:
+    print(f"{len(POINTS) * len(SCATTERS) * rods} rods of each kind; scatter estimated, and given\n")
+    every: dict[bool, list[Floats]] = {False: [], True: []}
+    for number, (name, draw) in enumerate(KINDS.items()):
+        for is_given in every:
+            errors, refused = [], 0
+            for count, scatter, k in product(POINTS, SCATTERS, range(rods)):
+                rng = np.random.default_rng([number, count, round(1e6 * scatter), k])
+                curvature = draw(rng)
+                turn = cumulative_simpson(curvature(FINE), x=FINE, initial=0.0)
+                x, y = (cumulative_simpson(way, x=FINE, initial=0.0) for way in (np.cos(turn), np.sin(turn)))
+                x, y = (
+                    np.interp(np.linspace(0.0, 1.0, count), FINE, v) + rng.normal(0.0, scatter, count) for v in (x, y)
+                )
+                try:
+                    rod = traced_rod(x, y, scatter=scatter if is_given else None)
+                except ParameterError:
+                    refused += 1
+                    continue
+                off = cumulative_simpson(rod.rest_curvature(FINE), x=FINE)[-1] - turn[-1]
+                at_places = (rod.rest_curvature(PLACES) - curvature(PLACES)) / rod.deviation(PLACES)
+                errors.append(np.append(at_places, off / rod.deviation_of_mean))
+            every[is_given] += errors
+            print(row(name if not is_given else "", errors) + (f"  {refused} refused" if refused else ""), flush=True)
+    for errors in every.values():
+        print(row("all", errors))
+
+
+def row(name: str, errors: list[Floats]) -> str:
+    z = np.array(errors)
+    shares = [np.mean(np.abs(part) < QUANTILE) for part in (z[:, :-1], z[:, [0, -2]], z[:, -1])]
+    return f"{name:<22}" + "".join(f"{share:>8.0%}" for share in shares) + f"{np.sqrt(np.mean(z**2)):>8.2f}"
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
