@@ -109,7 +109,9 @@ def _whitened(
 ) -> Walk:
     """Return the start in nearly standard normal coordinates, with no more walkers than span them."""
     by_contacts = contact_fit(model)
-    noise = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
+    of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
+    smooth = [float(model.priors[name].median()) for name in model.noise.of_discrepancy]  # type: ignore[attr-defined]
+    noise = np.append(of_white, smooth)
     whitening = None
     if by_contacts is not None:
         rig = [float(model.priors[name].median()) for name in model.nuisances.names]  # type: ignore[attr-defined]
@@ -142,7 +144,11 @@ def _whitened_around(
     """Return the start around a centre, in whitening coordinates."""
     log_probability = in_coordinates(model.log_probability, whitening)
     spread = np.full(centre.size, _WHITENED_SPREAD)
-    spread[: whitening.bent] = [_ROUGHNESS_SPREAD] * 2 + [_NOISE_SPREAD] * len(model.noise.names)
+    spread[: whitening.bent] = (
+        [_ROUGHNESS_SPREAD] * 2
+        + [_NOISE_SPREAD] * len(model.noise.of_white)
+        + [_ROUGHNESS_SPREAD] * len(model.noise.of_discrepancy)
+    )
     cloud = gather(log_probability, centre, np.diag(np.square(spread)), rng, deadline)
     if not cloud.is_possible:
         raise InferenceError("nothing near is possible")

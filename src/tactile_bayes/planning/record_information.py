@@ -135,7 +135,7 @@ def record_information(
     every = np.zeros((*white.shape[:2], point.size))
     every[..., : len(model.forward_parameters)] = white
     of_noise = np.zeros(point.size)
-    for name, scaled in zip(model.noise.names, model.noise.channels, strict=True):
+    for name, scaled in zip(model.noise.of_white, model.noise.channels, strict=True):
         count = len(loads) * sum(present[CHANNELS.index(c)] for c in scaled)
         share = 1.0 if math.isinf(nu) else nu / (nu + 3.0)
         i = model.names.index(name)

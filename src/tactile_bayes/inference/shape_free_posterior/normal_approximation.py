@@ -62,6 +62,11 @@ def linear_names(model: ContourModel) -> tuple[str, ...]:
     return (*rough, *sorted(model.nuisances.names, key=MAY_VANISH.__contains__))
 
 
+def _white_scales(model: ContourModel) -> slice:
+    """Return the place of the white noise among the scales."""
+    return slice(len(_OF_ROUGHNESS), len(_OF_ROUGHNESS) + len(model.noise.of_white))
+
+
 def split(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
     """Return scales (amplitude, length scale, noise), (n, scales), and linear parameters, (n, d), of points."""
     values = model.values(points)
@@ -155,6 +160,7 @@ class NormalApproximation:
         self.prior, self.model = prior, observer.model
         family = observer.model.family
         assert isinstance(family, ShapeFreeFamily)
+        self._white = _white_scales(observer.model)
         known, self._count = family.radius.directions, family.radius.count
         self.vanishing = int(np.count_nonzero(observer.model.may_vanish))
         slopes, self._observed, self._kinds, self._readings = _linearised(observer, family, prior, scales, linear)
@@ -175,7 +181,7 @@ class NormalApproximation:
         """Return L⁻¹b, (n, d), and L, (n, d, d), given scales (n, scales): precision L·Lᵀ and mean L⁻ᵀL⁻¹b."""
         at = np.clip(np.log(scales[:, 1]), self._through.x[0], self._through.x[-1])
         # One over the noise of the observations; that of the snap-offs is known.
-        certainty = np.hstack([1.0 / scales[:, 2:], np.ones((len(scales), 1))])[:, self._kinds]
+        certainty = np.hstack([1.0 / scales[:, self._white], np.ones((len(scales), 1))])[:, self._kinds]
         through = self._through(at) * certainty[:, None, :]
         through[:, 1 : 1 + self._count] *= scales[:, :1, None]
         precision = through @ np.swapaxes(through, 1, 2)
@@ -229,8 +235,9 @@ class NormalApproximation:
     def log_evidence(self, scales: Floats) -> float:
         """Return the log-density of readings and snap-offs given scales of shape (scales,), up to a constant."""
         pulled, root = (of_one[0] for of_one in self.conditional(scales[None]))
-        certainty = np.append(1.0 / scales[2:], 1.0)[self._kinds]
-        volume = np.sum(self._readings * np.log(scales[2:])) + np.log(np.diag(root)).sum()
+        noise = scales[self._white]
+        certainty = np.append(1.0 / noise, 1.0)[self._kinds]
+        volume = np.sum(self._readings * np.log(noise)) + np.log(np.diag(root)).sum()
         return float(0.5 * (pulled @ pulled - np.sum(np.square(certainty * self._observed))) - volume)
 
 
@@ -261,7 +268,7 @@ def _linearised(
     # A sample that is loaded on one side of a difference only has no slope.
     smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
     observed, counts = [], []
-    for channels, scale in zip(model.noise.channels, scales[2:], strict=True):
+    for channels, scale in zip(model.noise.channels, scales[_white_scales(model)], strict=True):
         chosen = [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]]
         of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
         of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * scale / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
