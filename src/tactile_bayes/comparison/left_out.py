@@ -92,9 +92,7 @@ def _densities(model: ContourModel, draws: Draws) -> Floats:
         if _is_correlated(model):
             loads, _, discrepancy = model.loads_and_discrepancy(part)
             cell, measured, scale = model.likelihood.load_cell, model.likelihood.measured, model.noise_scale(part)
-            logs.append(
-                cell.log_density_left_out(measured, loads[:, 0], noise_scale=scale, discrepancy=discrepancy)
-            )
+            logs.append(cell.log_density_left_out(measured, loads[:, 0], noise_scale=scale, discrepancy=discrepancy))
         else:
             logs.append(model.log_likelihood(part, pointwise=True))
     return np.concatenate(logs).reshape(chains, kept.size, -1)

@@ -16,6 +16,7 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
+from tactile_bayes.inference.discrepancy import PARAMETERS
 from tactile_bayes.inference.misfit import CHECK_RIG, is_inferred, what_to_try
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
@@ -27,7 +28,7 @@ __all__ = ["doubtful_sides", "verdicts"]
 _HOLDS, _NOT = "holds", "do not rely on it"
 """Conclusions of `trust`; another one is a reservation."""
 
-_NOISES = ("noise_scale", "moment_noise", "force_noise")
+_NOISES = ("noise_scale", "moment_noise", "force_noise", *PARAMETERS)
 
 _FACTOR = 2.0
 """Ratio of inferred to stated noise beyond which it is reported: data sheets are no more accurate."""
@@ -205,6 +206,7 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
         f"{float(worst.worst_to):.3g} rad it is off the prediction by {float(worst.worst_residual):+.2g}{unit}. "
         "Do not use this contour. "
         + what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0))
+        + (f" {check.attrs['suggestion']}" if check.attrs["suggestion"] else "")
     )
 
 

@@ -144,10 +144,10 @@ def _labelled(model: ContourModel, samples: Floats, draw: Index) -> xr.Dataset:
 def unit_of(model: ContourModel, name: str) -> str:
     """Return the unit of a parameter, like "N m"."""
     if model.measured.attrs["units"] == "dimensionless":
-        return "rad" if name in ("drive_angle_offset", "backlash", "length_scale") else "1"
+        return "rad" if name in ("drive_angle_offset", "backlash", "length_scale", "discrepancy_length") else "1"
     if name in model.nuisances.names:
         return model.nuisances.unit(name)
-    if name == "length_scale":
+    if name in ("length_scale", "discrepancy_length"):
         return "rad"
     powers = {0: "1", 1: "m", -1: "1/m"}
     return {"moment_noise": "N m", "force_noise": "N"}.get(name) or powers[model.family.length_powers.get(name, 0)]

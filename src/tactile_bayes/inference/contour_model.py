@@ -95,8 +95,8 @@ class ContourModel:
         )
         if noise.of_discrepancy and self.likelihood.encoder.count > 1:
             raise ParameterError(
-                "drive_angle_noise or drive_angle_resolution together with a discrepancy have no closed form: leave one "
-                "of the two out (relative_noise of the load cell can stand for small errors of the encoder)"
+                "drive_angle_noise or drive_angle_resolution together with a discrepancy have no closed form: leave "
+                "one of the two out (relative_noise of the load cell can stand for small errors of the encoder)"
             )
         self.found = self._zero_load()
         self.zero, noise_found = self._unloaded()

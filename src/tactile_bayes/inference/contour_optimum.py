@@ -245,7 +245,8 @@ class _Search:
         model, size = self.model, self.middle.size
         point = self.points(found.point[None])[0]
         residuals = found.residuals[: self.measured.size].reshape(self.measured.shape)
-        noise = np.append(fitted_noise(model, residuals), fitted_discrepancy(model, point, residuals))
+        drawn = self.candidates[:, len(model.names) - len(model.noise.of_discrepancy) :]
+        noise = np.append(fitted_noise(model, residuals), fitted_discrepancy(model, point, residuals, drawn))
         if not np.isfinite(model.log_prior(np.append(point, noise)[None]))[0]:
             possible = self.candidates[:, size:]
             noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
@@ -298,21 +299,20 @@ def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
     return np.array([np.median([ratio[c] for c in channels if c in ratio]) for channels in model.noise.channels])
 
 
-def fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats) -> Floats:
+def fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, drawn: Floats) -> Floats:
     """Return parameters of the discrepancy, if it is inferred, that fit residuals as in `fitted_noise`.
 
-    They are the root mean square of the residuals in contact over the largest load, and the prior's median of the
-    length.
+    They are the root mean square of the residuals in contact over the largest load, within the range of prior draws,
+    shape (n, 2), and the median of the drawn lengths.
     """
     if not model.noise.of_discrepancy:
         return np.empty(0)
     loads, _ = model.likelihood.predict(model.contours(point[None]), model.rig(point[None]))
     largest = load_in_contact(loads[0], model.likelihood.course)[:, model.present]
     squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviation[model.present])
-    of_scale, of_length = (model.priors[name] for name in model.noise.of_discrepancy)
-    least, most = of_scale.ppf([0.05, 0.999])
+    least, most = np.quantile(drawn[:, 0], [0.05, 1.0])
     share = np.sqrt(squares[largest > 0.0].sum() / max(np.square(largest).sum(), np.finfo(float).tiny))
-    return np.array([np.clip(share, least, most), of_length.median()])
+    return np.array([np.clip(share, least, most), np.median(drawn[:, 1])])
 
 
 def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -110,11 +111,10 @@ def _whitened(
     """Return the start in nearly standard normal coordinates, with no more walkers than span them."""
     by_contacts = contact_fit(model)
     of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
-    smooth = [float(model.priors[name].median()) for name in model.noise.of_discrepancy]  # type: ignore[attr-defined]
-    noise = np.append(of_white, smooth)
+    noise = np.append(of_white, _prior_medians(model, model.noise.of_discrepancy))
     whitening = None
     if by_contacts is not None:
-        rig = [float(model.priors[name].median()) for name in model.nuisances.names]  # type: ignore[attr-defined]
+        rig = _prior_medians(model, model.nuisances.names)
         whitening = whitening_at(model, np.concatenate([by_contacts, rig, noise]), rng, deadline)
     if whitening is None or (_misfit(model, whitening.centre) > _POOR_MISFIT and not deadline.has_passed):
         other = whitening_at(model, optimum_of(model, rng, deadline).point, rng, deadline)
@@ -130,6 +130,10 @@ def _whitened(
     point = drawn[np.argmax(model.log_probability(drawn))]
     whitening = whitening_at(model, point, rng, deadline)
     return _whitened_around(model, whitening, whitening.of(point[None])[0], seed, rng, settings, deadline)
+
+
+def _prior_medians(model: ContourModel, names: Sequence[str]) -> list[float]:
+    return [float(model.priors[name].median()) for name in names]  # type: ignore[attr-defined]
 
 
 def _whitened_around(
@@ -230,7 +234,8 @@ def _scattered(
         best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
         raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
     coordinates = common.with_proposal(proposal)
-    if proposal.efficiency < _EFFICIENT and not deadline.has_passed:
+    # Beside a discrepancy the posterior is a funnel, which no linear change of coordinates straightens.
+    if proposal.efficiency < _EFFICIENT and not model.noise.of_discrepancy and not deadline.has_passed:
         size = len(model.names)
         pilot, scale = start.reshape(-1, size)[: _PILOT_WALKERS * size], _prior_scale(model, common, rng)
         coordinates = learn_coordinates(model.log_probability, coordinates, pilot, scale, rng, deadline)

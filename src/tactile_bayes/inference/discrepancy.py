@@ -18,7 +18,7 @@ DISCREPANCY = "discrepancy"
 
 PARAMETERS = ("discrepancy_scale", "discrepancy_length")
 
-_SCALE, _SCALE_SPREAD = 0.01, 1.0
+_SCALE, _SCALE_SPREAD = 0.005, 1.0
 """Median of the prior of the scale, and standard deviation of its logarithm."""
 
 _LENGTH, _LENGTH_SPREAD = 0.3, 0.5
