@@ -120,6 +120,15 @@ def test_the_density_is_finite_and_decreases_with_the_residual(length, size, noi
     assert logs[0] > logs[1] > logs[2]
 
 
+def test_the_covariance_of_a_record_is_written_out():
+    for repeated in (False, True):
+        discrepancy, coordinate, sweeps, _, loads, _ = drawn(11, repeated=repeated)
+        _, covariance = dense(CELL, discrepancy, coordinate, sweeps, loads, np.ones(3))
+        expected = covariance.reshape(N, 3, N, 3) - np.diag(np.tile(CELL.noise**2, N)).reshape(N, 3, N, 3)
+        for c in range(3):
+            np.testing.assert_allclose(discrepancy.covariance()[..., c], expected[:, c, :, c], atol=1e-15)
+
+
 def test_draws_have_the_covariance_of_the_likelihood():
     """Variances and covariances of 20000 draws are within 5 standard errors: a false alarm in one of 1000 runs."""
     discrepancy, coordinate, sweeps, _, loads, _ = drawn(7)

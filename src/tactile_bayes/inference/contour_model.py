@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -138,6 +138,10 @@ class ContourModel:
         """Number of predicted loads of a point: one for every channel, sample and error of the encoder."""
         return self.likelihood.measured.size * self.likelihood.encoder.count
 
+    def prior_medians(self, names: Sequence[str]) -> list[float]:
+        """Return the medians of some parameters' priors."""
+        return [float(self.priors[name].median()) for name in names]  # type: ignore[attr-defined]
+
     def contours(self, points: Floats) -> Contour:
         """Return the contours of points, with parameters of shape (n,)."""
         return self.family.build(*points[:, : len(self.family.parameters)].T)
@@ -181,7 +185,9 @@ class ContourModel:
         return Discrepancy(course, scale[:, None, None] * load_in_contact(loads, course), length)
 
     def discrepancy_at(self, point: Floats) -> Discrepancy | None:
-        """Return the discrepancy of one point, shape (d,), for a single record."""
+        """Return the discrepancy of one point, shape (d,), for a single record; None without."""
+        if not self.noise.of_discrepancy:
+            return None
         loads, _ = self.likelihood.predict(self.contours(point[None]), self.rig(point[None]))
         every = self.discrepancy(point[None], loads)
         return None if every is None else every.take(0)

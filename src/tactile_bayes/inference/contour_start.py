@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -111,10 +110,10 @@ def _whitened(
     """Return the start in nearly standard normal coordinates, with no more walkers than span them."""
     by_contacts = contact_fit(model)
     of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
-    noise = np.append(of_white, _prior_medians(model, model.noise.of_discrepancy))
+    noise = np.append(of_white, model.prior_medians(model.noise.of_discrepancy))
     whitening = None
     if by_contacts is not None:
-        rig = _prior_medians(model, model.nuisances.names)
+        rig = model.prior_medians(model.nuisances.names)
         whitening = whitening_at(model, np.concatenate([by_contacts, rig, noise]), rng, deadline)
     if whitening is None or (_misfit(model, whitening.centre) > _POOR_MISFIT and not deadline.has_passed):
         other = whitening_at(model, optimum_of(model, rng, deadline).point, rng, deadline)
@@ -130,10 +129,6 @@ def _whitened(
     point = drawn[np.argmax(model.log_probability(drawn))]
     whitening = whitening_at(model, point, rng, deadline)
     return _whitened_around(model, whitening, whitening.of(point[None])[0], seed, rng, settings, deadline)
-
-
-def _prior_medians(model: ContourModel, names: Sequence[str]) -> list[float]:
-    return [float(model.priors[name].median()) for name in names]  # type: ignore[attr-defined]
 
 
 def _whitened_around(

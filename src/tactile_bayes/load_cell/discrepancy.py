@@ -80,6 +80,16 @@ class Discrepancy:
         """Rate of the process, shape (...)."""
         return math.sqrt(3.0) / np.asarray(self.length, dtype=float)
 
+    def covariance(self) -> Floats:
+        """Return the covariance of the samples of each channel, shape (samples, samples, 3), without a batch."""
+        sweep = np.cumsum(np.isinf(self.course.step))
+        place = np.cumsum(np.where(np.isinf(self.course.step), 0.0, self.course.step))
+        a = float(self.rate) * np.abs(np.subtract.outer(place, place))
+        together = np.empty(a.shape)
+        ordered = np.where(np.equal.outer(sweep, sweep), (1.0 + a) * np.exp(-a), 0.0)
+        together[np.ix_(self.course.order, self.course.order)] = ordered
+        return np.asarray(self.deviation[:, None] * together[..., None] * self.deviation)
+
     def draw(self, rng: Draws) -> Floats:
         """Draw discrepancies, shape (..., samples, 3)."""
         batch, rate = self.deviation.shape[:-2], self.rate
