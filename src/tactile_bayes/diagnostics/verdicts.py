@@ -78,8 +78,9 @@ def verdicts(
         One or more sentences. They report: loads that such a rod cannot have (`check_units_and_signs`); a zero that is
         off, or that moved; a record unlike the predictions of the posterior (`check_record`); reasons not to rely on
         the band (`trust`); ensembles that have not converged; noise twice as large as stated, or half; loads of a
-        sample that contradict one another; nuisance parameters that are nearly impossible under their prior. The last,
-        which are no faults, say that the prior sets the gap, and name parameters that the record hardly determines.
+        sample that contradict one another; nuisance parameters that are nearly impossible under their prior; smooth
+        residuals, which a discrepancy can describe. The last, which are no faults, say that the prior sets the gap, and
+        name parameters that the record hardly determines.
 
     Raises
     ------
@@ -122,6 +123,8 @@ def verdicts(
     beyond = _beyond_prior(posterior)
     against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
     against += _beyond_message(beyond)
+    if check is not None and check.attrs["suggestion"]:
+        against.append(check.attrs["suggestion"])
     if not against:
         p_value = math.nan if check is None else float(check.overall_p_value)
         against.append(
@@ -206,7 +209,6 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
         f"{float(worst.worst_to):.3g} rad it is off the prediction by {float(worst.worst_residual):+.2g}{unit}. "
         "Do not use this contour. "
         + what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0))
-        + (f" {check.attrs['suggestion']}" if check.attrs["suggestion"] else "")
     )
 
 

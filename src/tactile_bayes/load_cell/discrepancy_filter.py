@@ -161,12 +161,13 @@ def _filter_channel(
             _advance_mean(mean, rate * away)
         away = 0.0
         seen[0], seen[1] = w * covariance[0, 0], w * covariance[1, 0]
-        variance = w * seen[0] + noise[sample]
+        # Rounding may leave a negative variance if the discrepancy is 1e8 times the noise.
+        variance = max(w * seen[0], 0.0) + noise[sample]
         at = w * mean[0]
         if wanders:
             for k in range(_STATES):
                 seen[k] = w * covariance[k, 0] + covariance[k, 2] + covariance[k, 3]
-            variance = w * seen[0] + seen[2] + seen[3] + noise[sample]
+            variance = max(w * seen[0] + seen[2] + seen[3], 0.0) + noise[sample]
             at += mean[2] + mean[3]
         error = residual[sample] - at
         new[sample], total[sample] = error, variance
