@@ -12,7 +12,7 @@ from helpers.contour_posteriors import BRIEF, CELL, MODEST, TRUTH, swept
 from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import calibrate, experiment_of
 from tactile_bayes.calibration.simulation import simulate
-from tactile_bayes.contours import Parabola
+from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
@@ -22,6 +22,7 @@ from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.load_cell.discrepancy import Course
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.sweep import Translation, scan
 from tactile_bayes.uncertainty.band import contour_band
 
 SMOOTH = ("discrepancy",)
@@ -127,6 +128,17 @@ def test_repeated_sweeps_have_it_in_common():
     with refused(ParameterError, "repeated sweeps"):
         model_of(both, cell=drifting).log_likelihood(points_of(model))
     assert np.isfinite(model_of(one, cell=drifting).log_likelihood(points_of(model))).all()
+
+
+def test_its_coordinate_is_the_travel_where_the_base_is_carried():
+    drive = Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
+    record = CELL.measure(scan(Circle(0.5, 0.5), drive=drive, drive_step=0.04).record, seed=1)
+    model = Experiment(record, "circle", CELL, nuisances=SMOOTH).model
+    course = model.likelihood.course
+    assert course.is_measured_order
+    ways = np.hypot(np.diff(record.base_x.values), np.diff(record.base_y.values))
+    np.testing.assert_allclose(course.step[1:], ways, rtol=1e-9)
+    assert np.isfinite(model.log_likelihood(points_of(model, r=0.5))).all()
 
 
 def test_what_has_no_closed_form_is_refused():

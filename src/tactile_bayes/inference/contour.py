@@ -169,14 +169,15 @@ def infer_contour(
     reach are excluded, those that the rod would still cut after snap-off, and those that a rod curved toward the object
     would touch twice.
 
-    The discrepancy is a Gaussian process over the drive angle, independent in each channel and each sweep segment, with
-    Matérn's covariance, ν = 3/2. Its standard deviation is discrepancy_scale times the largest load of the segment that
-    contour and rig predict, of the moment, or of the force in any direction; it is zero out of contact, where nothing
-    but the sensor acts. Sweeps that repeat a segment have it in common. The likelihood integrates it out exactly, by a
-    Kalman filter, beside drift and unknown biases; it is refused beside outliers, correlated noise, errors of the
-    encoder, and readings at the end of the range. Whatever is smooth may be discrepancy: bands become wider, and what
-    both explain, like a small dent of the contour, is no longer seen. It does not correct a wrong property of the rig
-    that another contour explains as well.
+    The discrepancy is a Gaussian process over the drive angle, or over the travel in rod lengths where the drive
+    carries the base, independent in each channel and each sweep segment, with Matérn's covariance, ν = 3/2. Its
+    standard deviation is discrepancy_scale times the largest load of the segment that contour and rig predict, of the
+    moment, or of the force in any direction; it is zero out of contact, where nothing but the sensor acts. Sweeps that
+    repeat a segment have it in common. The likelihood integrates it out exactly, by a Kalman filter, beside drift and
+    unknown biases; it is refused beside outliers, correlated noise, errors of the encoder, and readings at the end of
+    the range. Whatever is smooth may be discrepancy: bands become wider, and what both explain, like a small dent of
+    the contour, is no longer seen. It does not correct a wrong property of the rig that another contour explains as
+    well.
 
     Examples
     --------

@@ -392,13 +392,15 @@ class RecordLikelihood:
 
     @cached_property
     def course(self) -> Course:
-        """Order in which a discrepancy passes through the samples: by drive angle, in the direction of the drive.
+        """Order in which a discrepancy passes through the samples: by drive angle, in the direction of the drive, or by
+        travel where the drive carries the base.
 
         Sweeps from one pivot in one direction repeat each other, and have one discrepancy in common.
         """
-        angle = self.angles_in_sweep_frame
-        turned = np.array([segment.sense * sign for segment, sign in zip(self.segments, self._signs, strict=True)])
-        return Course.along(turned[self.segment_of_sample] * angle, [segment.samples for segment in self.segments])
+        pairs = zip(self.segments, self._signs, strict=True)
+        direction = np.array([segment.sense * sign or 1.0 for segment, sign in pairs])
+        coordinate = direction[self.segment_of_sample] * self.angles_in_sweep_frame
+        return Course.along(coordinate, [segment.samples for segment in self.segments])
 
     def usable(self, contours: Contour, rig: Rig | None = None) -> Flags:
         """Return True for contours that the rod reaches in every segment and is clear of after snap-off, shape (n,)."""
