@@ -6,6 +6,9 @@ from their default priors. An indented row repeats the case above it with other 
 infers the property that is wrong, everything is taken as stated instead (--as-stated); otherwise the row names the
 property that is inferred, or stated, in correction. Replicates are kept in results/misspecification, from which a
 stopped run resumes.
+
+With --discrepancy, the rows are those of the rigs without correction, each without and with a discrepancy, which is
+inferred beside all else.
 """
 
 from __future__ import annotations
@@ -99,7 +102,7 @@ CASES: Mapping[str, Mapping[str, Run]] = {
 }
 
 
-def main(replicates: int = 40, *names: str) -> None:
+def main(replicates: int = 40, *names: str, discrepancy: bool = False) -> None:
     print(
         f"{replicates} replicates; noise 0.05 EI/L² and 0.02 EI/L, steps of 2°; bands of 90 %; noticed by the check of"
     )
@@ -110,10 +113,20 @@ def main(replicates: int = 40, *names: str) -> None:
     heads = ("in the gap", "beside it", "bias [L]", "width [L]", "check", "misfit", "axial", "any", "not conv.")
     print(f"{'':<38}" + "".join(f"{head:>11}" for head in heads), flush=True)
     for name in names or CASES:
-        for other, run in CASES[name].items():
+        for other, run in (beside_discrepancy(CASES[name]) if discrepancy else CASES[name]).items():
             few = max(1, replicates // (FEWER if run.asked.get("family") else 1))
             count = f" ({few})" if few < replicates else ""
             print(row(f"  {other}{count}" if other else name, calibrated(f"{name} {other}", run, few)), flush=True)
+
+
+def beside_discrepancy(runs: Mapping[str, Run]) -> dict[str, Run]:
+    """Return the run without correction, and the same with a discrepancy, of which the simulated rig has none."""
+    which = "--as-stated" if "--as-stated" in runs else ""
+    run = runs[which]
+    nothing = {"discrepancy_scale": stats.lognorm(s=1e-9, scale=1e-12)}
+    world = {**run.world, "priors": {**run.world.get("priors", {}), **nothing}}
+    asked = {**run.asked, "nuisances": (*run.asked.get("nuisances", STANDARD), "discrepancy")}
+    return {which: run, f"{which} with discrepancy".strip(): Run(world, asked)}
 
 
 def calibrated(name: str, run: Run, replicates: int) -> xr.Dataset:
@@ -149,5 +162,6 @@ def _mean(found: xr.Dataset, name: str) -> float:
 
 
 if __name__ == "__main__":
-    counts, chosen = [a for a in sys.argv[1:] if a.isdigit()], [a for a in sys.argv[1:] if not a.isdigit()]
-    main(*map(int, counts or ["40"]), *chosen)
+    given = [argument for argument in sys.argv[1:] if argument != "--discrepancy"]
+    counts, chosen = [a for a in given if a.isdigit()], [a for a in given if not a.isdigit()]
+    main(*map(int, counts or ["40"]), *chosen, discrepancy="--discrepancy" in sys.argv)

@@ -157,6 +157,19 @@ def test_profiles_are_scaled_to_the_rod(asked, tmp_path):
     assert float(options["contour"].height(0.2)) == pytest.approx(0.28)
 
 
+@pytest.mark.parametrize(
+    ("options", "nuisances"),
+    [
+        (["--discrepancy"], [*STANDARD, "discrepancy"]),
+        (["--as-stated", "--discrepancy"], ["discrepancy"]),
+        (["--nuisance", "standard", "--nuisance", "drift", "--discrepancy"], ["standard", "drift", "discrepancy"]),
+    ],
+)
+def test_a_discrepancy_is_inferred_beside_the_nuisances(asked, tmp_path, options, nuisances):
+    assert call("--out", tmp_path, *options).exit_code == 0
+    assert list(asked["sensitivity"]["nuisances"]) == nuisances
+
+
 def test_options_arrive(asked, tmp_path):
     cell = ("--force-noise", 0.1, "--moment-noise", 0.03, "--drive-angle-noise", 0.5)
     rig = ("--base", "0.1,0", "--base", "0.2,0", "--friction", 0.2, "--as-stated", "--seed", 3)

@@ -139,6 +139,21 @@ def test_information_of_an_encoder_is_that_of_dense_algebra(name, encoder, frame
     assert_matrices_agree(record_information(plan.model, plan.point).matrix[:size, :size], right, 1e-6)
 
 
+def test_information_beside_a_discrepancy_is_that_of_dense_algebra():
+    plan = between(nuisances=("rigidity_scale", "drive_angle_offset", "bias", "discrepancy"))
+    slopes, _ = scan_slopes(plan)
+    discrepancy = plan.model.discrepancy_at(plan.point)
+    assert discrepancy is not None
+    assert np.sum(np.isinf(discrepancy.course.step)) == 2
+    size, right = len(plan.model.forward_parameters), 0.0
+    for c, noise in enumerate(CELL.noise):
+        covariance = discrepancy.covariance()[..., c] + noise**2 * np.eye(len(slopes))
+        right = right + slopes[:, c].T @ np.linalg.solve(covariance, slopes[:, c])
+    found = record_information(plan.model, plan.point).matrix
+    assert_matrices_agree(found[:size, :size], right, 1e-6)
+    assert np.all(found[-2:] == 0.0)
+
+
 def test_slopes_are_those_of_scans():
     plan = between(replace(CELL, drive_angle_noise=0.01), ("rigidity_scale", "drive_angle_offset", "bias"))
     found = reading_slopes(plan.model, plan.point)

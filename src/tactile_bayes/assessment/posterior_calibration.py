@@ -67,9 +67,14 @@ class JointModel(ContourModel):
         self.__dict__.update(vars(model))
         self._further = further
 
-    def log_likelihood(self, points: Floats) -> Floats:
-        predicted, scale = self.loads_with_errors(points), self.noise_scale(points)
-        return self.likelihood.score(*predicted, scale) + self._further.likelihood.score(*predicted, scale)
+    def log_likelihood(self, points: Floats, *, pointwise: bool = False) -> Floats:
+        loads, reached, discrepancy = self.loads_and_discrepancy(points)
+        scale = self.noise_scale(points)
+        first, further = (
+            likelihood.score(loads, reached, scale, pointwise=pointwise, discrepancy=discrepancy)
+            for likelihood in (self.likelihood, self._further.likelihood)
+        )
+        return first + further
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,9 +79,11 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     values = model.values(point)
     rod = likelihood.rod
     measures = cell.dimensionless(rod)
-    sensed = model.nuisances.sensed(loads, values, measures)[0]
+    discrepancy = model.discrepancy(point, loads)
+    sensed = model.nuisances.sensed(loads, values, measures)
     units = rod.load_units
-    readings = measures.simulate(sensed, seed=rng, noise_scale=model.noise_scale(point)[0]) * units
+    scale = model.noise_scale(point)
+    readings = measures.simulate(sensed, seed=rng, noise_scale=scale, discrepancy=discrepancy)[0] * units
     course = model.nuisances.elapsed[:, None]
     readings = readings + np.array(world.bias) + np.array(world.drift) * course
     template = experiment.assumed.record

@@ -131,12 +131,21 @@ class UnknownOptions:
         list[str] | None,
         typer.Option(
             help="Unknown of the rig to be inferred, in place of rigidity_scale, drive_angle_offset, bias, lever, "
-            "backlash and friction: one of these, or drift, gain, suspension_compliance, rest_curvature, taper, "
-            "base (positions of further pivots); may be repeated."
+            "backlash and friction: one of these, standard (all of these), or drift, gain, suspension_compliance, "
+            "rest_curvature, taper, base (positions of further pivots); may be repeated."
         ),
     ] = None
     as_stated: Annotated[
         bool, typer.Option("--as-stated", help="Assume the rig as stated: fewer parameters, narrower bands.")
+    ] = False
+
+    discrepancy: Annotated[
+        bool,
+        typer.Option(
+            "--discrepancy",
+            help="Infer a smooth deviation of the readings from the model as well, for hysteresis, stick-slip and the "
+            "like: wider bands.",
+        ),
     ] = False
 
     @property
@@ -149,11 +158,13 @@ class UnknownOptions:
             If the options contradict each other.
         """
         from tactile_bayes.errors import ParameterError
+        from tactile_bayes.inference.discrepancy import DISCREPANCY
         from tactile_bayes.inference.nuisances import STANDARD
 
         if self.as_stated and self.nuisance:
             raise ParameterError("--as-stated and --nuisance contradict each other: leave one of them out")
-        return [] if self.as_stated else list(self.nuisance or STANDARD)
+        smooth = [DISCREPANCY] if self.discrepancy else []
+        return smooth if self.as_stated else [*(self.nuisance or STANDARD), *smooth]
 
 
 def points_in(path: Path) -> tuple[Floats, Floats]:

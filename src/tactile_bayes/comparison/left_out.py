@@ -24,7 +24,7 @@ class PredictedSamples(NamedTuple):
     """Leave-one-out log-density of each sample, its channels together, in units of EI/L and EI/L²."""
 
     log_density: Floats
-    """Shape (samples,); NaN next to events if the load cell drifts or has an unknown bias."""
+    """Shape (samples,); NaN next to events if the load cell drifts or has an unknown bias, or beside a discrepancy."""
     standard_error: Floats
     """Monte-Carlo error; infinite where it cannot be trusted."""
     pareto_k: Floats
@@ -79,7 +79,7 @@ def predicted_samples(
 
 def _is_correlated(model: ContourModel) -> bool:
     cell = model.likelihood.load_cell
-    return bool(cell.drift or any(cell.bias_uncertainty))
+    return bool(cell.drift or any(cell.bias_uncertainty) or model.noise.of_discrepancy)
 
 
 def _densities(model: ContourModel, draws: Draws) -> Floats:
@@ -89,10 +89,10 @@ def _densities(model: ContourModel, draws: Draws) -> Floats:
     points = draws.samples[:, kept].reshape(-1, parameters)
     logs = []
     for part in np.array_split(points, max(1, len(points) // 200)):
-        loads, reached = model.loads_with_errors(part)
         if _is_correlated(model):
-            cell, measured = model.likelihood.load_cell, model.likelihood.measured
-            logs.append(cell.log_density_left_out(measured, loads[:, 0], noise_scale=model.noise_scale(part)))
+            loads, _, discrepancy = model.loads_and_discrepancy(part)
+            cell, measured, scale = model.likelihood.load_cell, model.likelihood.measured, model.noise_scale(part)
+            logs.append(cell.log_density_left_out(measured, loads[:, 0], noise_scale=scale, discrepancy=discrepancy))
         else:
-            logs.append(model.likelihood.score(loads, reached, model.noise_scale(part), pointwise=True))
+            logs.append(model.log_likelihood(part, pointwise=True))
     return np.concatenate(logs).reshape(chains, kept.size, -1)

@@ -10,6 +10,7 @@ import xarray as xr
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.discrepancy import PARAMETERS
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, rough_noise
@@ -29,6 +30,9 @@ _OUTLYING = 4.0
 
 _WINDOWS = 8
 """Running-mean widths in the loaded part of a sweep: misfit of one shape by another changes sign 3 to 5 times."""
+
+_EXCESS = 1.2
+"""Root mean square of loaded residuals over the noise between neighbours from which they count as larger."""
 
 _LOST = 20.0
 """Log-probability below the median beyond which a draw belongs to a lost walker and is left out."""
@@ -85,7 +89,9 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
         overall_p_value
             Share of records of which the largest score is at least that of the real one.
 
-        Attributes: `passed` (0 or 1), `false_alarm` (the probability in effect), `predictions` (their number).
+        Attributes: `passed` (0 or 1), `false_alarm` (the probability in effect), `predictions` (their number), and
+        `suggestion`, a sentence if the check fails because residuals are smooth and larger than the noise, and no
+        discrepancy is inferred; else empty.
 
     Raises
     ------
@@ -146,6 +152,9 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     false_alarm = max(false_alarm, 1.0 / (1.0 + predictions))
     predicted = posterior["posterior_predictive"].to_dataset()
     units = {name: str(predicted[name].attrs.get("units", "1")) for name in channels}
+    passed = not overall <= false_alarm
+    smooth = _smooth(residuals, p_values, false_alarm) if not passed else {}
+    described = PARAMETERS[0] in posterior["posterior"].data_vars
     return xr.Dataset(
         {
             "p_value": (("discrepancy", "channel"), p_values),
@@ -162,7 +171,12 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             "channel": channels,
             "unit": ("channel", [units[name] for name in channels]),
         },
-        attrs={"passed": int(not overall <= false_alarm), "false_alarm": false_alarm, "predictions": predictions},
+        attrs={
+            "passed": int(passed),
+            "false_alarm": false_alarm,
+            "predictions": predictions,
+            "suggestion": "" if described else _suggestion(smooth),
+        },
     )
 
 
@@ -234,6 +248,31 @@ def _discrepancies(residuals: Residuals) -> Floats:
 def _ratio(above: Floats, below: Floats) -> Floats:
     """Return the logarithm of a ratio, whose distribution over records has no long tail."""
     return np.asarray(np.log(np.maximum(above, _TINY)) - np.log(np.maximum(below, _TINY)))
+
+
+def _smooth(residuals: dict[str, Residuals], p_values: Floats, false_alarm: float) -> dict[str, float]:
+    """Return channels whose residuals are smooth and exceed the noise, with loaded residuals over that noise."""
+    smooth = {}
+    for (name, of_channel), p_value in zip(residuals.items(), p_values.T, strict=True):
+        runs = p_value[[DISCREPANCIES.index("runs"), DISCREPANCIES.index("neighbours")]]
+        noise, loaded = _neighbour_noise(of_channel), of_channel.loaded
+        if not np.any(runs <= false_alarm) or not loaded.any() or not noise > 0.0:
+            continue
+        size = float(np.sqrt(np.mean(np.square(of_channel.values[0] * of_channel.scale)[loaded])))
+        if size > _EXCESS * noise:
+            smooth[name] = size / noise
+    return smooth
+
+
+def _suggestion(smooth: dict[str, float]) -> str:
+    if not smooth:
+        return ""
+    named = " and ".join(f"{name} ({ratio:.2g} times)" for name, ratio in smooth.items())
+    return (
+        f"In contact the residuals of {named} are larger than the noise between neighbouring samples, and smooth: "
+        "where neither another family nor more of the rig describes them, infer a discrepancy of the model "
+        "(--discrepancy, or nuisances=['standard', 'discrepancy'])."
+    )
 
 
 def _width(samples: int) -> int:

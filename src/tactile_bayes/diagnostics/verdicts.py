@@ -16,6 +16,7 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
+from tactile_bayes.inference.discrepancy import PARAMETERS
 from tactile_bayes.inference.misfit import CHECK_RIG, is_inferred, what_to_try
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
@@ -27,7 +28,7 @@ __all__ = ["doubtful_sides", "verdicts"]
 _HOLDS, _NOT = "holds", "do not rely on it"
 """Conclusions of `trust`; another one is a reservation."""
 
-_NOISES = ("noise_scale", "moment_noise", "force_noise")
+_NOISES = ("noise_scale", "moment_noise", "force_noise", *PARAMETERS)
 
 _FACTOR = 2.0
 """Ratio of inferred to stated noise beyond which it is reported: data sheets are no more accurate."""
@@ -77,8 +78,9 @@ def verdicts(
         One or more sentences. They report: loads that such a rod cannot have (`check_units_and_signs`); a zero that is
         off, or that moved; a record unlike the predictions of the posterior (`check_record`); reasons not to rely on
         the band (`trust`); ensembles that have not converged; noise twice as large as stated, or half; loads of a
-        sample that contradict one another; nuisance parameters that are nearly impossible under their prior. The last,
-        which are no faults, say that the prior sets the gap, and name parameters that the record hardly determines.
+        sample that contradict one another; nuisance parameters that are nearly impossible under their prior; smooth
+        residuals, which a discrepancy can describe. The last, which are no faults, say that the prior sets the gap, and
+        name parameters that the record hardly determines.
 
     Raises
     ------
@@ -121,6 +123,8 @@ def verdicts(
     beyond = _beyond_prior(posterior)
     against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
     against += _beyond_message(beyond)
+    if check is not None and check.attrs["suggestion"]:
+        against.append(check.attrs["suggestion"])
     if not against:
         p_value = math.nan if check is None else float(check.overall_p_value)
         against.append(

@@ -101,9 +101,13 @@ def infer_contour(
         "suspension_compliance" (turn of the pivot per holding moment), "rest_curvature" (mean curvature of the unloaded
         rod; how it varies along the rod stays as stated), "taper". By default the first five and friction, except
         those that are not identifiable (the lever without the moment, the backlash in a single direction) and a given
-        friction; an empty list takes all as stated. "base": shifts of the second and further pivots of a record, as
-        "base_2_x", "base_2_y", "base_3_x" and so on. The position of the first pivot is not identifiable, since a
-        common shift of pivots and object changes no reading: results are relative to it.
+        friction; "standard" stands for these, and an empty list takes all as stated. "base": shifts of the second and
+        further pivots of a record, as "base_2_x", "base_2_y", "base_3_x" and so on. The position of the first pivot is
+        not identifiable, since a common shift of pivots and object changes no reading: results are relative to it.
+        "discrepancy": a smooth deviation of the readings in contact from those of any contour and rig, as by
+        hysteresis, stick-slip or a lean out of the plane (Kennedy and O'Hagan 2001, doi 10.1111/1467-9868.00294), with
+        "discrepancy_scale" and "discrepancy_length"; see Notes. nuisances=["standard", "discrepancy"] infers it beside
+        the default ones.
     events : bool
         Whether unloaded samples count, which show where contact begins and ends. Otherwise only samples count whose
         load exceeds the noise, as in methods that use contacts alone.
@@ -160,8 +164,20 @@ def infer_contour(
     and lever_y normal with 0.5 % of L, backlash normal with 0.2°, gains normal around 1 with 2 %, friction half-normal
     with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, rest_curvature normal around the stated
     mean with the rod's rest_curvature_deviation, or 0.05/L if it has none, taper normal around the stated one with
-    0.05, pivots normal with 1 % of L. In addition, contours out of reach are excluded, those that the rod would still
-    cut after snap-off, and those that a rod curved toward the object would touch twice.
+    0.05, pivots normal with 1 % of L; discrepancy_scale log-normal around 0.005, standard deviation 1 of the logarithm,
+    discrepancy_length log-normal around 0.3 rad, standard deviation 0.5 of the logarithm. In addition, contours out of
+    reach are excluded, those that the rod would still cut after snap-off, and those that a rod curved toward the object
+    would touch twice.
+
+    The discrepancy is a Gaussian process over the drive angle, or over the travel in rod lengths where the drive
+    carries the base, independent in each channel and each sweep segment, with Matérn's covariance, ν = 3/2. Its
+    standard deviation is discrepancy_scale times the largest load of the segment that contour and rig predict, of the
+    moment, or of the force in any direction; it is zero out of contact, where nothing but the sensor acts. Sweeps that
+    repeat a segment have it in common. The likelihood integrates it out exactly, by a Kalman filter, beside drift and
+    unknown biases; it is refused beside outliers, correlated noise, errors of the encoder, and readings at the end of
+    the range. Whatever is smooth may be discrepancy: bands become wider, and what both explain, like a small dent of
+    the contour, is no longer seen. It does not correct a wrong property of the rig that another contour explains as
+    well.
 
     Examples
     --------

@@ -14,6 +14,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws
 from tactile_bayes.inference.result import sample_stats
+from tactile_bayes.load_cell.discrepancy import Discrepancy, joined
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels
 
@@ -70,14 +71,20 @@ def _predictions(model: ContourModel, draws: Draws, kept: Index, rng: np.random.
     likelihood, cell = model.likelihood, model.likelihood.load_cell
     samples = len(likelihood.measured)
     predicted, log_likelihood = np.empty((len(points), samples, len(CHANNELS))), np.empty((len(points), samples))
+    smooth: list[Discrepancy] = []
     for block in blocks(len(points), model.loads_of_a_point, _PATHS):
-        loads, reached = model.loads_with_errors(points[block])
+        loads, reached, discrepancy = model.loads_and_discrepancy(points[block])
         error = likelihood.encoder.draw(rng, (block.size, samples))
         predicted[block] = np.take_along_axis(loads, error[:, None, :, None], axis=1)[:, 0]
-        log_likelihood[block] = likelihood.score(loads, reached, model.noise_scale(points[block]), pointwise=True)
+        log_likelihood[block] = likelihood.score(
+            loads, reached, model.noise_scale(points[block]), pointwise=True, discrepancy=discrepancy
+        )
+        if discrepancy is not None:
+            smooth.append(discrepancy)
+    discrepancy = joined(smooth)
     for block in blocks(len(points), predicted[0].size):
-        scale = model.noise_scale(points[block])
-        predicted[block] = cell.simulate(predicted[block], seed=rng, noise_scale=scale)
+        scale, own = model.noise_scale(points[block]), None if discrepancy is None else discrepancy.take(block)
+        predicted[block] = cell.simulate(predicted[block], seed=rng, noise_scale=scale, discrepancy=own)
     shape = (len(draws.samples), kept.size, samples)
     coords = {"chain": np.arange(shape[0]), "draw": kept}
     predictive = {}
@@ -137,10 +144,10 @@ def _labelled(model: ContourModel, samples: Floats, draw: Index) -> xr.Dataset:
 def unit_of(model: ContourModel, name: str) -> str:
     """Return the unit of a parameter, like "N m"."""
     if model.measured.attrs["units"] == "dimensionless":
-        return "rad" if name in ("drive_angle_offset", "backlash", "length_scale") else "1"
+        return "rad" if name in ("drive_angle_offset", "backlash", "length_scale", "discrepancy_length") else "1"
     if name in model.nuisances.names:
         return model.nuisances.unit(name)
-    if name == "length_scale":
+    if name in ("length_scale", "discrepancy_length"):
         return "rad"
     powers = {0: "1", 1: "m", -1: "1/m"}
     return {"moment_noise": "N m", "force_noise": "N"}.get(name) or powers[model.family.length_powers.get(name, 0)]

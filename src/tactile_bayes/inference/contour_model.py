@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -11,8 +11,9 @@ import xarray as xr
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import Family
-from tactile_bayes.errors import DriftWarning, ReachError
+from tactile_bayes.errors import DriftWarning, ParameterError, ReachError
 from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.discrepancy import load_in_contact
 from tactile_bayes.inference.ensembles import Ends, Logarithms
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import Noise
@@ -20,6 +21,7 @@ from tactile_bayes.inference.nuisances import MAY_VANISH, Nuisances
 from tactile_bayes.inference.prior_density import log_density_of
 from tactile_bayes.inference.priors import Prior, support_of
 from tactile_bayes.load_cell import rough_noise, zero_load
+from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS
 
@@ -35,7 +37,8 @@ _MOST_TRIALS = 50
 class ContourModel:
     """Prior times likelihood, as a function of arrays of parameters.
 
-    Points, shape (n, d), have the parameters of the contour first, then those of the rig, then those of the noise.
+    Points, shape (n, d), have the parameters of the contour first, then those of the rig, then those of the noise, then
+    those of a discrepancy.
 
     Parameters
     ----------
@@ -62,6 +65,11 @@ class ContourModel:
         Zero and noise of the unloaded samples, from `zero_load`.
     zero, deviation : ndarray, shape (3,)
         Zero of each channel (NaN if unknown) and estimated standard deviation [EI/L, EI/L²].
+
+    Raises
+    ------
+    ParameterError
+        If errors of the encoder are combined with a discrepancy, for which there is no closed form.
     """
 
     def __init__(
@@ -85,6 +93,11 @@ class ContourModel:
         self.likelihood = RecordLikelihood(
             measured, noise.cell, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
         )
+        if noise.of_discrepancy and self.likelihood.encoder.count > 1:
+            raise ParameterError(
+                "drive_angle_noise or drive_angle_resolution together with a discrepancy have no closed form: leave "
+                "one of the two out (relative_noise of the load cell can stand for small errors of the encoder)"
+            )
         self.found = self._zero_load()
         self.zero, noise_found = self._unloaded()
         rough = np.where(noise_found > 0.0, noise_found, self._rough_noise())
@@ -125,6 +138,10 @@ class ContourModel:
         """Number of predicted loads of a point: one for every channel, sample and error of the encoder."""
         return self.likelihood.measured.size * self.likelihood.encoder.count
 
+    def prior_medians(self, names: Sequence[str]) -> list[float]:
+        """Return the medians of some parameters' priors."""
+        return [float(self.priors[name].median()) for name in names]  # type: ignore[attr-defined]
+
     def contours(self, points: Floats) -> Contour:
         """Return the contours of points, with parameters of shape (n,)."""
         return self.family.build(*points[:, : len(self.family.parameters)].T)
@@ -155,9 +172,40 @@ class ContourModel:
     def noise_scale(self, points: Floats) -> Floats:
         """Return the factors on the load cell's standard deviations, shape (n, 3)."""
         scale = np.ones((points.shape[0], len(CHANNELS)))
-        for name, channels in zip(self.noise.names, self.noise.channels, strict=True):
+        for name, channels in zip(self.noise.of_white, self.noise.channels, strict=True):
             scale[:, [CHANNELS.index(c) for c in channels]] = points[:, [self.names.index(name)]]
         return scale
+
+    def discrepancy(self, points: Floats, loads: Floats) -> Discrepancy | None:
+        """Return the discrepancy of points, for the loads (n, samples, 3) of contour and rig alone; None without."""
+        if not self.noise.of_discrepancy:
+            return None
+        scale, length = points[:, [self.names.index(name) for name in self.noise.of_discrepancy]].T
+        course = self.likelihood.course
+        return Discrepancy(course, scale[:, None, None] * load_in_contact(loads, course), length)
+
+    def discrepancy_at(self, point: Floats) -> Discrepancy | None:
+        """Return the discrepancy of one point, shape (d,), for a single record; None without."""
+        if not self.noise.of_discrepancy:
+            return None
+        loads, _ = self.likelihood.predict(self.contours(point[None]), self.rig(point[None]))
+        every = self.discrepancy(point[None], loads)
+        return None if every is None else every.take(0)
+
+    def log_likelihood(self, points: Floats, *, pointwise: bool = False) -> Floats:
+        """Return the log-likelihood of points, shape (n,), or of each sample, (n, samples); −inf out of reach."""
+        loads, reached, discrepancy = self.loads_and_discrepancy(points)
+        scale = self.noise_scale(points)
+        return self.likelihood.score(loads, reached, scale, pointwise=pointwise, discrepancy=discrepancy)
+
+    def loads_and_discrepancy(self, points: Floats) -> tuple[Floats, Flags, Discrepancy | None]:
+        """Return the results of `loads_with_errors`, and the discrepancy."""
+        if not self.noise.of_discrepancy:
+            return *self.loads_with_errors(points), None
+        loads, reached = self.likelihood.predict_with_errors(self.contours(points), self.rig(points))
+        discrepancy = self.discrepancy(points, loads[:, 0])
+        sensed = self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell)
+        return sensed, reached, discrepancy
 
     def log_prior(self, points: Floats) -> Floats:
         """Return the logarithm of the prior density, shape (n,), without the exclusion of contours out of reach."""
@@ -177,10 +225,6 @@ class ContourModel:
         for block in blocks(inside.size, self.loads_of_a_point) if inside.size else ():
             values[inside[block]] += self.log_likelihood(points[inside[block]])
         return values
-
-    def log_likelihood(self, points: Floats) -> Floats:
-        """Return the logarithm of the likelihood, shape (n,), of points within their bounds; −inf out of reach."""
-        return self.likelihood.score(*self.loads_with_errors(points), self.noise_scale(points))
 
     def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:
         """Draw from the prior of contours within reach.

@@ -13,6 +13,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.discrepancy import load_in_contact
 from tactile_bayes.inference.ensembles import Logarithms
 from tactile_bayes.inference.found_rig import rig_with
 from tactile_bayes.inference.nuisances import BIASES
@@ -20,7 +21,7 @@ from tactile_bayes.inference.start import Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS, present_channels
 
-__all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
+__all__ = ["ContourOptimum", "contact_fit", "fitted_discrepancy", "fitted_noise", "optima_of", "optimum_of"]
 
 _PRIOR_DRAWS = 1000
 _CANDIDATES = 24
@@ -45,6 +46,12 @@ _MAX_RELATIVE_SD = 2.0
 _MIN_GAIN, _MAX_COST = 100.0, 5.0
 """Gain in coarse log-likelihood beyond the end of a prior above which the prior is reported as too narrow, and the cost
 per residual there below which the gain is believed."""
+
+_DISCREPANCY_SPREAD = 0.4
+"""Standard deviation of the logarithms of scale and length of a discrepancy, before they are known."""
+
+_MAX_RESIDUAL = 100.0
+"""Largest residual in standard deviations from which a discrepancy is estimated."""
 
 _MAX_COST_RATIO = 0.9
 """Largest share of the cost that a search from Step 2's contacts may leave for its result to be taken."""
@@ -237,12 +244,16 @@ class _Search:
         """Return the optimum with the noise parameters and the covariance of all parameters."""
         model, size = self.model, self.middle.size
         point = self.points(found.point[None])[0]
-        noise = fitted_noise(model, found.residuals[: self.measured.size].reshape(self.measured.shape))
+        residuals = found.residuals[: self.measured.size].reshape(self.measured.shape)
+        drawn = self.candidates[:, len(model.names) - len(model.noise.of_discrepancy) :]
+        noise = np.append(fitted_noise(model, residuals), fitted_discrepancy(model, point, residuals, drawn))
         if not np.isfinite(model.log_prior(np.append(point, noise)[None]))[0]:
             possible = self.candidates[:, size:]
             noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
         narrow = np.minimum(0.5 * self.spread / np.sqrt(np.diag(found.covariance)), 1.0)
-        covariance = np.diag(np.full(len(model.names), 0.5 / self.measured.size))
+        variances = np.full(len(model.names), 0.5 / self.measured.size)
+        variances[len(model.names) - len(model.noise.of_discrepancy) :] = _DISCREPANCY_SPREAD**2
+        covariance = np.diag(variances)
         covariance[:size, :size] = found.covariance * np.outer(narrow, narrow)
         return ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, self._beyond(found))
 
@@ -276,12 +287,32 @@ def _continued(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
 
 
 def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
-    """Return noise parameters that fit residuals, shape (samples, present channels), robustly against outliers."""
+    """Return parameters of the white noise that fit residuals, shape (samples, present channels), robustly.
+
+    Beside a discrepancy the noise is that of unloaded or neighbouring samples.
+    """
     known = model.likelihood.load_cell.noise
-    fitted = model.deviation[model.present] * np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
+    sizes = np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
+    fitted = model.deviation[model.present] * (1.0 if model.noise.of_discrepancy else sizes)
     measured = np.flatnonzero(model.present)
     ratio = {CHANNELS[i]: value / (known[i] or 1.0) for i, value in zip(measured, fitted, strict=True)}
     return np.array([np.median([ratio[c] for c in channels if c in ratio]) for channels in model.noise.channels])
+
+
+def fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, drawn: Floats) -> Floats:
+    """Return parameters of the discrepancy, if it is inferred, that fit residuals as in `fitted_noise`.
+
+    They are the root mean square of the residuals in contact over the largest load, within the range of prior draws,
+    shape (n, 2), and the median of the drawn lengths.
+    """
+    if not model.noise.of_discrepancy:
+        return np.empty(0)
+    loads, _ = model.likelihood.predict(model.contours(point[None]), model.rig(point[None]))
+    largest = load_in_contact(loads[0], model.likelihood.course)[:, model.present]
+    squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviation[model.present])
+    least, most = np.quantile(drawn[:, 0], [0.05, 1.0])
+    share = np.sqrt(squares[largest > 0.0].sum() / max(np.square(largest).sum(), np.finfo(float).tiny))
+    return np.array([np.clip(share, least, most), np.median(drawn[:, 1])])
 
 
 def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:

@@ -109,10 +109,11 @@ def _whitened(
 ) -> Walk:
     """Return the start in nearly standard normal coordinates, with no more walkers than span them."""
     by_contacts = contact_fit(model)
-    noise = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
+    of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
+    noise = np.append(of_white, model.prior_medians(model.noise.of_discrepancy))
     whitening = None
     if by_contacts is not None:
-        rig = [float(model.priors[name].median()) for name in model.nuisances.names]  # type: ignore[attr-defined]
+        rig = model.prior_medians(model.nuisances.names)
         whitening = whitening_at(model, np.concatenate([by_contacts, rig, noise]), rng, deadline)
     if whitening is None or (_misfit(model, whitening.centre) > _POOR_MISFIT and not deadline.has_passed):
         other = whitening_at(model, optimum_of(model, rng, deadline).point, rng, deadline)
@@ -142,7 +143,11 @@ def _whitened_around(
     """Return the start around a centre, in whitening coordinates."""
     log_probability = in_coordinates(model.log_probability, whitening)
     spread = np.full(centre.size, _WHITENED_SPREAD)
-    spread[: whitening.bent] = [_ROUGHNESS_SPREAD] * 2 + [_NOISE_SPREAD] * len(model.noise.names)
+    spread[: whitening.bent] = (
+        [_ROUGHNESS_SPREAD] * 2
+        + [_NOISE_SPREAD] * len(model.noise.of_white)
+        + [_ROUGHNESS_SPREAD] * len(model.noise.of_discrepancy)
+    )
     cloud = gather(log_probability, centre, np.diag(np.square(spread)), rng, deadline)
     if not cloud.is_possible:
         raise InferenceError("nothing near is possible")
@@ -224,7 +229,8 @@ def _scattered(
         best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
         raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
     coordinates = common.with_proposal(proposal)
-    if proposal.efficiency < _EFFICIENT and not deadline.has_passed:
+    # Beside a discrepancy the posterior is a funnel, which no linear change of coordinates straightens.
+    if proposal.efficiency < _EFFICIENT and not model.noise.of_discrepancy and not deadline.has_passed:
         size = len(model.names)
         pilot, scale = start.reshape(-1, size)[: _PILOT_WALKERS * size], _prior_scale(model, common, rng)
         coordinates = learn_coordinates(model.log_probability, coordinates, pilot, scale, rng, deadline)

@@ -16,6 +16,7 @@ from scipy.stats import rv_histogram
 from tactile_bayes.checks import check_names, check_optional, check_switch
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.discrepancy import discrepancy_priors
 from tactile_bayes.inference.noise import Noise, noise_of
 from tactile_bayes.inference.nuisances import STANDARD, Nuisances, nuisances_of
 from tactile_bayes.inference.priors import Prior, check_priors, refuse_unknown_priors
@@ -78,8 +79,8 @@ class Experiment:
 
     @cached_property
     def noise(self) -> Noise:
-        """Parameters of the noise."""
-        return noise_of(self.record, self.load_cell)
+        """Parameters of the noise, and of a discrepancy if it is asked for."""
+        return noise_of(self.record, self.load_cell, discrepancy_priors(self.nuisances, self.priors))
 
     @cached_property
     def rig(self) -> Nuisances:
@@ -107,7 +108,7 @@ class Experiment:
             "data_sha256": record_hash(self.record),
             "family": self.family,
             "friction": self.rig.friction,
-            "nuisances": json.dumps(self.rig.names),
+            "nuisances": json.dumps((*self.rig.names, *self.noise.of_discrepancy)),
             "events": int(self.events),
             "priors": priors_in_words({**self.default_priors, **self.priors}),
             "units": attrs["units"],

@@ -18,6 +18,7 @@ from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.encoder import EncoderErrors
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.mechanics.line import LINE_COLUMNS, lines_through
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile
@@ -389,6 +390,18 @@ class RecordLikelihood:
             which[segment.samples] = k
         return which
 
+    @cached_property
+    def course(self) -> Course:
+        """Order in which a discrepancy passes through the samples: by drive angle, in the direction of the drive, or by
+        travel where the drive carries the base.
+
+        Sweeps from one pivot in one direction repeat each other, and have one discrepancy in common.
+        """
+        pairs = zip(self.segments, self._signs, strict=True)
+        direction = np.array([segment.sense * sign or 1.0 for segment, sign in pairs])
+        coordinate = direction[self.segment_of_sample] * self.angles_in_sweep_frame
+        return Course.along(coordinate, [segment.samples for segment in self.segments])
+
     def usable(self, contours: Contour, rig: Rig | None = None) -> Flags:
         """Return True for contours that the rod reaches in every segment and is clear of after snap-off, shape (n,)."""
         return self._usable(self._solutions(contours, self._rig_of(rig, contours.shape[0])))
@@ -522,8 +535,16 @@ class RecordLikelihood:
         """
         return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
 
-    def score(self, predicted: Floats, reached: Flags, noise_scale: Any = 1.0, *, pointwise: bool = False) -> Floats:
-        """Return the `log_likelihood` of contours from the loads of `predict_with_errors`."""
+    def score(
+        self,
+        predicted: Floats,
+        reached: Flags,
+        noise_scale: Any = 1.0,
+        *,
+        pointwise: bool = False,
+        discrepancy: Discrepancy | None = None,
+    ) -> Floats:
+        """Return the `log_likelihood` of contours from the loads of `predict_with_errors`, beside a discrepancy."""
         is_exact = self.encoder.count == 1
         scale = np.asarray(noise_scale, dtype=float)
         if scale.ndim > 1 and not is_exact:
@@ -533,6 +554,7 @@ class RecordLikelihood:
             predicted[:, 0] if is_exact else predicted,
             noise_scale=scale,
             pointwise=pointwise or not is_exact,
+            discrepancy=discrepancy,
         )
         if not is_exact:
             values = logsumexp(values + self.encoder.log_weights[:, None], axis=1)

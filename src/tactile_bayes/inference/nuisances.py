@@ -14,6 +14,7 @@ from scipy import stats
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_names, check_number
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.discrepancy import DISCREPANCY, is_discrepancy
 from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
@@ -26,6 +27,9 @@ __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_o
 
 STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
 """Default nuisance parameters, of which those that a record cannot identify are left out."""
+
+_STANDARD = "standard"
+"""Name that stands for the default nuisance parameters."""
 
 MAY_VANISH = ("friction", "suspension_compliance", "taper")
 """Parameters that are zero or positive, and may be zero."""
@@ -192,7 +196,8 @@ def nuisances_of(
     """Return the nuisance parameters that are chosen by name or have a prior, with default priors.
 
     A bias with a bias_uncertainty of the load cell is not among them: the likelihood integrates it out already. Of the
-    `STANDARD` ones those that are not identifiable are left out, and friction if it is given.
+    `STANDARD` ones those that are not identifiable are left out, and friction if it is given. The parameters of a
+    discrepancy are not among them: they belong to the noise.
 
     Parameters
     ----------
@@ -212,11 +217,13 @@ def nuisances_of(
     ParameterError
         If a name is no nuisance parameter, or the parameter is not identifiable.
     """
-    chosen = check_names("nuisances", chosen)
+    chosen = [name for name in check_names("nuisances", chosen) if not is_discrepancy(name)]
     unidentifiable = _unidentifiable(measured)
+    known = set() if friction is None else {"friction"}
+    standard = [name for name in STANDARD if name not in unidentifiable.keys() | known]
     if tuple(chosen) == STANDARD:
-        known = set() if friction is None else {"friction"}
-        chosen = [name for name in chosen if name not in unidentifiable.keys() | known]
+        chosen = [_STANDARD]
+    chosen = [each for name in chosen for each in (standard if name == _STANDARD else [name])]
     present = [_SHORT[name] for name in present_channels(measured)]
     uncertain = dict(zip(_GROUPS["bias"], cell.bias_uncertainty, strict=True))
     names: list[str] = []
@@ -226,7 +233,8 @@ def nuisances_of(
             continue
         if name not in _KINDS and name not in _GROUPS:
             raise ParameterError(
-                f"there is no nuisance parameter {name!r}: choose from {', '.join([*_GROUPS, *_KINDS])}, or base"
+                f"there is no nuisance parameter {name!r}: choose from "
+                f"{', '.join([_STANDARD, *_GROUPS, *_KINDS, DISCREPANCY])}, or base"
             )
         if name in unidentifiable:
             raise ParameterError(f"{name} cannot be inferred: {unidentifiable[name]}")

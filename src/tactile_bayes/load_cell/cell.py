@@ -17,6 +17,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_loads
 from tactile_bayes.load_cell.covariance import covariance, squared_mahalanobis_distance
 from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.likelihood import approximations, checked_noise_scale, log_density_left_out, log_likelihood
 from tactile_bayes.load_cell.measurement import corrected, measured, stated_entries
 from tactile_bayes.load_cell.zero_load import found_cell
@@ -277,7 +278,14 @@ class LoadCell(DataSheet):
                 f"a frame, or in_frame(record, {self.frame!r})"
             )
 
-    def simulate(self, loads: ArrayLike, *, seed: int | np.random.Generator, noise_scale: ArrayLike = 1.0) -> Floats:
+    def simulate(
+        self,
+        loads: ArrayLike,
+        *,
+        seed: int | np.random.Generator,
+        noise_scale: ArrayLike = 1.0,
+        discrepancy: Discrepancy | None = None,
+    ) -> Floats:
         """Simulate the readings of loads, as arrays.
 
         Parameters
@@ -288,6 +296,8 @@ class LoadCell(DataSheet):
             As in `measure`.
         noise_scale : array_like, broadcastable to shape (..., 3)
             Factor on the white noise of each channel.
+        discrepancy : Discrepancy, optional
+            Smooth deviation of the readings, in the units of the cell, for loads of its shape.
 
         Returns
         -------
@@ -310,7 +320,8 @@ class LoadCell(DataSheet):
             )
         scale = checked_noise_scale(noise_scale, given.shape)
         batch = np.broadcast_shapes(scale.shape[:-1], given.shape[:-2])
-        return corrupted_loads(self, np.broadcast_to(given, (*batch, *given.shape[-2:])), _generator(seed), scale)
+        every = np.broadcast_to(given, (*batch, *given.shape[-2:]))
+        return corrupted_loads(self, every, _generator(seed), scale, discrepancy)
 
     def covariance(self, loads: ArrayLike) -> Floats:
         """Covariance of the errors of readings for each sample by itself: errors that samples share count as noise.
@@ -369,7 +380,13 @@ class LoadCell(DataSheet):
         return squared_mahalanobis_distance(self, np.asarray(readings, dtype=np.float64))
 
     def log_likelihood(
-        self, measured: ArrayLike, predicted: ArrayLike, *, noise_scale: ArrayLike = 1.0, pointwise: bool = False
+        self,
+        measured: ArrayLike,
+        predicted: ArrayLike,
+        *,
+        noise_scale: ArrayLike = 1.0,
+        pointwise: bool = False,
+        discrepancy: Discrepancy | None = None,
     ) -> Floats:
         """Log-likelihood of readings, for one or many predictions; drive angles count as exact.
 
@@ -392,6 +409,9 @@ class LoadCell(DataSheet):
         pointwise : bool
             Whether to return the terms of the samples instead of their sum; a term of dependent samples is conditional
             on the samples before it.
+        discrepancy : Discrepancy, optional
+            Smooth deviation of the readings that is integrated out exactly, in the units of the cell. Beside it, steps
+            count as noise, as beside drift.
 
         Returns
         -------
@@ -404,7 +424,8 @@ class LoadCell(DataSheet):
             If a present channel has no noise, or lacks some of its samples; if a reading is beyond the range, a noise
             scale is not positive, or the shapes do not fit; if drift, an unknown bias or correlation is combined with
             outliers, or with a sample at the end of the range; if three of drift, unknown bias, correlation and
-            relative_noise are combined.
+            relative_noise are combined; if a discrepancy is combined with outliers, a sample at the end of the range or
+            correlation, or with drift in another order of samples.
 
         Examples
         --------
@@ -413,15 +434,20 @@ class LoadCell(DataSheet):
         >>> cell.log_likelihood(moment_only, [[[0.5, 0.0, 0.0]], [[0.51, 0.0, 0.0]]]).round(4)
         array([2.8681, 2.9931])
         """
-        return log_likelihood(self, measured, predicted, noise_scale, pointwise)
+        return log_likelihood(self, measured, predicted, noise_scale, pointwise, discrepancy)
 
     def log_density_left_out(
-        self, measured: ArrayLike, predicted: ArrayLike, *, noise_scale: ArrayLike = 1.0
+        self,
+        measured: ArrayLike,
+        predicted: ArrayLike,
+        *,
+        noise_scale: ArrayLike = 1.0,
+        discrepancy: Discrepancy | None = None,
     ) -> Floats:
         """Log-density of each sample given all others, for leave-one-out cross-validation.
 
         The channels of a sample are taken together. For independent samples this is the pointwise `log_likelihood`;
-        with drift or an unknown bias it is conditional on the samples before and after, exactly.
+        with drift, an unknown bias or a discrepancy it is conditional on the samples before and after, exactly.
 
         Parameters
         ----------
@@ -430,6 +456,8 @@ class LoadCell(DataSheet):
         predicted : array, shape (..., n_samples, 3)
             As in `log_likelihood`.
         noise_scale : array, broadcastable to shape (..., 3)
+            As in `log_likelihood`.
+        discrepancy : Discrepancy, optional
             As in `log_likelihood`.
 
         Returns
@@ -450,7 +478,7 @@ class LoadCell(DataSheet):
         >>> cell.log_density_left_out(moment_only, np.zeros((3, 3))).round(1)  # the last is off by 0.1
         array([ 0.7,  0.7, -5.6])
         """
-        return log_density_left_out(self, measured, predicted, noise_scale)
+        return log_density_left_out(self, measured, predicted, noise_scale, discrepancy)
 
 
 def _generator(seed: int | np.random.Generator) -> np.random.Generator:

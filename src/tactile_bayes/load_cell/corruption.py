@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.load_cell.discrepancy import Discrepancy
 
 __all__ = ["Draws", "corrupted_angles", "corrupted_loads"]
 
@@ -21,8 +22,14 @@ class Draws(Protocol):
     def chisquare(self, df: float, size: tuple[int, ...], /) -> Any: ...
 
 
-def corrupted_loads(sheet: DataSheet, loads: Floats, rng: Draws, noise_scale: ArrayLike = 1.0) -> Floats:
-    """Simulate readings of loads: lever, gain and bias, drift and noise, then the range, then the steps.
+def corrupted_loads(
+    sheet: DataSheet,
+    loads: Floats,
+    rng: Draws,
+    noise_scale: ArrayLike = 1.0,
+    discrepancy: Discrepancy | None = None,
+) -> Floats:
+    """Simulate readings of loads: lever, gain and bias, drift, noise and discrepancy, then the range, then the steps.
 
     Parameters
     ----------
@@ -34,6 +41,8 @@ def corrupted_loads(sheet: DataSheet, loads: Floats, rng: Draws, noise_scale: Ar
         Source of random numbers. White noise is drawn first, and each part for all three channels.
     noise_scale : array_like, broadcastable to shape (..., 3)
         Factor on the white noise of each channel.
+    discrepancy : Discrepancy, optional
+        Discrepancy of the model, whose arrays have the shape of the loads. It is drawn last.
 
     Returns
     -------
@@ -51,6 +60,8 @@ def corrupted_loads(sheet: DataSheet, loads: Floats, rng: Draws, noise_scale: Ar
         noise /= np.sqrt(rng.chisquare(sheet.degrees_of_freedom, loads.shape) / sheet.degrees_of_freedom)
     scale = np.asarray(noise_scale, dtype=float)
     readings += sheet.deviation(loads) * (scale[..., None, :] if scale.ndim else scale) * noise
+    if discrepancy is not None:
+        readings += discrepancy.draw(rng)
     if math.isfinite(min(sheet.force_range, sheet.moment_range)):
         readings = np.clip(readings, -sheet.limit, sheet.limit)
     return rounded(readings, sheet.resolution)

@@ -13,6 +13,7 @@ from scipy.special import betaln, gammaln, hyp2f1, log_ndtr, stdtr
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.record import CHANNELS
 
 __all__ = [
@@ -47,10 +48,13 @@ def log_likelihood(
     predicted: ArrayLike,
     noise_scale: ArrayLike = 1.0,
     pointwise: bool = False,
-    given: Given | None = None,
+    discrepancy: Discrepancy | None = None,
+    left_out: bool = False,
 ) -> Floats:
-    """Log-density of readings; see `LoadCell.log_likelihood`. Dependent samples are conditional on those before."""
-    given = given or _given_before
+    """Log-density of readings; see `LoadCell.log_likelihood`.
+
+    Dependent samples are conditional on those before, or on all others if `left_out`.
+    """
     readings, loads, scale = _checked(measured, predicted, noise_scale)
     present = _present(sheet, readings)
     if not present.size:
@@ -60,17 +64,23 @@ def log_likelihood(
     deviation = np.asarray(sheet.deviation(loads) * (scale[..., None, :] if scale.ndim else scale))
     if present.size < len(CHANNELS):
         readings, expected, deviation = readings[:, present], expected[..., present], deviation[..., present]
-    if _is_plain(sheet):
+    if _is_plain(sheet) and discrepancy is None:
         return _white(readings, expected, deviation, pointwise)
 
+    given: Given = _given_others if left_out else _given_before
+    if discrepancy is not None:
+        of_present = discrepancy.of(present)
+        given = of_present.given_others if left_out else of_present.given_before
     wanders = bool(np.any(_wandering_sizes(sheet)[present]))
     correlation = sheet.correlation_matrix[np.ix_(present, present)]
     correlated = bool(np.any(correlation != np.eye(present.size)))
     outliers = math.isfinite(sheet.degrees_of_freedom)
     step, limit = sheet.resolution[present], sheet.limit[present]
     _refuse_beyond(readings, step, limit, present)
-    if wanders or correlated:
-        refuse_inexact(sheet, readings, present, wanders, correlated)
+    if discrepancy is not None:
+        _refuse_beside_discrepancy(sheet, discrepancy, correlated)
+    if wanders or correlated or discrepancy is not None:
+        refuse_inexact(sheet, readings, present, wanders, correlated, discrepancy is not None)
         steps = step**2 / 12.0
         if not correlated:
             by_sample = _wandering(sheet, readings - expected, deviation**2 + steps, present, given)
@@ -90,10 +100,14 @@ def log_likelihood(
 
 
 def log_density_left_out(
-    sheet: DataSheet, measured: ArrayLike, predicted: ArrayLike, noise_scale: ArrayLike = 1.0
+    sheet: DataSheet,
+    measured: ArrayLike,
+    predicted: ArrayLike,
+    noise_scale: ArrayLike = 1.0,
+    discrepancy: Discrepancy | None = None,
 ) -> Floats:
     """Log-density of each sample given all the others; see `LoadCell.log_density_left_out`."""
-    return log_likelihood(sheet, measured, predicted, noise_scale, pointwise=True, given=_given_others)
+    return log_likelihood(sheet, measured, predicted, noise_scale, True, discrepancy, left_out=True)
 
 
 def _is_plain(sheet: DataSheet) -> bool:
@@ -430,9 +444,11 @@ def _refuse_beyond(readings: Floats, step: Floats, limit: Floats, present: Index
         )
 
 
-def refuse_inexact(sheet: DataSheet, readings: Floats, present: Index, wanders: bool, correlated: bool) -> None:
-    """Refuse combinations whose likelihood has no exact or nearly exact form."""
-    what = "drift or an unknown bias" if wanders else "correlated noise"
+def refuse_inexact(
+    sheet: DataSheet, readings: Floats, present: Index, wanders: bool, correlated: bool, smooth: bool = False
+) -> None:
+    """Refuse combinations whose likelihood has no exact or nearly exact form; `smooth` beside a discrepancy."""
+    what = "a discrepancy" if smooth else "drift or an unknown bias" if wanders else "correlated noise"
     if math.isfinite(sheet.degrees_of_freedom):
         raise ParameterError(
             f"the likelihood of {what} with outliers (degrees_of_freedom) has no closed form: leave one of them out"
@@ -451,3 +467,17 @@ def refuse_inexact(sheet: DataSheet, readings: Floats, present: Index, wanders: 
             )
         if sheet.drift is not None and any(sheet.bias_uncertainty[i] for i in present):
             raise ParameterError("drift, an unknown bias and correlated noise exclude each other: leave one out")
+
+
+def _refuse_beside_discrepancy(sheet: DataSheet, discrepancy: Discrepancy, correlated: bool) -> None:
+    """Refuse correlated noise beside a discrepancy, and drift in another order than its own."""
+    if correlated:
+        raise ParameterError(
+            "a discrepancy and noise that is correlated between channels exclude each other: leave one of the two out"
+        )
+    if sheet.drift is not None and not discrepancy.course.is_measured_order:
+        raise ParameterError(
+            "a discrepancy is common to repeated sweeps, and a drift beside it requires that the samples of all sweeps "
+            "from one pivot in one direction follow one another, with drive angles in order: describe the drift by "
+            "bias_uncertainty, or infer one of the sweeps alone"
+        )

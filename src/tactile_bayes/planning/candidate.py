@@ -162,9 +162,7 @@ def _nested(
     def densities(points: Floats) -> Floats:
         inside = ((points > after.low) & (points < after.high)).all(axis=1)
         values = np.full((len(points), measured.sizes["sample"]), -np.inf)
-        values[inside] = after.likelihood.score(
-            *after.loads_with_errors(points[inside]), after.noise_scale(points[inside]), pointwise=True
-        )
+        values[inside] = after.log_likelihood(points[inside], pointwise=True)
         return values
 
     score = central_slopes(densities, point, steps).sum(axis=0)
@@ -189,10 +187,12 @@ def _nested(
 def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) -> xr.Dataset:
     """Return a simulated measurement of the model's record, of one truth, shape (d,)."""
     loads = model.loads(point[None])[0]
+    discrepancy = model.discrepancy_at(point)
     rod = model.likelihood.rod
     units = rod.load_units
     cell = model.likelihood.load_cell
-    readings = cell.simulate(loads, seed=rng, noise_scale=model.noise_scale(point[None])[0]) * units
+    scale = model.noise_scale(point[None])[0]
+    readings = cell.simulate(loads, seed=rng, noise_scale=scale, discrepancy=discrepancy) * units
     template = model.measured
     return template.assign({name: ("sample", readings[:, i], template[name].attrs) for i, name in enumerate(CHANNELS)})
 

@@ -10,6 +10,7 @@ from scipy.linalg import solve_triangular
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
+from tactile_bayes.load_cell.discrepancy import Discrepancy
 
 __all__ = ["Whitening", "whitening"]
 
@@ -34,7 +35,9 @@ class Whitening(NamedTuple):
         return np.asarray(solve_triangular(self.together, flat, lower=True)).reshape(kept.shape)
 
 
-def whitening(cell: LoadCell, loads: Floats, by_angle: Floats, present: Flags) -> Whitening:
+def whitening(
+    cell: LoadCell, loads: Floats, by_angle: Floats, present: Flags, discrepancy: Discrepancy | None = None
+) -> Whitening:
     """Return the whitening of the readings of loads, with errors of the encoder to first order.
 
     Parameters
@@ -47,12 +50,14 @@ def whitening(cell: LoadCell, loads: Floats, by_angle: Floats, present: Flags) -
         Derivatives of the readings by the drive angle.
     present : ndarray of bool, shape (3,)
         True for channels that were measured.
+    discrepancy : Discrepancy, optional
+        Smooth deviation that samples share.
     """
     samples = len(loads)
     covariance = cell.covariance(loads)
     covariance += cell.drive_angle_deviation**2 * by_angle[:, :, None] * by_angle[:, None, :]
     wandering = wandering_deviation(cell, samples)
-    shared = bool(np.any(wandering[:, present]))
+    shared = bool(np.any(wandering[:, present])) or discrepancy is not None
     index = np.arange(3)
     if not shared:
         chosen = covariance[:, present][:, :, present]
@@ -63,6 +68,8 @@ def whitening(cell: LoadCell, loads: Floats, by_angle: Floats, present: Flags) -
     whole = np.zeros((samples, channels, samples, channels))
     whole[np.arange(samples), :, np.arange(samples), :] = chosen
     sums = _wandering(cell, samples)[..., present]
+    if discrepancy is not None:
+        sums += discrepancy.covariance()[..., present]
     for c in range(channels):
         whole[:, c, :, c] += sums[..., c]
     size = samples * channels

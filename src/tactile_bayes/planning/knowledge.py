@@ -149,7 +149,7 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
     experiment = Experiment(empty, attrs["family"], cell, rod=rod, friction=friction, nuisances=nuisances)
     every = np.stack([columns[name] for name in experiment.model.names], axis=1)
     if unknown:  # a constant scale would make the covariance singular
-        every[:, -1] *= np.exp(0.05 * rng.standard_normal(len(every)))
+        every[:, experiment.model.names.index("noise_scale")] *= np.exp(0.05 * rng.standard_normal(len(every)))
     chosen = rng.choice(len(every), min(draws, len(every)), replace=False)
     return Knowledge(experiment, every[chosen], _precision(every), bases)
 

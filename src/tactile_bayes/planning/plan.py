@@ -141,8 +141,12 @@ class Plan:
 
     @cached_property
     def point(self) -> Floats:
-        """True values of the model's parameters, with the rig as stated, shape (d,)."""
-        own = family_parameters(self.contour)[1]
+        """True values of the model's parameters, with the rig as stated, shape (d,).
+
+        A discrepancy has the medians of its priors.
+        """
+        smooth = self.model.noise.of_discrepancy
+        own = {**family_parameters(self.contour)[1], **dict(zip(smooth, self.model.prior_medians(smooth), strict=True))}
         as_stated = {name: 1.0 for name in self.model.names if name.endswith(("_scale", "_gain"))}
         return np.array([own.get(name, as_stated.get(name, 0.0)) for name in self.model.names])
 

@@ -104,8 +104,9 @@ def record_information(
 
     For normal errors it is JᵀΣ⁻¹J, with J the derivatives of the readings; for Student's t with ν degrees of freedom it
     is smaller by (ν + 1)/(ν + 3), with Σ of the scale in place of the standard deviation. The snap-off also excludes
-    contours: that has no derivative and is not counted. The dependence of noise on the loads is not counted either,
-    and the information about the noise scale is that of white noise, which is too large with drift or encoder noise.
+    contours: that has no derivative and is not counted. The dependence of noise on the loads, and information about a
+    discrepancy, are not counted either, and the information about the noise scale is that of white noise, which is too
+    large with drift, encoder noise or a discrepancy.
 
     Parameters
     ----------
@@ -128,14 +129,14 @@ def record_information(
     cell = scaled_cell(cell, model.noise_scale(point[None])[0])
     present = model.present if channels is None else model.present & channels
     loads, by_parameters, by_angle = reading_slopes(model, point) if slopes is None else slopes
-    white = whitening(cell, loads, by_angle, present)(by_parameters)
+    white = whitening(cell, loads, by_angle, present, model.discrepancy_at(point))(by_parameters)
     nu = cell.degrees_of_freedom
     if not math.isinf(nu):  # the covariance is wider than the scale by ν/(ν − 2)
         white = white * math.sqrt((nu + 1.0) / (nu + 3.0) * nu / (nu - 2.0))
     every = np.zeros((*white.shape[:2], point.size))
     every[..., : len(model.forward_parameters)] = white
     of_noise = np.zeros(point.size)
-    for name, scaled in zip(model.noise.names, model.noise.channels, strict=True):
+    for name, scaled in zip(model.noise.of_white, model.noise.channels, strict=True):
         count = len(loads) * sum(present[CHANNELS.index(c)] for c in scaled)
         share = 1.0 if math.isinf(nu) else nu / (nu + 3.0)
         i = model.names.index(name)

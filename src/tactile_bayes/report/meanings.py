@@ -26,6 +26,8 @@ _MEANINGS = {
     "noise_scale": "noise over stated noise",
     "moment_noise": "noise of the holding moment",
     "force_noise": "noise of the forces",
+    "discrepancy_scale": "standard deviation of the discrepancy over the largest load of a sweep",
+    "discrepancy_length": "drive angle over which the discrepancy changes",
     "rigidity_scale": "flexural rigidity over stated flexural rigidity",
     "drive_angle_offset": "encoder offset",
     "lever_x": "x of the cell's reference point of the moment, from the pivot",

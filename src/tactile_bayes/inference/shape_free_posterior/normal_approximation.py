@@ -14,6 +14,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.discrepancy import load_in_contact
 from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import CHANNELS
@@ -62,6 +63,11 @@ def linear_names(model: ContourModel) -> tuple[str, ...]:
     return (*rough, *sorted(model.nuisances.names, key=MAY_VANISH.__contains__))
 
 
+def _white_scales(model: ContourModel) -> slice:
+    """Return the place of the white noise among the scales."""
+    return slice(len(_OF_ROUGHNESS), len(_OF_ROUGHNESS) + len(model.noise.of_white))
+
+
 def split(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
     """Return scales (amplitude, length scale, noise), (n, scales), and linear parameters, (n, d), of points."""
     values = model.values(points)
@@ -76,6 +82,47 @@ def joined(model: ContourModel, scales: Floats, linear: Floats) -> Floats:
     points = np.empty((len(linear), len(names)))
     points[:, [model.names.index(name) for name in names]] = np.hstack([scales, np.exp(linear[:, :1]), linear[:, 1:]])
     return points
+
+
+class _SmoothNoise(NamedTuple):
+    """White noise that is as harmful as a discrepancy to what changes slowly along a sweep, the shape of a contour."""
+
+    size: Floats
+    """Root mean square of the largest load in contact over the noise, for each parameter of the noise."""
+    step: float
+    """Distance of samples."""
+    longest: float
+    """Length of a sweep in contact."""
+
+    @classmethod
+    def at(cls, observer: Observer, point: Floats) -> _SmoothNoise:
+        """Return the noise for the loads of a point, shape (1, parameters)."""
+        model = observer.model
+        nothing = cls(np.zeros(len(model.noise.channels)), 1.0, 1.0)
+        if not model.noise.of_discrepancy:
+            return nothing
+        loads, _ = model.likelihood.predict(model.contours(point), model.rig(point))
+        course = model.likelihood.course
+        largest = load_in_contact(loads[0], course) / observer.noise
+        in_contact = largest.any(axis=1)
+        if not in_contact.any():
+            return nothing
+        sizes = []
+        for channels in model.noise.channels:
+            chosen = [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]]
+            sizes.append(np.sqrt(np.mean(np.square(largest[in_contact][:, chosen]))))
+        step = float(np.mean(course.step[np.isfinite(course.step)]))
+        sweeps = np.count_nonzero(np.isinf(course.step))
+        return cls(np.array(sizes), step, step * np.count_nonzero(in_contact) / sweeps)
+
+    def beside(self, white: Floats, discrepancy: Floats) -> Floats:
+        """Return the noise, shape (n, noises), beside a discrepancy of scale and length (n, 2), or none (n, 0)."""
+        if not discrepancy.size:
+            return white
+        scale, length = discrepancy[:, :1], discrepancy[:, 1:]
+        # The integral of Matérn's correlation, ν = 3/2, is 4/√3 lengths.
+        alike = np.minimum(4.0 / np.sqrt(3.0) * length, self.longest) / self.step
+        return np.asarray(np.hypot(white, scale * np.sqrt(np.maximum(alike, 1.0)) * self.size))
 
 
 class Observer:
@@ -155,6 +202,8 @@ class NormalApproximation:
         self.prior, self.model = prior, observer.model
         family = observer.model.family
         assert isinstance(family, ShapeFreeFamily)
+        self._white = _white_scales(observer.model)
+        self._smooth = _SmoothNoise.at(observer, joined(observer.model, scales[None], linear[None]))
         known, self._count = family.radius.directions, family.radius.count
         self.vanishing = int(np.count_nonzero(observer.model.may_vanish))
         slopes, self._observed, self._kinds, self._readings = _linearised(observer, family, prior, scales, linear)
@@ -169,13 +218,16 @@ class NormalApproximation:
     @property
     def arrays(self) -> tuple[Floats, ...]:
         """Arrays that determine `conditional`."""
-        return self._through.c, self._observed, *self.prior
+        size, step, longest = self._smooth
+        smooth = [np.array([*size, step, longest])] if self.model.noise.of_discrepancy else []
+        return self._through.c, self._observed, *self.prior, *smooth
 
     def conditional(self, scales: Floats) -> tuple[Floats, Floats]:
         """Return L⁻¹b, (n, d), and L, (n, d, d), given scales (n, scales): precision L·Lᵀ and mean L⁻ᵀL⁻¹b."""
         at = np.clip(np.log(scales[:, 1]), self._through.x[0], self._through.x[-1])
         # One over the noise of the observations; that of the snap-offs is known.
-        certainty = np.hstack([1.0 / scales[:, 2:], np.ones((len(scales), 1))])[:, self._kinds]
+        noise = self._smooth.beside(scales[:, self._white], scales[:, self._white.stop :])
+        certainty = np.hstack([1.0 / noise, np.ones((len(scales), 1))])[:, self._kinds]
         through = self._through(at) * certainty[:, None, :]
         through[:, 1 : 1 + self._count] *= scales[:, :1, None]
         precision = through @ np.swapaxes(through, 1, 2)
@@ -228,9 +280,14 @@ class NormalApproximation:
 
     def log_evidence(self, scales: Floats) -> float:
         """Return the log-density of readings and snap-offs given scales of shape (scales,), up to a constant."""
-        pulled, root = (of_one[0] for of_one in self.conditional(scales[None]))
-        certainty = np.append(1.0 / scales[2:], 1.0)[self._kinds]
-        volume = np.sum(self._readings * np.log(scales[2:])) + np.log(np.diag(root)).sum()
+        known = scales.copy()
+        known[self._white.stop :] = (
+            0.0  # a discrepancy is no white noise, from which the size of the residuals tells it
+        )
+        pulled, root = (of_one[0] for of_one in self.conditional(known[None]))
+        noise = scales[self._white]
+        certainty = np.append(1.0 / noise, 1.0)[self._kinds]
+        volume = np.sum(self._readings * np.log(noise)) + np.log(np.diag(root)).sum()
         return float(0.5 * (pulled @ pulled - np.sum(np.square(certainty * self._observed))) - volume)
 
 
@@ -261,7 +318,7 @@ def _linearised(
     # A sample that is loaded on one side of a difference only has no slope.
     smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
     observed, counts = [], []
-    for channels, scale in zip(model.noise.channels, scales[2:], strict=True):
+    for channels, scale in zip(model.noise.channels, scales[_white_scales(model)], strict=True):
         chosen = [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]]
         of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
         of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * scale / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
