@@ -120,7 +120,7 @@ def rods(
     path = np.stack([record[f"base_{axis}"].values[record["sweep"].values == number] for axis in "xy"])
     if np.ptp(path, axis=1).any():
         ax.plot(*path, color="0.5", linewidth=0.8, zorder=1.5, label="path of the base")
-    draw_pivot(ax, events.base, label="base at the beginning" if np.ptp(path, axis=1).any() else "pivot")
+    draw_pivot(ax, events.base, label="base at start" if np.ptp(path, axis=1).any() else "pivot")
     draw_object(ax, scan.contour, extent[0], extent[1], room=0.05 * rod.length_unit)
     finish_map(ax, record["base_x"].attrs)
     return ax
