@@ -9,7 +9,7 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
 from tactile_bayes.load_cell import zero_load
-from tactile_bayes.record import carried_sweeps, travel_of_sample
+from tactile_bayes.record import carried_sweeps, travels_of
 
 CIRCLE = tb.contours.Circle(0.3, 0.8)
 THERE = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
@@ -72,7 +72,7 @@ def test_a_rod_that_moves_along_itself_has_no_direction(tmp_path):
 def test_travels_are_ways_where_the_base_is_carried():
     record = tb.scan(CIRCLE, drive=[tb.Rotation(), THERE]).record
     turned = record.sweep.values < 2
-    travels = travel_of_sample(record)
+    travels = travels_of(record)
     np.testing.assert_array_equal(travels[turned], record.drive_angle.values[turned])
     np.testing.assert_allclose(travels[~turned], 0.01 * np.arange(161), atol=1e-12)
 
@@ -104,5 +104,5 @@ def test_lengths_of_a_stage_are_in_metres(tmp_path):
     record = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rod=ROD).record
     path = _stage(tmp_path / "stage.csv", record, "# drive_angle: 68.75 [deg]\n")
     read = tb.read_record(path, rod=ROD, split_sweeps=True)
-    assert travel_of_sample(read)[-1] == pytest.approx(0.16)
+    assert travels_of(read)[-1] == pytest.approx(0.16)
     assert set(read.direction.values) == {"forward"}

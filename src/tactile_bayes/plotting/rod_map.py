@@ -119,7 +119,7 @@ def rods(
         ax.plot(event.contact_x, event.contact_y, "o", color=PALETTE["change"], markersize=4.0, zorder=3.5)
     path = np.stack([record[f"base_{axis}"].values[record["sweep"].values == number] for axis in "xy"])
     if np.ptp(path, axis=1).any():
-        ax.plot(*path, color="0.5", linewidth=0.8, zorder=1.5, label="path of the base")
+        ax.plot(*path, color="0.5", linewidth=0.8, zorder=1.5, label="base path")
     draw_pivot(ax, events.base, label="base at start" if np.ptp(path, axis=1).any() else "pivot")
     draw_object(ax, scan.contour, extent[0], extent[1], room=0.05 * rod.length_unit)
     finish_map(ax, record["base_x"].attrs)

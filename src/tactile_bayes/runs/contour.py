@@ -30,7 +30,7 @@ from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod
 from tactile_bayes.runs.folder import Folder, panels
-from tactile_bayes.sweep import Scan, drives_of, scan
+from tactile_bayes.sweep import Scan, recorded_drives, scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
@@ -257,7 +257,7 @@ class _Figures:
         if carried_sweeps(self.measured):
             return scan(
                 contours_of(draw, attrs["family"]).take(np.array(0)),
-                drive=drives_of(self.measured),
+                drive=recorded_drives(self.measured),
                 rod=rod_of(self.measured),
                 friction=float(draw.get("friction", attrs["friction"])),
             )
@@ -285,7 +285,7 @@ class _Figures:
     def rods(self) -> Any:
         if carried_sweeps(self.measured):
             count = len(self.fitted.sweeps)
-            axes = panels(count, 1, 7.0, 4.0 * count)
+            axes = panels(count, 1, 8.5, 4.0 * count)  # maps of a base that moves are wide
             for number, ax in enumerate(axes[:, 0]):
                 plotting.rods(self.fitted, sweep=number, ax=ax)
             return axes

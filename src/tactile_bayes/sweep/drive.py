@@ -17,7 +17,7 @@ from tactile_bayes.checks import check_number, check_numbers, check_positive
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import carried_sweeps
 
-__all__ = ["Carried", "Drive", "Motion", "Rotation", "Translation", "drives_of"]
+__all__ = ["Carried", "Drive", "Motion", "Rotation", "Translation", "recorded_drives"]
 
 _ROUNDING = 1e-15
 _TURN = 2.0 * math.pi
@@ -184,7 +184,7 @@ class Motion(Carried):
         return np.stack([self.x, self.y, self.drive_angle], axis=1)
 
 
-def drives_of(record: xr.Dataset) -> list[Drive]:
+def recorded_drives(record: xr.Dataset) -> list[Drive]:
     """Return the drives of a record: a rotation about each pivot, and a motion for each sweep that carries the base."""
     carried = carried_sweeps(record)
     drives: dict[object, Drive] = {}
