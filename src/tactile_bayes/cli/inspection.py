@@ -116,7 +116,10 @@ def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
 
 
 def _sweeps(sweeps: xr.Dataset) -> Table:
-    """Return the table of sweeps, with angles in degrees; events lie midway between the samples beside them."""
+    """Return the table of sweeps; events lie midway between the samples beside them.
+
+    Angles are in degrees, and travels of a base that is carried in mm or rod lengths, with their unit.
+    """
     import numpy as np
 
     pivots = [f"{x:g},{y:g}" for x, y in zip(sweeps.base_x.values, sweeps.base_y.values, strict=True)]
@@ -128,19 +131,31 @@ def _sweeps(sweeps: xr.Dataset) -> Table:
         row = sweeps.isel(sweep=i)
         start, end, step = (np.degrees(float(row[f"drive_{name}"])) for name in ("angle_from", "angle_to", "step"))
         ends = [_place(np.degrees(row[f"{name}_drive_angle"].values)) for name in ("onset", "snap_off")]
+        moves = [f"{start:.1f} to {end:.1f}", f"{step:.3g}"]
+        if "carried" in row and bool(row.carried):
+            along = (_travel(float(row[name]), unit) for name in ("travel", "travel_step"))
+            moves = [f"{words} {text}" for words, text in zip(("carried", "by"), along, strict=True)]
+            ends = [_travel(float(row[f"{name}_travel"].mean(skipna=False)), unit) for name in ("onset", "snap_off")]
         rows.append(
             [
                 f"{number} {row.direction.values}",
                 *([pivots[i]] if with_pivots else []),
                 str(int(row.samples)),
-                f"{start:.1f} to {end:.1f}",
-                f"{step:.3g}",
+                *moves,
                 *(ends if bool(row.contact) else ["never", "–"]),
                 str(int(row.unloaded)),
             ]
         )
-    heads = ["sweep", *([base] if with_pivots else []), "samples", "drive [°]", "step", "touches", "lets go"]
+    drive = "drive [°]" if "carried" not in sweeps else "drive [°], or travel"
+    heads = ["sweep", *([base] if with_pivots else []), "samples", drive, "step", "touches", "lets go"]
     return table_of([*heads, "unloaded"], rows, left=["sweep"])
+
+
+def _travel(value: float, unit: str) -> str:
+    """Return a travel of the base with its unit."""
+    if value != value:
+        return "–"
+    return f"{value:.4g} L" if unit == "1" else f"{1e3 * value:.4g} mm"
 
 
 def _place(beside: Any) -> str:
@@ -178,6 +193,10 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
         sweeps, found.sweeps.onset_drive_angle.values, found.sweeps.snap_off_drive_angle.values, strict=True
     ):
         row |= {"onset_drive_angle": onset, "snap_off_drive_angle": snap}
+    for name in ("onset_travel", "snap_off_travel"):
+        if name in found.sweeps:
+            for row, beside in zip(sweeps, found.sweeps[name].values, strict=True):
+                row[name] = beside
     return {
         "words": found.messages,
         "is_suspect": found.is_suspect,

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_bayes.cli.numbers import numbers_asked
+from tactile_bayes.cli.numbers import columns_in, numbers_asked
 
 if TYPE_CHECKING:
-    from tactile_bayes.arrays import Floats
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.mechanics.rod import Rod
 
@@ -90,7 +89,7 @@ class RodOptions:
         if self.rod_shape is not None:
             if self.length is not None or self.rest_curvature:
                 raise ParameterError("--rod-shape gives length and rest curvature: leave out the options of these")
-            x, y = points_in(self.rod_shape)
+            x, y = columns_in(self.rod_shape, ("x", "y"))
             return Rod.from_shape(x, y, self.flexural_rigidity, diameter=self.diameter, taper=self.taper)
         if (self.length is None) != (self.flexural_rigidity is None):
             raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
@@ -165,36 +164,3 @@ class UnknownOptions:
             raise ParameterError("--as-stated and --nuisance contradict each other: leave one of them out")
         smooth = [DISCREPANCY] if self.discrepancy else []
         return smooth if self.as_stated else [*(self.nuisance or STANDARD), *smooth]
-
-
-def points_in(path: Path) -> tuple[Floats, Floats]:
-    """Return the columns x and y of a CSV file with points.
-
-    Raises
-    ------
-    ParameterError
-        If the file cannot be read, has no such columns, or a value is no number.
-    """
-    import csv
-
-    import numpy as np
-
-    from tactile_bayes.errors import ParameterError
-    from tactile_bayes.record.cell import number_in
-
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ParameterError(f"{path}: the points cannot be read ({error})") from error
-    columns = []
-    for name in ("x", "y"):
-        values = [number_in(row.get(name) or "") for row in rows]
-        if not values or None in values:
-            at = values.index(None) + 1 if values else 0
-            raise ParameterError(
-                f"{path}: point {at} has no number in column {name!r}: write a line 'x,y', then a point in each line, "
-                "in metres, with decimal points"
-            )
-        columns.append(np.array(values, dtype=float))
-    return columns[0], columns[1]

@@ -11,6 +11,7 @@ import typer
 from tactile_bayes.cli.answer import Answer, table_of
 from tactile_bayes.cli.command import Output
 from tactile_bayes.cli.contour_options import ContourOptions
+from tactile_bayes.cli.drive_options import DriveOptions
 from tactile_bayes.cli.rig_options import Friction, RigOptions
 from tactile_bayes.cli.task_bar import step_bar
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from tactile_bayes.mechanics.rod import Rod
-    from tactile_bayes.sweep import Scan
+    from tactile_bayes.sweep import Event, Scan
 
 __all__ = ["RecordFile", "refuse_other_suffix", "scan"]
 
@@ -35,10 +36,10 @@ def scan(
     out: RecordFile,
     choice: ContourOptions,
     rig: RigOptions,
+    drive: DriveOptions,
     direction: Annotated[
-        Literal["both", "forward", "backward"], typer.Option(help="Sense of the sweeps from each pivot.")
+        Literal["both", "forward", "backward"], typer.Option(help="Sense of the rotations about each pivot.")
     ] = "both",
-    drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.001, max=28.0)] = 1.0,
     friction: Friction = 0.0,
     figure: Annotated[
         Path | None,
@@ -48,7 +49,10 @@ def scan(
     ] = None,
     output: Output,
 ) -> Answer:
-    """Sweep an ideal rod along a contour (Step 1), and write the record of its base, without noise, and its events."""
+    """Sweep an ideal rod along a contour (Step 1), and write the record of its base, without noise, and its events.
+
+    The drive turns the rod about each --base, or carries its base (--carry, --poses); with both, the record holds both.
+    """
     refuse_other_suffix(out)
     if figure is not None:
         refuse_other_suffix(figure, (".png", ".pdf", ".svg"), "a figure")
@@ -58,11 +62,12 @@ def scan(
         from tactile_bayes.sweep import scan as sweep
 
         rod = rig.rod or Rod()
+        drives = drive.drives(rig.pivots if rig.base or not drive.carries else [])
         made = sweep(
             choice.contour(rod.length),
+            drive=drives,
             direction=direction,
-            base=rig.pivots,  # type: ignore[arg-type]  # of two numbers each
-            drive_step=math.radians(drive_step),
+            drive_step=drive.step(drives),
             rod=rod,
             friction=friction,
         )
@@ -109,27 +114,45 @@ def _headline(made: Scan, rod: Rod) -> str:
 
 def _table(made: Scan, rod: Rod) -> Table:
     """Return first contact, phase changes and snap-off of every sweep, in this order."""
+    from tactile_bayes.record import carried_sweeps
+
     scale, units = (1.0, ("", "", "")) if rod.is_dimensionless else (1e3, (" [mm]", " [mN m]", " [mN]"))
     length, moment, force = units
+    carried = carried_sweeps(made.record)
     rows = []
     for number, sweep in enumerate(made.sweeps):
         for event in (sweep.first_contact, *sweep.transitions, sweep.snap_off):
             size = math.hypot(event.force_x, event.force_y)
             values = (scale * v for v in (event.contact_x, event.contact_y, event.holding_moment, size))
-            numbers = [f"{value:z.4f}" if abs(value) < 1e3 else f"{value:.5g}" for value in values]
+            travel = [_fixed(scale * event.travel) if number in carried else ""] if carried else []
+            numbers = [*travel, f"{math.degrees(event.drive_angle):.3f}", *map(_fixed, values)]
             sweeping, name = "", event.kind
             if event is sweep.first_contact:
                 sweeping, name = f"{number} {sweep.direction}", f"first contact ({name})"
             elif event is sweep.snap_off:
-                name = f"snap-off ({name})"
-            rows.append([sweeping, name, f"{math.degrees(event.drive_angle):.3f}", *numbers])
-    heads = ["sweep", "event", "at [°]", f"x{length}", f"y{length}", f"m0{moment}", f"force{force}"]
+                name = _ending(event)
+            rows.append([sweeping, name, *numbers])
+    travel = [f"travel{length or ' [L]'}"] if carried else []
+    heads = ["sweep", "event", *travel, "at [°]", f"x{length}", f"y{length}", f"m0{moment}", f"force{force}"]
     return table_of(heads, rows, left=["sweep", "event"])
+
+
+def _fixed(value: float) -> str:
+    return f"{value:z.4f}" if abs(value) < 1e3 else f"{value:.5g}"
+
+
+def _ending(event: Event) -> str:
+    """Return how contact ends, as text."""
+    ways = {"release": "released without a jump", "never": "still in contact at the end"}
+    return ways.get(event.kind, f"snap-off ({event.kind})")
 
 
 def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
     from dataclasses import asdict
 
+    from tactile_bayes.record import carried_sweeps
+
+    carried = carried_sweeps(made.record)
     return {
         "contour": str(made.contour),
         "units": made.record.attrs["units"],
@@ -140,6 +163,7 @@ def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
                 "sweep": number,
                 "direction": sweep.direction,
                 "base": sweep.base,
+                "carried": number in carried,
                 "clear": sweep.clear,
                 "largest_strain": sweep.largest_strain,
                 "first_contact": asdict(sweep.first_contact),
@@ -153,20 +177,19 @@ def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
 
 
 def _draw(made: Scan, path: Path) -> None:
-    """Draw rods of every sweep from the first pivot, and the loads below."""
+    """Draw rods of every sweep from the first pivot and of sweeps in which the base is carried, and the loads below."""
     from matplotlib.figure import Figure
 
     from tactile_bayes import plotting
+    from tactile_bayes.record import carried_sweeps
     from tactile_bayes.tasks import write_atomically
 
-    shown = [number for number, sweep in enumerate(made.sweeps) if sweep.base == made.sweeps[0].base]
+    carried = carried_sweeps(made.record)
+    shown = [n for n, sweep in enumerate(made.sweeps) if sweep.base == made.sweeps[0].base or n in carried]
     figure = Figure(figsize=(7.0, 5.0 + 3.4 * len(shown)), layout="constrained")
     parts: Any = figure.subfigures(2, 1, height_ratios=(3.4 * len(shown), 5.0))
     for number, ax in zip(shown, parts[0].subplots(len(shown), 1, squeeze=False)[:, 0], strict=True):
         plotting.rods(made, sweep=number, ax=ax)
-    one_base = len(shown) == len(made.sweeps)
-    plotting.observables(
-        made.record, events=made.events if one_base else None, axes=parts[1].subplots(3, 1, sharex=True)
-    )
+    plotting.observables(made.record, events=made.events, axes=parts[1].subplots(3, 1, sharex=True))
     with write_atomically(path) as temporary:
         figure.savefig(temporary, dpi=200, format=path.suffix[1:])

@@ -14,6 +14,7 @@ from tactile_bayes.inference.discrepancy import PARAMETERS
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, rough_noise
+from tactile_bayes.record import carried_sweeps, travels_of
 
 __all__ = ["DISCREPANCIES", "Residuals", "check_record", "residuals_of"]
 
@@ -80,7 +81,8 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             Discrepancy above its median over predictions, over the same of their 95 % quantile: 1 is unusual, some
             tens are a visible misfit.
         worst_sweep, worst_from, worst_to (channel)
-            Sweep and drive angles [rad] of the stretch whose mean residual is largest, in standard errors.
+            Sweep and drive angles [rad] of the stretch whose mean residual is largest, in standard errors. If the drive
+            carries the base in some sweep, also worst_from_travel and worst_to_travel, as in the group `events`.
         worst_residual (channel)
             That mean, in the record's units.
         neighbour_noise (channel)
@@ -149,6 +151,13 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     angle, sweep = columns.drive_angle.values, columns.sweep.values
     worst = [_worst_stretch(of_channel) for of_channel in residuals.values()]
     means = [float(np.mean((r.values[0] * r.scale)[rows])) for r, rows in zip(residuals.values(), worst, strict=True)]
+    travels = {}
+    if carried_sweeps(record_of(posterior)):
+        along = travels_of(record_of(posterior))
+        travels = {
+            f"worst_{end}_travel": ("channel", [float(along[rows[place]]) for rows in worst])
+            for end, place in (("from", 0), ("to", -1))
+        }
     false_alarm = max(false_alarm, 1.0 / (1.0 + predictions))
     predicted = posterior["posterior_predictive"].to_dataset()
     units = {name: str(predicted[name].attrs.get("units", "1")) for name in channels}
@@ -162,6 +171,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             "worst_sweep": ("channel", [int(sweep[rows[0]]) for rows in worst]),
             "worst_from": ("channel", [float(angle[rows[0]]) for rows in worst], {"units": "rad"}),
             "worst_to": ("channel", [float(angle[rows[-1]]) for rows in worst], {"units": "rad"}),
+            **travels,
             "worst_residual": ("channel", means),
             "neighbour_noise": ("channel", [_neighbour_noise(of_channel) for of_channel in residuals.values()]),
             "overall_p_value": overall,
@@ -213,11 +223,11 @@ def _loaded(posterior: xr.DataTree) -> Flags:
     record = record_of(posterior)
     events = posterior["events"].to_dataset().median(("chain", "draw"))
     segments = RecordLikelihood(record, LoadCell.from_record(record) or LoadCell()).segments
-    angle = record.drive_angle.values
-    loaded = np.zeros(angle.size, dtype=bool)
-    ends = np.sort(np.stack([events.first_drive_angle.values, events.snap_off_drive_angle.values]), axis=0)
+    along, place = travels_of(record), "travel" if carried_sweeps(record) else "drive_angle"
+    loaded = np.zeros(along.size, dtype=bool)
+    ends = np.sort(np.stack([events[f"first_{place}"].values, events[f"snap_off_{place}"].values]), axis=0)
     for segment, low, high in zip(segments, *ends, strict=True):
-        loaded[segment.samples] = (angle[segment.samples] >= low) & (angle[segment.samples] <= high)
+        loaded[segment.samples] = (along[segment.samples] >= low) & (along[segment.samples] <= high)
     return loaded
 
 

@@ -14,7 +14,15 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import DriftWarning, RecordError
 from tactile_bayes.load_cell.contact_bounds import FEWEST, ContactBounds, contact_bounds
-from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, present_channels, validate
+from tactile_bayes.record import (
+    CHANNELS,
+    COLUMNS,
+    carried_sweeps,
+    frame_of,
+    present_channels,
+    travels_of,
+    validate,
+)
 
 __all__ = ["found_cell", "zero_load"]
 
@@ -51,7 +59,9 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
             Samples of the record between which contact began and ended: the last "before" the event and the first
             "after" it that are certainly unloaded or loaded, which at onset are at least two apart; -1 where there is
             none, as before the onset of a sweep that is loaded from its first sample. Their drive angles, or NaN, are
-            onset_drive_angle and snap_off_drive_angle [rad].
+            onset_drive_angle and snap_off_drive_angle [rad]. If the drive carries the base in some sweep, there are
+            also onset_travel and snap_off_travel: ways of the base from the sweep's first sample [length] where it does
+            so, and else drive angles [rad].
         unloaded (sample)
             Samples from which bias and noise are estimated: up to "before" of the onset and from "after" of the
             snap-off, and sweeps of at least 12 samples with neither contact nor slope at a level of 5 %.
@@ -251,6 +261,9 @@ def _labelled(
         variables[name] = (dims, sample, {"long_name": f"samples beside {event}"})
         attrs = {"units": "rad", "long_name": f"drive angles beside {event}"}
         variables[f"{name}_drive_angle"] = (dims, np.where(sample < 0, np.nan, angle[sample]), attrs)
+        if carried_sweeps(record):
+            attrs = {"long_name": f"travels of the drive beside {event}"}
+            variables[f"{name}_travel"] = (dims, np.where(sample < 0, np.nan, travels_of(record)[sample]), attrs)
     for name, values in statistics.items():
         of_all = np.full(len(CHANNELS), np.nan)
         of_all[[CHANNELS.index(channel) for channel in channels]] = values

@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
-from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
+from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
+from tactile_bayes.plotting.labels import LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.marks import PALETTE
 from tactile_bayes.plotting.sweep_lines import finish_channels, reading_style
 from tactile_bayes.record import CHANNELS, present_channels
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
 
+    from tactile_bayes.arrays import Index
     from tactile_bayes.diagnostics.inspection import Inspection
 
 __all__ = ["inspection"]
@@ -33,14 +36,15 @@ _LEGEND = ["forward", "backward", "first contact", "snap-off", *(words for words
 
 
 def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
-    """Draw the observables of a record over the drive angle, marks of wrong samples, and unloaded samples enlarged.
+    """Draw the observables of a record along the drive, marks of wrong samples, and unloaded samples enlarged.
 
     Parameters
     ----------
     inspected : Inspection
         From `tactile_bayes.inspect_record`.
     axes : array of Axes, shape (3, 2), optional
-        A row for each of holding_moment, force_x and force_y. The left Axes hold readings over the drive angle:
+        A row for each of holding_moment, force_x and force_y. The left Axes hold readings over the drive angle,
+        the travel of the base, or the number of the sample, as in `observables`:
         vertical lines between the samples beside first contact (dotted) and snap-off (dashed) have the colour of the
         sweep's direction; rings and other marks show samples that look wrong. The right Axes hold readings of the
         unloaded samples in the order of measurement, with their mean and two standard deviations to either side.
@@ -48,7 +52,7 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
     Returns
     -------
     ndarray of Axes, shape (3, 2)
-        Drive angles are in degrees.
+        Drive angles are in degrees, and travels in the record's unit of length, or its thousandth.
 
     Raises
     ------
@@ -69,6 +73,7 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
     else:
         panels = check_panels(axes, (3, 2), f"a row for each of {', '.join(CHANNELS)}")
     record = inspected.record
+    along = drive_axis(record)
     for index, channel in enumerate(CHANNELS):
         readings, zero = panels[index]
         label = LABELS[channel]
@@ -76,12 +81,12 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
             write_not_measured(readings, label)
             zero.set_yticks([])
             continue
-        _draw_readings(readings, inspected, index)
+        _draw_readings(readings, inspected, index, along)
         set_unit(readings.yaxis, f"{label}\n", channel, record[channel].attrs, record[channel].values)
         _draw_unloaded(zero, inspected, index)
         unloaded = record[channel].values[inspected.samples.unloaded.values]
         set_unit(zero.yaxis, "", channel, record[channel].attrs, unloaded)
-    panels[-1, 0].set_xlabel(DRIVE_ANGLE)
+    along.label(panels[-1, 0].xaxis, with_ticks=False)
     panels[-1, 1].set_xlabel("sample")
     panels[0, 1].set_title("unloaded", fontsize="small")
     panels[0, 0].figure.align_ylabels(list(panels[:, 0]))
@@ -89,24 +94,38 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
     return panels
 
 
-def _draw_readings(ax: Axes, inspected: Inspection, index: int) -> None:
+def _draw_readings(ax: Axes, inspected: Inspection, index: int, along: DriveAxis) -> None:
     record, sweeps = inspected.record, inspected.sweeps
-    angle, reading = np.degrees(record.drive_angle.values), record[CHANNELS[index]].values
+    places, reading = along.values, record[CHANNELS[index]].values
     ax.axhline(0.0, color="0.85", linewidth=0.8, zorder=0)
+    for start in along.starts:
+        ax.axvline(start, color="0.6", linewidth=0.8, zorder=0)
     for place, number in enumerate(sweeps.sweep.values):
         direction = str(sweeps.direction.values[place])
         rows = record.sweep.values == number
         style = reading_style(direction, _COLOURS[direction])
-        ax.plot(angle[rows], reading[rows], **style)
+        ax.plot(places[rows], reading[rows], **style)
         legend_entry(ax, direction, **style)
         for event, label, line in (("onset", "first contact", ":"), ("snap_off", "snap-off", "--")):
-            between = float(np.degrees(sweeps[f"{event}_drive_angle"].values[place].mean()))
+            between = _between(sweeps.isel(sweep=place), event, along, np.flatnonzero(rows))
             if np.isfinite(between):
                 ax.axvline(between, color=_COLOURS[direction], linestyle=line, linewidth=1.0, zorder=0.5)
                 legend_entry(ax, label, color="0.35", linestyle=line, linewidth=1.0)
     for name, flags in _wrong(inspected, index):
         label, special = _WRONG[name]
-        ax.plot(angle[flags], reading[flags], label=label, **_MARKS, **special)
+        ax.plot(places[flags], reading[flags], label=label, **_MARKS, **special)
+
+
+def _between(sweep: xr.Dataset, event: str, along: DriveAxis, rows: Index) -> float:
+    """Return the place midway between the samples beside an event of a sweep; NaN where there is none."""
+    if along.kind == "angle":
+        return float(np.degrees(sweep[f"{event}_drive_angle"].values.mean()))
+    travel = float(sweep[f"{event}_travel"].values.mean())
+    if along.kind == "travel" or not np.isfinite(travel):
+        return travel
+    travels = along.travels[rows]
+    order = np.argsort(travels, kind="stable")
+    return float(np.interp(travel, travels[order], along.values[rows][order]))
 
 
 def _draw_unloaded(ax: Axes, inspected: Inspection, index: int) -> None:

@@ -1,4 +1,4 @@
-"""Figures of a record: observables over the drive angle, and their posterior predictive interval."""
+"""Figures of a record: observables along the drive, and their posterior predictive interval."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
-from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
+from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
+from tactile_bayes.plotting.labels import LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
 from tactile_bayes.plotting.sweep_lines import draw_events, finish_channels, phase_runs, reading_style, with_events
@@ -29,6 +28,9 @@ _SWEEPS = {"forward": "#0072B2", "backward": "#B34700"}
 """Colours of residuals of two overlapping sweeps, after Okabe and Ito."""
 
 _ENDS = ("lower", "upper")
+_ALONG = "along_drive"
+"""Variable with the coordinate of a sample in the figure."""
+
 _FARTHEST = 8.0
 """Largest residual within a panel's limits: a single outlier must not flatten all others."""
 
@@ -46,7 +48,8 @@ def observables(
 
     The paper's doi is 10.1155/2018/1613945. A record without noise, as `scan` returns it, is drawn as lines coloured by
     contact phase; any other record as points, with its truth, if it has one, as thin lines. Forces are drawn in the
-    frame of the record.
+    frame of the record. A record of drives that carry the base is drawn over the travel of the base; one in which the
+    drive turns in some sweeps and carries the base in others over the number of the sample, sweep beside sweep.
 
     Parameters
     ----------
@@ -61,7 +64,7 @@ def observables(
     Returns
     -------
     ndarray of Axes, shape (3,)
-        Drive angles are in degrees.
+        Drive angles are in degrees, and travels in the record's unit of length, or its thousandth.
 
     Raises
     ------
@@ -81,8 +84,9 @@ def observables(
     """
     record = validate(record)
     panels = _panels(axes)
-    _draw_observables(panels, record, events, with_truth=True)
-    _finish_panels(panels, axes is None)
+    along = drive_axis(record)
+    _draw_observables(panels, record, events, along, with_truth=True)
+    _finish_panels(panels, along, axes is None)
     return panels
 
 
@@ -117,7 +121,7 @@ def predictive(
     Returns
     -------
     ndarray of Axes, shape (3,)
-        Axes of the channels; drive angles are in degrees. A new figure has residuals below each channel.
+        Axes of the channels over the coordinate of `observables`. A new figure has residuals below each channel.
 
     Raises
     ------
@@ -157,23 +161,23 @@ def predictive(
         panels, below = both[::2], both[1::2]
     else:
         panels, below = _panels(axes), np.full(3, None) if residuals is None else _panels(residuals)
-    _draw_observables(panels, record, None, with_truth=False)
+    along = drive_axis(record)
+    _draw_observables(panels, record, None, along, with_truth=False)
     for channel, panel, ax in zip(CHANNELS, panels, below, strict=True):
         if f"{channel}_lower" not in predicted or np.isnan(record[channel].values).all():
             if ax is not None:
                 ax.set_yticks([])
             continue
-        for sweep in _sweeps(record.assign({end: predicted[f"{channel}_{end}"] for end in _ENDS})):
-            sweep = sweep.sortby("drive_angle")
-            angle = _degrees(sweep["drive_angle"].values)
+        for sweep in _sweeps(record.assign({end: predicted[f"{channel}_{end}"] for end in _ENDS}), along):
+            sweep = sweep.sortby(_ALONG)
             style = {"color": PALETTE["band"], "linewidth": 0.5, "zorder": 0.5, "label": label}
-            panel.fill_between(angle, *(sweep[end].values for end in _ENDS), **style)
+            panel.fill_between(sweep[_ALONG].values, *(sweep[end].values for end in _ENDS), **style)
             if ax is not None:
                 _draw_residuals(ax, sweep, channel)
         if ax is not None:
             _finish_residuals(ax)
     drawn = [ax for pair in zip(panels, below, strict=True) for ax in pair if ax is not None]
-    _finish_panels(np.array(drawn, dtype=object), axes is None, columns=4 if below[0] is None else 3)
+    _finish_panels(np.array(drawn, dtype=object), along, axes is None, columns=4 if below[0] is None else 3)
     return panels
 
 
@@ -191,7 +195,7 @@ def _draw_residuals(ax: Axes, sweep: xr.Dataset, channel: str) -> None:
     style: dict[str, Any] = {"color": _SWEEPS[direction], "marker": SWEEP_MARKERS[direction], "markersize": 2.2}
     style |= {"markeredgewidth": 0.0, "linestyle": SWEEP_LINES[direction], "linewidth": 0.5}
     style |= {"label": f"residual {direction}"}
-    ax.plot(_degrees(sweep["drive_angle"].values), np.where(np.isfinite(off), off, np.nan), **style)
+    ax.plot(sweep[_ALONG].values, np.where(np.isfinite(off), off, np.nan), **style)
 
 
 def _finish_residuals(ax: Axes) -> None:
@@ -203,14 +207,9 @@ def _finish_residuals(ax: Axes) -> None:
     ax.set_ylabel("residual\n[½ interval]")
 
 
-def _finish_panels(panels: AxesArray, own: bool, columns: int = 4) -> None:
-    from matplotlib.ticker import MultipleLocator
-
+def _finish_panels(panels: AxesArray, along: DriveAxis, own: bool, columns: int = 4) -> None:
     bottom = panels[-1]
-    bottom.set_xlabel(DRIVE_ANGLE)
-    span = np.ptp(bottom.get_xlim())
-    if 60.0 < span < 400.0:
-        bottom.xaxis.set_major_locator(MultipleLocator(15.0 if span < 150.0 else 30.0))
+    along.label(bottom.xaxis)
     if own:
         bottom.figure.align_ylabels(list(panels))
         for panel in panels[:-1]:
@@ -225,7 +224,12 @@ def _legend_order(label: str) -> int:
 
 
 def _draw_observables(
-    panels: AxesArray, record: xr.Dataset, events: Mapping[str, SweepEvents] | None, *, with_truth: bool
+    panels: AxesArray,
+    record: xr.Dataset,
+    events: Mapping[str, SweepEvents] | None,
+    along: DriveAxis,
+    *,
+    with_truth: bool,
 ) -> None:
     frame = frame_of(record)
     labels = LABELS if frame == "fixed" else _TURNING_LABELS
@@ -234,25 +238,28 @@ def _draw_observables(
             write_not_measured(panel, f"{labels[channel]}\n")
             continue
         panel.axhline(0.0, color="0.85", linewidth=0.8, zorder=0)
-        for sweep in _sweeps(record):
+        for start in along.starts:
+            panel.axvline(start, color="0.6", linewidth=0.8, zorder=0)
+        for sweep in _sweeps(record, along):
             direction = str(sweep["direction"].values[0])
-            of_sweep = events.get(direction) if events is not None else None
+            of_sweep = events.get(direction) if events is not None and along.kind != "sample" else None
             if _is_exact(sweep, channel):
-                _draw_line(panel, sweep, channel, channel, of_sweep, frame, linewidth=1.6)
+                _draw_line(panel, sweep, channel, channel, of_sweep, frame, along, linewidth=1.6)
                 legend_entry(panel, direction, color="0.35", linestyle=SWEEP_LINES[direction], linewidth=1.6)
             else:
                 style = reading_style(direction, PALETTE["sample"])
-                panel.plot(_degrees(sweep["drive_angle"].values), sweep[channel].values, **style)
+                panel.plot(sweep[_ALONG].values, sweep[channel].values, **style)
                 legend_entry(panel, f"measured {direction}", **style)
                 if with_truth and f"truth_{channel}" in sweep:
-                    _draw_line(panel, sweep, f"truth_{channel}", channel, of_sweep, frame, linewidth=1.0)
+                    _draw_line(panel, sweep, f"truth_{channel}", channel, of_sweep, frame, along, linewidth=1.0)
             if of_sweep is not None:
-                draw_events(panel, of_sweep, channel, frame)
+                draw_events(panel, of_sweep, channel, frame, travels=along.kind == "travel")
         values = record[channel].values
         set_unit(panel.yaxis, f"{labels[channel]}\n", channel, record[channel].attrs, values)
 
 
-def _sweeps(record: xr.Dataset) -> Iterator[xr.Dataset]:
+def _sweeps(record: xr.Dataset, along: DriveAxis) -> Iterator[xr.Dataset]:
+    record = record.assign({_ALONG: ("sample", along.values)})
     for number in np.unique(record["sweep"].values):
         yield record.isel(sample=np.flatnonzero(record["sweep"].values == number))
 
@@ -272,28 +279,27 @@ def _draw_line(
     channel: str,
     events: SweepEvents | None,
     frame: Frame,
+    along: DriveAxis,
     *,
     linewidth: float,
 ) -> None:
     """Draw a channel without noise, coloured by phase, and complete up to the events."""
-    angle_column = "truth_drive_angle" if "truth_drive_angle" in sweep else "drive_angle"
-    angle, value = sweep[angle_column].values, sweep[column].values
+    angle, value = sweep[_ALONG].values, sweep[column].values
+    if along.kind == "angle" and "truth_drive_angle" in sweep:
+        angle = np.degrees(sweep["truth_drive_angle"].values)
     direction = str(sweep["direction"].values[0])
     style: dict[str, Any] = {"linestyle": SWEEP_LINES[direction], "linewidth": linewidth, "zorder": 2.5}
     phase = sweep["truth_contact_phase"].values.astype(object) if "truth_contact_phase" in sweep else None
     if phase is None:
-        ax.plot(_degrees(angle), value, color=PALETTE["change"], **style)
+        ax.plot(angle, value, color=PALETTE["change"], **style)
         legend_entry(ax, "truth", color=PALETTE["change"], linewidth=linewidth)
         return
     if events is not None:
-        angle, value, phase = with_events(angle, value, phase, events, channel, frame)
+        travels = along.kind == "travel"
+        angle, value, phase = with_events(angle, value, phase, events, channel, frame, travels=travels)
     for run in phase_runs(phase):
         name = str(phase[run.start])
-        ax.plot(_degrees(angle[run]), value[run], color=PALETTE[name], **style)
+        ax.plot(angle[run], value[run], color=PALETTE[name], **style)
         if name in PHASES:
             prefix = "true " if column != channel else ""
             legend_entry(ax, prefix + PHASES[name], color=PALETTE[name], linewidth=linewidth)
-
-
-def _degrees(angle: ArrayLike) -> Floats:
-    return np.degrees(np.asarray(angle, dtype=float))

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 __all__ = ["rods"]
 
+_ENDINGS = {"release": "release", "never": "end of the drive"}
+"""Labels of the end of contact other than by a snap-off."""
+
 
 def rods(
     scan: Scan,
@@ -87,14 +90,15 @@ def rods(
             side=1 if events.direction == "forward" else -1,
             rods=rod.mirrored(1 if events.direction == "forward" else -1),
         )
-        return events.base[0] + rod.length_unit * x, events.base[1] + rod.length_unit * y
+        base_x, base_y = (np.asarray(state[name])[..., None] for name in ("base_x", "base_y"))
+        return base_x + rod.length_unit * x, base_y + rod.length_unit * y
 
     def true(name: str) -> Floats:
         return record[f"truth_{name}" if f"truth_{name}" in record else name].values[samples]
 
     ax = single_axes() if ax is None else ax
     phases = record["truth_contact_phase"].values[samples]
-    x, y = shape({name: true(name) for name in ("drive_angle", *CHANNELS)})
+    x, y = shape({name: true(name) for name in ("base_x", "base_y", "drive_angle", *CHANNELS)})
     for phase, label in PHASES.items():
         chosen = phases == phase
         if chosen.any():
@@ -105,7 +109,7 @@ def rods(
     marked: list[tuple[Event, str, str]] = [
         (events.first_contact, "first contact", ":"),
         *((event, "phase change", "-") for event in events.transitions),
-        (events.snap_off, "snap-off", "--"),
+        (events.snap_off, _ENDINGS.get(events.snap_off.kind, "snap-off"), "--"),
     ]
     extent = [x, y]
     for event, label, style in marked:
@@ -113,7 +117,10 @@ def rods(
         extent = [np.append(a, b) for a, b in zip(extent, (x, y), strict=True)]
         ax.plot(x, y, color=PALETTE["change"], linestyle=style, linewidth=1.4, zorder=2.5, label=label)
         ax.plot(event.contact_x, event.contact_y, "o", color=PALETTE["change"], markersize=4.0, zorder=3.5)
-    draw_pivot(ax, events.base)
+    path = np.stack([record[f"base_{axis}"].values[record["sweep"].values == number] for axis in "xy"])
+    if np.ptp(path, axis=1).any():
+        ax.plot(*path, color="0.5", linewidth=0.8, zorder=1.5, label="base path")
+    draw_pivot(ax, events.base, label="base at start" if np.ptp(path, axis=1).any() else "pivot")
     draw_object(ax, scan.contour, extent[0], extent[1], room=0.05 * rod.length_unit)
     finish_map(ax, record["base_x"].attrs)
     return ax

@@ -1,4 +1,4 @@
-"""Sweeps over the drive angle: readings, lines complete up to the events, and panels of channels."""
+"""Sweeps along the drive: readings, lines complete up to the events, and panels of channels."""
 
 from __future__ import annotations
 
@@ -34,16 +34,28 @@ def reading_style(direction: str, colour: str) -> dict[str, Any]:
     return style | {"linestyle": "none", "markerfacecolor": "none", "markeredgewidth": 0.6}
 
 
-def draw_events(ax: Axes, events: SweepEvents, channel: str, frame: Frame, size: float = 1.0, **style: Any) -> None:
-    """Mark first contact, phase changes and snap-off, with markers of `size` times their usual size."""
+def draw_events(
+    ax: Axes,
+    events: SweepEvents,
+    channel: str,
+    frame: Frame,
+    size: float = 1.0,
+    *,
+    travels: bool = False,
+    **style: Any,
+) -> None:
+    """Mark first contact, phase changes and snap-off, with markers of `size` times their usual size.
+
+    They are marked at drive angles [degrees], or at travels of the base. A drive that ends in contact has no snap-off.
+    """
     marked = {
         "first contact": (events.first_contact,),
         "phase change": events.transitions,
-        "snap-off": (events.snap_off,),
+        "snap-off": (events.snap_off,) if events.snap_off.kind != "never" else (),
     }
     for label, of_label in marked.items():
         if of_label:
-            angles = np.degrees([event.drive_angle for event in of_label])
+            angles = [_place_of(event, travels) for event in of_label]
             values = [_load_of(event, channel, frame) for event in of_label]
             look = {**style, **EVENT_MARKERS[label], "color": PALETTE["change"], "linestyle": "none", "zorder": 4}
             look["markersize"] *= size
@@ -51,15 +63,25 @@ def draw_events(ax: Axes, events: SweepEvents, channel: str, frame: Frame, size:
 
 
 def with_events(
-    angle: Floats, value: Floats, phase: Phases, events: SweepEvents, channel: str, frame: Frame
+    angle: Floats,
+    value: Floats,
+    phase: Phases,
+    events: SweepEvents,
+    channel: str,
+    frame: Frame,
+    *,
+    travels: bool = False,
 ) -> tuple[Floats, Floats, Phases]:
-    """Return the samples of a channel and its values at the events, in the order of the drive."""
+    """Return the samples of a channel and its values at the events, in the order of the drive.
+
+    They are at drive angles [degrees], or at travels of the base.
+    """
     marked = [events.first_contact, *events.transitions, events.snap_off]
     following = [event.kind.split(" → ")[-1] for event in marked[:-1]]
-    angle = np.append(angle, [event.drive_angle for event in marked])
+    angle = np.append(angle, [_place_of(event, travels) for event in marked])
     value = np.append(value, [_load_of(event, channel, frame) for event in marked])
     phase = np.append(phase, [*following, following[-1]])
-    order = np.argsort(angle if events.direction == "forward" else -angle, kind="stable")
+    order = np.argsort(angle if travels or events.direction == "forward" else -angle, kind="stable")
     return angle[order], value[order], phase[order]
 
 
@@ -69,6 +91,10 @@ def phase_runs(phase: Phases) -> Iterator[slice]:
     for start, stop in zip(starts, np.append(starts[1:], phase.size), strict=True):
         joined = stop < phase.size and phase[stop] != "none"
         yield slice(int(start), int(stop) + 1 if joined else int(stop))
+
+
+def _place_of(event: Event, travels: bool) -> float:
+    return event.travel if travels else float(np.degrees(event.drive_angle))
 
 
 def _load_of(event: Event, channel: str, frame: Frame) -> float:

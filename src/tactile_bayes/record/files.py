@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import xarray as xr
@@ -56,15 +57,18 @@ def read_record(
     columns : mapping of str to str, optional
         Source of a column of a record in the file: `NAME`, or `NAME[UNIT]` if the file does not state the unit. A minus
         before it, `-NAME[UNIT]`, reverses the sign, and a number with a sign shifts the zero, in the same unit:
-        `90-NAME[deg]` or `NAME[mN]+12.5`. For base_x, base_y, sweep and direction one value for all samples can be
-        given, as "12[mm]", "0" or "forward". A unit in the name of a column may be left out. Further columns keep their
-        names, except for a slash, which no NetCDF file can store: "Temp / °C" becomes "Temp [°C]", and another slash
-        "|".
+        `90-NAME[deg]` or `NAME[mN]+12.5`. For base_x, base_y, drive_angle, sweep and direction one value for all
+        samples can be given, as "12[mm]", "90[deg]", "0" or "forward"; so can a line of the header, `# drive_angle: 90
+        [deg]`, for a rod that is clamped while its base is carried. A unit in the name of a column may be left out.
+        Further columns keep their names, except for a slash, which no NetCDF file can store: "Temp / °C" becomes "Temp
+        [°C]", and another slash "|".
     split_sweeps : bool
         Whether to derive the columns sweep and direction from the drive angle if the file lacks them. A sweep ends
         where the angle returns from an extreme by more than a tenth of its whole range, or where the pivot moves; its
         direction is that of a straight line fitted to its angles. An angle that returns within one sample was reset,
-        and the sweeps before and after it have the same direction.
+        and the sweeps before and after it have the same direction. Where the base moves in more than half of the steps,
+        a sweep ends where the base turns back, and it is forward if the left side of the rod leads; turned here and
+        carried there in one file takes columns sweep and direction.
     rod : Rod, optional
         The rod, if the file does not state it.
     missing : collection of str, optional
@@ -129,10 +133,15 @@ def read_record(
     if path.is_dir():
         raise RecordError(f"{path} is a folder: give the record itself, a .csv or a .nc file")
     columns = columns or {}
-    table = renamed(_READERS[_suffix(path)](path, columns), columns)
-    table = in_units_of_record(table, rod)
+    table = _READERS[_suffix(path)](path, columns)
+    if "drive_angle" in table.attrs and "drive_angle" not in {*columns, *table.columns}:
+        columns = {**columns, "drive_angle": str(table.attrs["drive_angle"])}
+        attrs = {name: value for name, value in table.attrs.items() if name != "drive_angle"}
+        table = replace(table, attrs=attrs)
+    table = in_units_of_record(renamed(table, columns), rod)
     if split_sweeps:
-        table = split_at_turns(table)
+        stated = table.attrs.get("rod_length", 1.0) if rod is None else rod.length
+        table = split_at_turns(table, float(stated) if isinstance(stated, int | float) else 1.0)
     record = completed_record(table, rod, missing, load_cell_frame)
     if rod is None and "units" not in table.attrs:
         record.attrs["units_source"] = "assumed"

@@ -19,7 +19,7 @@ from tactile_bayes.record.table import Cells, Source, Table
 
 __all__ = ["Origin", "any_meant", "meant_kinds", "origins_of", "renamed"]
 
-CONSTANTS = ("sweep", "direction", "base_x", "base_y")
+CONSTANTS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 """Columns for which a single value can be given."""
 
 _NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -288,7 +288,7 @@ def _value(target: str, text: str) -> Origin | None:
 
 
 def _example(column: Column) -> str:
-    return {"direction": "forward", "sweep": "0"}.get(column.name, "12[mm]")
+    return {"direction": "forward", "sweep": "0", "drive_angle": "90[deg]"}.get(column.name, "12[mm]")
 
 
 def _column(name: str) -> Column:

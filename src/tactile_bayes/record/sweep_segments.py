@@ -1,4 +1,4 @@
-"""Sweep segments: the turning points of a drive, and its direction between them."""
+"""Sweep segments: the turning points of a drive, or of a base that it carries, and its direction between them."""
 
 from __future__ import annotations
 
@@ -13,8 +13,14 @@ from tactile_bayes.record.table import Source, Table
 
 __all__ = ["split_at_turns", "turning_points"]
 
+_ROUNDING = 1e-9
+"""Share of the motion that must be across the rod for a side of it to lead."""
+
 _WIDEST = 0.5
 """Largest distance of neighbouring samples of a sweep [rad]."""
+
+_MOST = 0.5
+"""Share of the steps beyond which a base that moves is carried, and not one of several pivots."""
 
 SHARE = 0.1
 """Least return of the drive angle after a turning point, as a share of its whole range."""
@@ -54,12 +60,16 @@ def turning_points(angle: Floats, least: float) -> list[int]:
     return found
 
 
-def split_at_turns(table: Table) -> Table:
-    """Add sweeps and directions to a table, from its drive angle.
+def split_at_turns(table: Table, length: float = 1.0) -> Table:
+    """Add sweeps and directions to a table, from its drive angle, or from the motion of its base.
 
     A sweep ends where the drive turns, that is where the angle returns from an extreme by more than a tenth of its
     whole range, and where the pivot moves. An angle that returns within one sample was reset: the sweeps before and
     after it have the same direction. The direction of a sweep is that of a straight line fitted to its angles.
+
+    If the base moves in more than half of the steps, the drive carries it. A sweep then ends in the same way where the
+    base turns back on the line along which it moves most, and it is forward if the rod's left side leads: if the middle
+    of the unloaded rod, of this length [length], moves to its left on average.
 
     Raises
     ------
@@ -88,6 +98,8 @@ def split_at_turns(table: Table) -> Table:
             base = parsed_column(name, table.columns[name][0], source)
             moved[1:] |= base[1:] != base[:-1]
     _refuse_wrapped(angle, moved, source)
+    if np.count_nonzero(moved) > max(1.0, _MOST * (angle.size - 1)):
+        return _split_carried(table, angle, length)
     starts = []
     for begin, end in pairwise([0, *np.flatnonzero(moved).tolist(), angle.size]):
         turns = turning_points(angle[begin:end], least)
@@ -110,6 +122,34 @@ def split_at_turns(table: Table) -> Table:
                 )
             raise source.error(f"{what}, or give columns 'sweep' and 'direction'")
         direction[begin:end] = "forward" if trend > 0.0 else "backward"
+    return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, source)
+
+
+def _split_carried(table: Table, angle: Floats, length: float) -> Table:
+    """Add sweeps and directions to a table whose base moves."""
+    source = table.source
+    base = np.zeros((angle.size, 2))
+    for column, name in enumerate(("base_x", "base_y")):
+        if name in table.columns:
+            base[:, column] = parsed_column(name, table.columns[name][0], source)
+    if not np.isfinite(base).all():  # refused later, with its row
+        return table
+    offset = base - base.mean(axis=0)
+    along = offset @ np.linalg.eigh(offset.T @ offset)[1][:, -1]
+    turns = turning_points(along, SHARE * float(np.ptp(along)))
+    is_reset = [False, *(turn == before + 1 for before, turn in pairwise(turns))]
+    starts = [0, *(turn + 1 for turn, reset in zip(turns, is_reset, strict=False) if not reset)]
+    sweep, direction = np.zeros(angle.size, dtype=np.int64), np.empty(angle.size, dtype="U8")
+    for number, (begin, end) in enumerate(pairwise([*starts, angle.size])):
+        step, middle = np.diff(base[begin:end], axis=0), 0.5 * (angle[begin : end - 1] + angle[begin + 1 : end])
+        left = -np.sin(middle) * step[:, 0] + np.cos(middle) * step[:, 1] + 0.5 * length * np.diff(angle[begin:end])
+        if not abs(left.sum()) > _ROUNDING * np.abs(step).sum():
+            raise source.error(
+                f"from {source.row(begin)} to {source.row(end - 1)} the base moves along the rod, or not at all, so "
+                "that no side of the rod leads and the sweep has no direction: give columns 'sweep' and 'direction'"
+            )
+        sweep[begin:end] = number
+        direction[begin:end] = "forward" if left.sum() > 0.0 else "backward"
     return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, source)
 
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from tactile_bayes.record import MEASURED
+from tactile_bayes.record import MEASURED, carried_sweeps, travels_of
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.meanings import is_direction, meaning_of
-from tactile_bayes.report.wording import Table, fixed, percent, shown_as
+from tactile_bayes.report.wording import Shown, Table, fixed, percent, shown_as
 
 __all__ = ["background_of"]
 
@@ -33,21 +33,36 @@ def background_of(findings: Findings) -> dict[str, Table | None]:
 def _sweeps(findings: Findings) -> Table:
     """Return the sweeps, with first contact and snap-off as the readings alone bound them."""
     record, zero = findings.record, findings.zero
+    carried, travels = carried_sweeps(record), travels_of(record)
     length = shown_as("contact_x", record["base_x"].attrs, np.r_[record.base_x.values, record.base_y.values])
     rows = []
     for number in zero["sweep"].values:
         rows_of = np.flatnonzero(record.sweep.values == number)
         angle = np.degrees(record.drive_angle.values[rows_of])
         of_sweep = zero.sel(sweep=number)
+        drive = [fixed(angle[0], ".1f"), fixed(angle[-1], ".1f")]
         spans = [_between(of_sweep[f"{event}_drive_angle"].values) for event in ("onset", "snap_off")]
+        if number in carried:
+            unit = shown_as("contact_x", record["base_x"].attrs, travels[rows_of])
+            drive.append(f"carried {unit.full(float(travels[rows_of[-1]]))}")
+            spans = [_along(of_sweep[f"{event}_travel"].values, unit) for event in ("onset", "snap_off")]
+        elif carried:
+            drive.append("–")
         unloaded = int(np.count_nonzero(zero["unloaded"].values[rows_of]))
         base = f"({length.text(float(record.base_x[rows_of[0]]))}, {length.text(float(record.base_y[rows_of[0]]))})"
         row = [str(int(number)), str(record.direction.values[rows_of[0]]), f"{base} {length.name}".rstrip()]
-        row += [str(rows_of.size), fixed(angle[0], ".1f"), fixed(angle[-1], ".1f"), *spans, str(unloaded)]
+        row += [str(rows_of.size), *drive, *spans, str(unloaded)]
         rows.append(row)
-    heads = ["sweep", "direction", "pivot", "samples", "from φ₀ [°]", "to"]
+    heads = ["sweep", "direction", "base at the beginning" if carried else "pivot", "samples", "from φ₀ [°]", "to"]
+    heads += ["base"] if carried else []
     heads += ["first contact between", "snap-off between", "unloaded"]
     return Table("Sweeps, with contact as the readings alone bound it", heads, rows, 3)
+
+
+def _along(travels: Any, unit: Shown) -> str:
+    if not np.isfinite(travels).any():
+        return "not detected"
+    return " and ".join(unit.full(float(travel)) if np.isfinite(travel) else "…" for travel in travels)
 
 
 def _between(angles: Any) -> str:

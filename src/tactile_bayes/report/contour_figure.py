@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.found_rig import found_rig
-from tactile_bayes.record import bases_of
+from tactile_bayes.record import bases_of, carried_sweeps
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.wording import Shown, percent, shown_as, spread
@@ -61,7 +61,8 @@ def contour_figure(findings: Findings) -> ContourFigure:
     overview.path(x, median, "median")
     entries += _put_contacts(overview, findings, x)
     overview.put_pivots(bases)
-    entries.append(("key-pivot", "pivot" if len(bases) == 1 else "pivots"))
+    word = "base, at the beginning" if carried_sweeps(findings.record) else "pivot" if len(bases) == 1 else "pivots"
+    entries.append(("key-pivot", word))
     diamond = element("path", d="M-7 0L0 -7L7 0L0 7Z")
     overview.put(element("g", diamond, id="band-mark", class_="place js-only", transform="translate(-20 -20)"))
     entries.append(("key-place js-only", "place along x, chosen below or beside"))

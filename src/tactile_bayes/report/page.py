@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.record import present_channels
+from tactile_bayes.record import carried_sweeps, present_channels
 from tactile_bayes.report.background import background_of
 from tactile_bayes.report.contour_figure import contour_figure, gap_ends
 from tactile_bayes.report.findings import Findings
@@ -33,6 +33,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
     heads = [
         f"{label} [{unit}]" if unit else label for channel, label, unit in readings.channels if channel in channels
     ]
+    travel = [] if readings.travel_unit is None else [f"travel{readings.travel_unit}"]
     first = readings.data["first"]
     return background_of(findings) | {
         "name": name,
@@ -64,7 +65,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
             (channel, label, unit, readings.data["said"][channel][first]) for channel, label, unit in readings.channels
         ],
         "motion_every": motion.every,
-        "all_readings": Table("The readings", ["sample", "sweep", "φ₀ [°]", *heads], readings.rows, 0),
+        "all_readings": Table("The readings", ["sample", "sweep", "φ₀ [°]", *travel, *heads], readings.rows, 0),
         "everything": _parameters(findings, mute=False) if any(map(is_direction, stats.parameter.values)) else None,
         "approximations": str(attrs.get("approximations", "")),
         "command": command_of(attrs),
@@ -105,6 +106,15 @@ def _answer(findings: Findings) -> str:
 
 def _gap_messages(findings: Findings) -> list[str]:
     edges = findings.edges
+    if edges is None and carried_sweeps(findings.record):
+        events = findings.posterior["events"].to_dataset()
+        ends = [float(events[f"{event}_contact_x"].median()) for event in ("first", "snap_off")]
+        unit = shown_as("contact_x", findings.band["x"].attrs, ends)
+        return [
+            f"The one sweep touches an arc without a gap, from first contact at x = {unit.full(ends[0])} to its last "
+            f"contact at x = {unit.full(ends[1])} (medians). What lies beyond these ends it has not touched: there the "
+            "contour follows from family and prior."
+        ]
     if edges is None:
         return ["There are sweeps in one direction only, so there is no gap between two."]
     width = edges["width"]

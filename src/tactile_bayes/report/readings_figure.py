@@ -11,8 +11,19 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
 from tactile_bayes.plotting.maps import outline
-from tactile_bayes.record import CHANNELS, bases_of, frame_of, present_channels, turned
+from tactile_bayes.record import (
+    CHANNELS,
+    bases_of,
+    carried_sweeps,
+    frame_of,
+    present_channels,
+    travels_of,
+    turned,
+)
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.frames import Motion
@@ -47,7 +58,9 @@ class ReadingsFigure(NamedTuple):
     data: Mapping[str, Any]
     """Frames of the moving rod."""
     rows: list[list[str]]
-    """Sample, sweep, drive angle [degrees], then readings."""
+    """Sample, sweep, drive angle [degrees], then travel if the base is carried in some sweep, then readings."""
+    travel_unit: str | None
+    """Unit of the travel; None if the base is never carried."""
     shown: dict[str, Shown]
     drawn_every: int
 
@@ -58,7 +71,7 @@ def channel_names(record: xr.Dataset) -> dict[str, str]:
 
 
 def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
-    """Draw the readings over the drive angle, and the rod at the largest load of the first sweep."""
+    """Draw the readings along the drive, and the rod at the largest load of the first sweep."""
     record, present = findings.record, present_channels(findings.record)
     words = channel_names(record)
     # The rod has all loads, also those that were not measured, each in a suitable unit.
@@ -72,7 +85,7 @@ def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
     rods, data = _rods(findings, motion, first)
     plots, drawings, every = _readings(findings, shown, int(motion.samples[first]))
     across = next(iter(plots.values())).x
-    data["angle"] = [across.at(value) for value in np.degrees(record.drive_angle.values[motion.samples])]
+    data["angle"] = [across.at(value) for value in drive_axis(record).values[motion.samples]]
     data["marks"] = {
         name: [None if not np.isfinite(value) else plot.y.at(value) for value in record[name].values[motion.samples]]
         for name, plot in plots.items()
@@ -107,6 +120,7 @@ def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
         [(name, words[name], shown[name].name) for name in CHANNELS],
         data,
         rows,
+        _length(findings, motion).bracketed if carried_sweeps(record) else None,
         shown,
         every,
     )
@@ -115,6 +129,8 @@ def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
 def _sweep_name(record: xr.Dataset, number: int) -> str:
     first = record.isel(sample=int(np.argmax(record.sweep.values == number)))
     name, bases = f"sweep {number}, {first.direction.item()}", bases_of(record)
+    if number in carried_sweeps(record):
+        return f"{name}, carried"
     pivot = first.base_x.item(), first.base_y.item()
     return name if len(bases) == 1 else f"{name}, pivot {bases.index(pivot) + 1}"
 
@@ -190,7 +206,14 @@ def _rod(frames: Mapping[str, Any], first: int) -> tuple[Markup, ...]:
 def _readings(findings: Findings, shown: Mapping[str, Shown], here: int) -> tuple[dict[str, Plot], list[Markup], int]:
     """Return plots of the measured channels with a rule at one sample, their drawings, and the thinning of readings."""
     record, interval, words = findings.record, findings.interval, channel_names(findings.record)
-    angle, sweep = np.degrees(record.drive_angle.values), record.sweep.values
+    along, sweep = drive_axis(record), record.sweep.values
+    angle = along.values
+    length = shown_as("contact_x", along.attrs, angle)
+    name_of_axis, power = {
+        "angle": ("drive angle φ₀ [°]", 0),
+        "travel": (f"travel of the base{length.bracketed}", length.power),
+        "sample": ("sample", 0),
+    }[along.kind]
     unloaded, direction = findings.zero.unloaded.values, record.direction.values
     every = max(1, -(-angle.size // _MOST_DOTS))
     kept = np.arange(angle.size) % every == 0
@@ -201,15 +224,17 @@ def _readings(findings: Findings, shown: Mapping[str, Shown], here: int) -> tupl
         values = record[name].values
         bounds = [interval[f"{name}_{edge}"].values for edge in ("lower", "upper")]
         unit = shown[name]
-        labels = "drive angle φ₀ [°]", f"{axes[name]}{unit.bracketed}"
-        plot = Plot.around(angle, np.concatenate([values, *bounds]), labels, _READINGS_HEIGHT, (0, unit.power))
+        labels = name_of_axis, f"{axes[name]}{unit.bracketed}"
+        plot = Plot.around(angle, np.concatenate([values, *bounds]), labels, _READINGS_HEIGHT, (power, unit.power))
         for number in np.unique(sweep):
             rows = np.flatnonzero((sweep == number) & kept)
             rows = rows[np.argsort(angle[rows], kind="stable")]
             plot.area(angle[rows], bounds[0][rows], bounds[1][rows], "predicted")
         plot.path([plot.x.low, plot.x.high], [0.0, 0.0], "zero")
-        for event in ("first_drive_angle", "snap_off_drive_angle"):
-            for at in np.degrees(events[event].values):
+        for start in along.starts:
+            plot.path([start, start], [plot.y.low, plot.y.high], "zero")
+        for event in ("first", "snap_off"):
+            for at in _places(findings, along, events, event):
                 plot.path([at, at], [plot.y.low, plot.y.high], "event")
         for sense, pale in product(("forward", "backward"), (" unloaded", "")):
             rows = np.flatnonzero(kept & (direction == sense) & (unloaded == bool(pale)))
@@ -224,14 +249,39 @@ def _readings(findings: Findings, shown: Mapping[str, Shown], here: int) -> tupl
         )
         plots[name] = plot
         title = f"Readings: {words[name]}"
+        over = {
+            "angle": f"over the drive angle from {angle.min():.4g} to {angle.max():.4g} degrees",
+            "travel": f"over the travel of the base from {length.text(angle.min())} to {length.full(angle.max())}",
+            "sample": "over the number of the sample",
+        }[along.kind]
         description = (
-            f"{words[name].capitalize()} of {angle.size} samples over the drive angle from "
-            f"{angle.min():.4g} to {angle.max():.4g} degrees, over what the posterior predicts; all numbers are in "
-            "the table below."
+            f"{words[name].capitalize()} of {angle.size} samples {over}, over what the posterior predicts; "
+            "all numbers are in the table below."
         )
         identity = f"readings-{name.replace('_', '-')}"
         drawings.append(figure(identity, title, description, _READINGS_HEIGHT, *plot.drawn(f"{identity}-clip")))
     return plots, drawings, every
+
+
+def _places(findings: Findings, along: DriveAxis, events: xr.Dataset, event: str) -> list[float]:
+    """Return where an event of every sweep segment is drawn."""
+    if along.kind == "angle":
+        return [float(at) for at in np.degrees(events[f"{event}_drive_angle"].values)]
+    travels = [float(at) for at in events[f"{event}_travel"].values]
+    if along.kind == "travel":
+        return travels
+    segments = RecordLikelihood(findings.record, LoadCell.from_record(findings.record) or LoadCell()).segments
+    places = []
+    for segment, travel in zip(segments, travels, strict=True):
+        order = segment.samples[np.argsort(along.travels[segment.samples], kind="stable")]
+        places.append(float(np.interp(travel, along.travels[order], along.values[order])))
+    return places
+
+
+def _length(findings: Findings, motion: Motion) -> Shown:
+    """Return the unit in which lengths beside the rod are shown."""
+    about = np.concatenate([motion.rod_x.ravel(), motion.rod_y.ravel()])
+    return shown_as("contact_x", findings.record["base_x"].attrs, about)
 
 
 def _said(
@@ -240,10 +290,13 @@ def _said(
     """Return the entries of the table beside the rod in every frame, and a table of all readings."""
     record, interval, present = findings.record, findings.interval, present_channels(findings.record)
     angles = [f"{angle:.2f}".replace("-", "−") for angle in np.degrees(record.drive_angle.values[motion.samples])]
-    length = shown_as("contact_x", record["base_x"].attrs, np.concatenate([motion.rod_x.ravel(), motion.rod_y.ravel()]))
+    carried = np.isin(record.sweep.values, carried_sweeps(record))
+    travels = travels_of(record)
+    length = _length(findings, motion)
     frames: dict[str, Any] = {
         "angle": angles,
         "sample": motion.samples.tolist(),
+        "travel": [f", travel {length.full(float(travels[k]))}" if carried[k] else "" for k in motion.samples],
         "contact": [
             f"({length.text(a)}, {length.text(b)}) {length.name}".rstrip() if np.isfinite(a) else "none"
             for a, b in zip(motion.contact_x, motion.contact_y, strict=True)
@@ -259,8 +312,9 @@ def _said(
                 low, high = (unit.text(float(interval[f"{name}_{edge}"].values[k])) for edge in ("lower", "upper"))
                 between = f"{low} to {high}"
             frames[name].append([reading, between, unit.text(float(bent[row, i]))])
+    moved = [[length.text(float(travels[k])) if carried[k] else "–"] if carried.any() else [] for k in motion.samples]
     rows = [
-        [str(k), str(sweep), angle, *(shown[name].text(float(record[name].values[k])) for name in present)]
-        for k, sweep, angle in zip(motion.samples, motion.sweep, angles, strict=True)
+        [str(k), str(sweep), angle, *travel, *(shown[name].text(float(record[name].values[k])) for name in present)]
+        for k, sweep, angle, travel in zip(motion.samples, motion.sweep, angles, moved, strict=True)
     ]
     return frames, rows

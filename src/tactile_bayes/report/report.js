@@ -78,11 +78,12 @@
     });
     by("said-sample").textContent = said.sample[frame];
     by("said-angle").textContent = said.angle[frame];
+    by("said-travel").textContent = said.travel[frame];
     by("said-contact").textContent = said.contact[frame];
     rows.forEach((row) => {
       said[row.dataset.channel][frame].forEach((text, k) => { row.cells[k + 1].textContent = text; });
     });
-    slider.setAttribute("aria-valuetext", "sample " + said.sample[frame] + ", drive angle " + said.angle[frame] + " degrees");
+    slider.setAttribute("aria-valuetext", "sample " + said.sample[frame] + ", drive angle " + said.angle[frame] + " degrees" + said.travel[frame]);
   }
   function showSweep(index, at) {
     sweep = frames.sweeps[index].frames;

@@ -10,7 +10,7 @@ import numpy as np
 from tactile_bayes.calibration.summary import CLAIMS
 from tactile_bayes.diagnostics.record_check import DISCREPANCIES
 from tactile_bayes.reconstruction import AXIAL_ALARM
-from tactile_bayes.record import CHANNELS, present_channels
+from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.readings_figure import channel_names
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as
@@ -110,16 +110,22 @@ def check_table(findings: Findings) -> Table | None:
     if check is None:
         return None
     record, rows = findings.record, []
-    words = channel_names(record)
+    words, carried = channel_names(record), carried_sweeps(record)
     for name in check["channel"].values:
         of_channel = check.sel(channel=name)
         unit = shown_as(name, record[name].attrs, [float(of_channel["worst_residual"])])
+        sweep = int(of_channel["worst_sweep"])
         low, high = sorted(np.degrees([float(of_channel["worst_from"]), float(of_channel["worst_to"])]))
+        stretch = f"{low:.0f}° to {high:.0f}°".replace("-", "−")
+        if sweep in carried:
+            travels = [float(of_channel[f"worst_{end}_travel"]) for end in ("from", "to")]
+            length = shown_as("contact_x", record["base_x"].attrs, travels)
+            stretch = f"{length.text(travels[0], 3)} to {length.full(travels[1], 3)} of travel"
         rows.append(
             [
                 words[str(name)],
                 *(chance(float(of_channel["p_value"].sel(discrepancy=d))) for d in DISCREPANCIES),
-                f"sweep {int(of_channel['worst_sweep'])}, {low:.0f}° to {high:.0f}°".replace("-", "−"),
+                f"sweep {sweep}, {stretch}",
                 unit.full(float(of_channel["worst_residual"]), 2),
             ]
         )

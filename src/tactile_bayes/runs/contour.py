@@ -28,9 +28,9 @@ from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.plotting.maps import set_below
-from tactile_bayes.record import rod_of, validate, with_rod
+from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod
 from tactile_bayes.runs.folder import Folder, panels
-from tactile_bayes.sweep import Scan, scan
+from tactile_bayes.sweep import Scan, recorded_drives, scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
@@ -265,6 +265,13 @@ class _Figures:
         """A scan of the most probable contour."""
         best = self.result["sample_stats"]["lp"].argmax(("chain", "draw"))  # the medians may be out of reach
         draw, attrs = self.draws.isel(best), self.result.attrs
+        if carried_sweeps(self.measured):
+            return scan(
+                contours_of(draw, attrs["family"]).take(np.array(0)),
+                drive=recorded_drives(self.measured),
+                rod=rod_of(self.measured),
+                friction=float(draw.get("friction", attrs["friction"])),
+            )
         return scan(
             contours_of(draw, attrs["family"]).take(np.array(0)),
             direction="both" if len(self.directions) == 2 else self.directions[0],
@@ -287,6 +294,12 @@ class _Figures:
         return axes
 
     def rods(self) -> Any:
+        if carried_sweeps(self.measured):
+            count = len(self.fitted.sweeps)
+            axes = panels(count, 1, 8.5, 4.0 * count)  # maps of a base that moves are wide
+            for number, ax in enumerate(axes[:, 0]):
+                plotting.rods(self.fitted, sweep=number, ax=ax)
+            return axes
         axes = panels(len(self.directions), 1, 7.0, 4.0 * len(self.directions))
         for direction, ax in zip(self.directions, axes[:, 0], strict=True):
             plotting.rods(self.fitted, direction=direction, ax=ax)
@@ -297,7 +310,8 @@ class _Figures:
             raise InferenceError("there is no band to be drawn")
         above, below = panels(2, 1, 7.0, 6.0, sharex=True, height_ratios=(2.6, 1.0))[:, 0]
         known: dict[str, Any] = {"truth": self.truth, "gap": self.edges}
-        plotting.contour(self.band.x.values, contacts=self.contacts, band=self.band, base=self.base, ax=above, **known)
+        base = None if carried_sweeps(self.measured) else self.base
+        plotting.contour(self.band.x.values, contacts=self.contacts, band=self.band, base=base, ax=above, **known)
         plotting.band_detail(self.band, ax=below, **known)
         above.set_xlabel("")
         set_below(above, below)

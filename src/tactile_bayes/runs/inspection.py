@@ -48,12 +48,14 @@ def write_inspection(
     folder = Folder(out)
     folder.write_lines("words", "inspection.txt", (*inspection.messages, *text))
     sweeps = inspection.sweeps
+    named = {f"{event}_drive_angle": event for event in ("onset", "snap_off")}
+    named |= {name: name for name in ("onset_travel", "snap_off_travel") if name in sweeps}
     sides = {
-        f"{event}_{side}": sweeps[f"{event}_drive_angle"].sel(side=side, drop=True)
-        for event in ("onset", "snap_off")
+        f"{short}_{side}": sweeps[name].sel(side=side, drop=True)
+        for name, short in named.items()
         for side in ("before", "after")
     }
-    flat = sweeps.drop_vars(["side", "onset_drive_angle", "snap_off_drive_angle"]).assign(sides)
+    flat = sweeps.drop_vars(["side", *named]).assign(sides)
     folder.write_table("sweeps", "sweeps.csv", flat)
     folder.write_table("channels", "channels.csv", inspection.channels)
     flags = inspection.samples

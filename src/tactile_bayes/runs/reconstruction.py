@@ -18,7 +18,7 @@ from tactile_bayes.diagnostics.verdicts import doubtful_sides
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
-from tactile_bayes.record import validate
+from tactile_bayes.record import bases_of, carried_sweeps, validate
 from tactile_bayes.runs.folder import Folder, Run, panels
 
 if TYPE_CHECKING:
@@ -166,8 +166,8 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
 
 
 def _map(measured: xr.Dataset, contacts: xr.Dataset, shown: Floats) -> Axes:
-    pivots = np.unique(np.stack([measured.base_x.values, measured.base_y.values], axis=1), axis=0)
-    base = (float(pivots[0, 0]), float(pivots[0, 1])) if len(pivots) == 1 else None
+    pivots = bases_of(measured)
+    base = pivots[0] if len(pivots) == 1 and not carried_sweeps(measured) else None
     low, high = (float(end) for end in np.quantile(shown, [0.01, 0.99]))
     ends = [low, high] if high > low else [shown.min(), shown.max()]
     return plotting.contour(ends, contacts=contacts, base=base, ax=panels(1, 1, 7.0, 4.0)[0, 0])

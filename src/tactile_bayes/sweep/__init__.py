@@ -1,7 +1,7 @@
 """Step 1: the readings of a sweep along a contour, or states at slope angles, with events, labels and units."""
 
 from tactile_bayes.sweep.columns import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
-from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation, Translation
+from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation, Translation, recorded_drives
 from tactile_bayes.sweep.events import Event, SweepEvents
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.scanning import Scan, drives_of, equilibria, scan
@@ -24,6 +24,7 @@ __all__ = [
     "equilibria",
     "phases_of",
     "record_template",
+    "recorded_drives",
     "scan",
     "scan_many",
     "sweep_events",

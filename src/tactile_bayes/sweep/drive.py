@@ -9,13 +9,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number, check_numbers, check_positive
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.record import carried_sweeps
 
-__all__ = ["Carried", "Drive", "Motion", "Rotation", "Translation"]
+__all__ = ["Carried", "Drive", "Motion", "Rotation", "Translation", "recorded_drives"]
 
 _ROUNDING = 1e-15
 _TURN = 2.0 * math.pi
@@ -180,6 +182,22 @@ class Motion(Carried):
     @property
     def poses(self) -> Floats:
         return np.stack([self.x, self.y, self.drive_angle], axis=1)
+
+
+def recorded_drives(record: xr.Dataset) -> list[Drive]:
+    """Return the drives of a record: a rotation about each pivot, and a motion for each sweep that carries the base."""
+    carried = carried_sweeps(record)
+    drives: dict[object, Drive] = {}
+    for number in dict.fromkeys(record.sweep.values.tolist()):
+        rows = record.sweep.values == number
+        poses = np.column_stack([record[name].values[rows] for name in ("base_x", "base_y", "drive_angle")])
+        if number in carried:
+            moves = np.append(True, np.any(np.diff(poses, axis=0) != 0.0, axis=1))
+            drives[number] = Motion(*poses[moves].T)
+        else:
+            x, y = poses[0, :2].tolist()
+            drives.setdefault((x, y), Rotation((x, y)))
+    return list(drives.values())
 
 
 def _pair(base: Any) -> tuple[float, float]:

@@ -55,7 +55,11 @@ _COARSEST = 0.5
 class _ByDirection(dict[str, SweepEvents]):
     def __missing__(self, direction: str) -> SweepEvents:
         have = ", ".join(map(repr, self))
-        hint = f"choose from {have}" if have else "there are several bases, so take scan.sweeps[number] instead"
+        hint = (
+            f"choose from {have}"
+            if have
+            else "there are several sweeps of a direction, so take scan.sweeps[number] instead"
+        )
         raise ParameterError(f"the scan has no events of direction {direction!r}: {hint}")
 
 
@@ -70,7 +74,7 @@ class Scan:
     sweeps : tuple of SweepEvents
         Events of each sweep, by its number in the record.
     events : mapping of str to SweepEvents
-        Events by direction, if there is one base only.
+        Events by direction, if there is one base only, and one sweep of each direction.
     contour : Contour
         The contour that was scanned.
     """
@@ -82,7 +86,8 @@ class Scan:
     @property
     def events(self) -> Mapping[str, SweepEvents]:
         one_base = len({sweep.base for sweep in self.sweeps}) == 1
-        return _ByDirection({sweep.direction: sweep for sweep in self.sweeps} if one_base else {})
+        found = {sweep.direction: sweep for sweep in self.sweeps}
+        return _ByDirection(found if one_base and len(found) == len(self.sweeps) else {})
 
 
 def equilibria(
@@ -384,7 +389,7 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
     where = f"in the {sweep.direction} sweep from ({sweep.base[0]:g}, {sweep.base[1]:g})"
     if not sweep.clear:
         warnings.warn(
-            f"{where} the rod snaps at {sweep.snap_off.drive_angle:.6g} rad, but unloaded it would still cut the "
+            f"{where} the rod snaps at {_place(sweep)}, but unloaded it would still cut the "
             "object: it comes to rest in another contact, which no sweep reaches; the samples after that are left out",
             ClearanceWarning,
             stacklevel=3,
@@ -403,6 +408,14 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
             StrainWarning,
             stacklevel=3,
         )
+
+
+def _place(sweep: SweepEvents) -> str:
+    """Return where a sweep ends, as text."""
+    event = sweep.snap_off
+    if event.travel == event.drive_angle:
+        return f"{event.drive_angle:.6g} rad"
+    return f"base ({event.base_x:.6g}, {event.base_y:.6g})"
 
 
 def _sweep(

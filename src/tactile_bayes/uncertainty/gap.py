@@ -15,7 +15,7 @@ from tactile_bayes.uncertainty.band import contour_band, length_unit
 from tactile_bayes.uncertainty.certificate import triangle
 from tactile_bayes.uncertainty.quantiles import central_levels
 
-__all__ = ["gap"]
+__all__ = ["gap", "has_gap"]
 
 _GRID_POINTS = 101
 """Number of grid points of x across the gap."""
@@ -30,7 +30,7 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     Parameters
     ----------
     posterior : xr.DataTree
-        From `infer_contour`, of a record with sweeps in both directions.
+        From `infer_contour`, of a record with sweeps in both directions, or with several if the base is carried.
     probability : float
         Probability of the central intervals and of the band, in (0, 1).
     without_events : xr.DataTree, optional
@@ -61,16 +61,18 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     Raises
     ------
     InferenceError
-        If the record has sweeps in one direction only, or no contour is touched in all of them.
+        If the record has sweeps in one direction only (one sweep only, if the base is carried), or no contour is
+        touched in all of them.
     ParameterError
         If the probability is not in (0, 1).
 
     Notes
     -----
-    With several pivots a gap is an arc that no sweep has touched, after the arcs from first contact to snap-off are
-    merged; its ends may then be first contacts, and several gaps may remain. The widest is described: medians decide
-    which arcs lie on its left and which on its right, and each contour's gap lies between the rightmost end of the
-    former and the leftmost end of the latter. If no gap remains, the smallest overlap is described.
+    With several pivots, or a base that is carried, a gap is an arc that no sweep has touched, after the arcs from first
+    contact to snap-off are merged; its ends may then be first contacts, and several gaps may remain. The widest is
+    described: medians decide which arcs lie on its left and which on its right, and each contour's gap lies between the
+    rightmost end of the former and the leftmost end of the latter. If no gap remains, the smallest overlap is
+    described.
 
     Where a contour's own arcs reach beyond the gap's ends, its height is known by contact: there, triangle_lower and
     triangle_upper count it as a triangle of no width. The band is therefore between them, up to the noise of the draws.
@@ -92,7 +94,14 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     draws = contour_draws(posterior)
     events = contour_events(posterior).transpose("chain", "draw", "stroke", ...)
     missing = [name for name in ("forward", "backward") if name not in events.stroke.values]
-    if missing:
+    if not has_gap(events):
+        if "first_travel" in events:
+            first, last = (float(events[f"{event}_contact_x"].median()) for event in ("first", "snap_off"))
+            raise InferenceError(
+                f"the one sweep touches an arc without a gap, from first contact at x = {first:.4g} to its last "
+                f"contact at x = {last:.4g}: what lies beyond these ends no sweep has touched, and contour_band gives "
+                "there what family and prior imply"
+            )
         raise InferenceError(f"a gap lies between sweeps of both directions, and there is no {missing[0]} one here")
     ends = np.stack([_rows(events["first_contact_x"]), _rows(events["snap_off_contact_x"])])
     touched = np.flatnonzero(np.isfinite(ends).all(axis=(0, 2)))
@@ -156,6 +165,15 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
         coords={"bound": ["lower", "median", "upper"], "x": ("x", x, length), "stroke": events.stroke.values},
         attrs={"probability": probability, "gaps": gaps},
     )
+
+
+def has_gap(events: xr.Dataset) -> bool:
+    """Return whether sweeps with these events may leave a gap between them.
+
+    Those that turn the rod must be of both directions; where the base is carried, any two may.
+    """
+    both = {"forward", "backward"} <= set(events.stroke.values.tolist())
+    return both or ("first_travel" in events and events.sizes["stroke"] > 1)
 
 
 def _ends(ends: Floats) -> tuple[Floats, Floats, int]:

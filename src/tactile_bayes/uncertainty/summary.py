@@ -10,7 +10,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import posterior_draws
-from tactile_bayes.uncertainty.gap import gap
+from tactile_bayes.uncertainty.gap import gap, has_gap
 from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["gap_if_any", "reach", "summary"]
@@ -53,9 +53,8 @@ def summary(posterior: xr.DataTree, probability: float = 0.95, edges: xr.Dataset
 
 
 def gap_if_any(posterior: xr.DataTree, probability: float) -> xr.Dataset | None:
-    """Return the gap, or None where there are sweeps in one direction only."""
-    both = set(_events(posterior).stroke.values) == {"forward", "backward"}
-    return gap(posterior, probability) if both else None
+    """Return the gap, or None where the sweeps leave none between them (`has_gap`)."""
+    return gap(posterior, probability) if has_gap(_events(posterior)) else None
 
 
 def reach(posterior: xr.DataTree) -> Floats:

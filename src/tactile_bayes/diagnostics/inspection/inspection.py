@@ -44,7 +44,9 @@ class Inspection:
     sweeps : xr.Dataset
         Over "sweep": direction, samples, base_x, base_y, drive_angle_from, drive_angle_to and drive_step (the median)
         [rad]; from `zero_load` contact, p_value, onset_drive_angle and snap_off_drive_angle [rad] (also over "side",
-        NaN where there is none); unloaded, the number of unloaded samples.
+        NaN where there is none); unloaded, the number of unloaded samples. If the drive carries the base in some sweep,
+        also carried, travel and travel_step (whole way of the base, and its median step, NaN for rotations), and
+        onset_travel and snap_off_travel from `zero_load`; base_x and base_y are then those of the first sample.
     channels : xr.Dataset
         Over "channel", in the units of coordinate "unit", NaN for a missing channel: smallest, largest, bias,
         bias_uncertainty, noise, noise_uncertainty, resolution and same_bias_p_value (see `zero_load`), stated_noise

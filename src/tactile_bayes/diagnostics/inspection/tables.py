@@ -9,7 +9,7 @@ from tactile_bayes.arrays import Index
 from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, repeated, stuck, uneven_steps
 from tactile_bayes.diagnostics.inspection.stretches import autocorrelation
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS, present_channels
+from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels, travels_of
 
 __all__ = ["channel_table", "sample_table", "sweep_table"]
 
@@ -56,9 +56,12 @@ def sample_table(
         twice = repeated(np.stack(readings, axis=-1), sweeps, np.array(chances), false_alarm=false_alarm)
         twice &= ~(flags["stuck"] | flags["cut_off"]).all(axis=1)
     uneven = np.zeros(count, dtype=bool)
+    travels, carried = travels_of(record), carried_sweeps(record)
     for rows in sweeps:
-        sense = -1 if record["direction"].values[rows[0]] == "backward" else 1
-        uneven[rows] = uneven_steps(record["drive_angle"].values, rows, sense)
+        turns_back = (
+            record["direction"].values[rows[0]] == "backward" and record["sweep"].values[rows[0]] not in carried
+        )
+        uneven[rows] = uneven_steps(travels, rows, -1 if turns_back else 1)
     words = {
         "outlier": "whether the reading stands out from its neighbours",
         "stuck": "whether the reading stays the same for long",
@@ -119,5 +122,14 @@ def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> x
         },
         coords={"sweep": found["sweep"].values, "side": found["side"].values},
     )
-    names = ("contact", "p_value", "onset_drive_angle", "snap_off_drive_angle")
+    names = ["contact", "p_value", "onset_drive_angle", "snap_off_drive_angle"]
+    carried = np.isin(table["sweep"].values, carried_sweeps(record))
+    if carried.any():
+        travels = travels_of(record)
+        whole = [travels[rows[-1]] for rows in sweeps]
+        steps = [float(np.median(np.diff(travels[rows]))) if rows.size > 1 else np.nan for rows in sweeps]
+        table["carried"] = ("sweep", carried)
+        table["travel"] = ("sweep", np.where(carried, whole, np.nan), length)
+        table["travel_step"] = ("sweep", np.where(carried, steps, np.nan), length)
+        names += ["onset_travel", "snap_off_travel"]
     return table.assign({name: found[name].variable for name in names})

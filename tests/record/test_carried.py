@@ -1,0 +1,108 @@
+"""Records of a base that is carried: files of a stage, sweeps and directions from its motion, and travels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tactile_bayes as tb
+from helpers.refusals import refused
+from tactile_bayes.errors import RecordError
+from tactile_bayes.load_cell import zero_load
+from tactile_bayes.record import carried_sweeps, travels_of
+
+CIRCLE = tb.contours.Circle(0.3, 0.8)
+THERE = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
+BACK = tb.Translation(base=(-0.8, 0.0), heading=0.0, drive_angle=1.2, travel=1.6)
+ROD = tb.Rod(length=0.1, flexural_rigidity=1.2e-5)
+
+
+def _stage(path, record, head="", columns=("base_x", "base_y", "holding_moment", "force_x", "force_y")):
+    rows = zip(*(record[name].values.tolist() for name in columns), strict=True)
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    path.write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("head", "columns"),
+    [("# drive_angle: 68.75 [deg]\n", {}), ("# drive_angle: 1.2\n", {}), ("", {"drive_angle": "68.75[deg]"})],
+)
+def test_a_clamped_rod_states_its_angle_once(tmp_path, head, columns):
+    record = tb.scan(CIRCLE, drive=THERE).record
+    read = tb.read_record(_stage(tmp_path / "stage.csv", record, head), columns=columns, split_sweeps=True)
+    np.testing.assert_allclose(read.drive_angle, 1.2, atol=1e-4)
+    assert carried_sweeps(read) == (0,)
+    assert set(read.direction.values) == {"forward"}
+    assert "drive_angle" not in read.attrs
+
+
+def test_a_column_of_angles_precedes_an_angle_in_the_header(tmp_path):
+    record = tb.scan(CIRCLE, drive=THERE).record
+    columns = ("base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y")
+    path = _stage(tmp_path / "stage.csv", record, "# drive_angle: 0.3\n", columns)
+    np.testing.assert_array_equal(tb.read_record(path, split_sweeps=True).drive_angle, record.drive_angle)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        [THERE],
+        [BACK],
+        [tb.Motion(x=[0.8, -0.8], y=0.0, drive_angle=[0.9, 1.7])],
+        [THERE, tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.2, 1.6)],
+    ],
+)
+def test_sweeps_and_directions_follow_from_the_motion(tmp_path, drive):
+    record = tb.scan(CIRCLE, drive=drive).record
+    columns = ("base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y")
+    read = tb.read_record(_stage(tmp_path / "stage.csv", record, columns=columns), split_sweeps=True)
+    np.testing.assert_array_equal(read.direction, record.direction)
+    assert len(set(read.sweep.values.tolist())) == len(drive)
+
+
+def test_a_rod_that_moves_along_itself_has_no_direction(tmp_path):
+    x = 0.01 * np.arange(50)
+    path = tmp_path / "stage.csv"
+    path.write_text("base_x,drive_angle,holding_moment,force_x,force_y\n" + "".join(f"{v},0,0,0,0\n" for v in x))
+    with refused(RecordError, "no side of the rod leads", "line 2"):
+        tb.read_record(path, split_sweeps=True)
+
+
+def test_travels_are_ways_where_the_base_is_carried():
+    record = tb.scan(CIRCLE, drive=[tb.Rotation(), THERE]).record
+    turned = record.sweep.values < 2
+    travels = travels_of(record)
+    np.testing.assert_array_equal(travels[turned], record.drive_angle.values[turned])
+    np.testing.assert_allclose(travels[~turned], 0.01 * np.arange(161), atol=1e-12)
+
+
+def test_unloaded_stretches_end_at_travels():
+    scan = tb.scan(CIRCLE, drive=[tb.Rotation(), THERE])
+    found = zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(scan.record, seed=1))
+    for number, event in ((0, "snap_off"), (2, "snap_off")):
+        before, after = found[f"{event}_travel"].sel(sweep=number).values
+        assert before <= scan.sweeps[number].snap_off.travel <= after
+    turned = tb.scan(CIRCLE).record
+    assert "onset_travel" not in zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(turned, seed=1))
+
+
+def test_an_inspection_reports_travels_and_finds_lost_samples():
+    measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(tb.scan(CIRCLE, drive=BACK).record, seed=1)
+    found = tb.inspect_record(measured)
+    sweeps = found.sweeps.isel(sweep=0)
+    assert bool(sweeps.carried)
+    assert float(sweeps.travel) == pytest.approx(1.6)
+    assert float(sweeps.travel_step) == pytest.approx(0.01)
+    assert not found.samples.uneven_step.values.any()
+    lost = tb.inspect_record(measured.isel(sample=np.delete(np.arange(161), [30, 31])))
+    assert np.flatnonzero(lost.samples.uneven_step.values).tolist() == [30]
+
+
+def test_lengths_of_a_stage_are_in_metres(tmp_path):
+    drive = tb.Translation((0.08, 0.0), np.pi, 1.2, 0.16)
+    record = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rod=ROD).record
+    path = _stage(tmp_path / "stage.csv", record, "# drive_angle: 68.75 [deg]\n")
+    read = tb.read_record(path, rod=ROD, split_sweeps=True)
+    assert travels_of(read)[-1] == pytest.approx(0.16)
+    assert set(read.direction.values) == {"forward"}
