@@ -21,7 +21,7 @@ from tactile_bayes.inference.misfit import CHECK_RIG, is_inferred, what_to_try
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, carried_sweeps
 
 __all__ = ["doubtful_sides", "verdicts"]
 
@@ -205,11 +205,20 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
     return (
         f"The family {family} and the rig as assumed do not describe the record: {like or 'none'} of {predictions} "
         f"records that the posterior predicts {'are' if like > 1 else 'is'} so far off. The worst channel is "
-        f"{channel}, {_CAUSES[cause]}; in sweep {int(worst.worst_sweep)} from {float(worst.worst_from):.3g} to "
-        f"{float(worst.worst_to):.3g} rad it is off the prediction by {float(worst.worst_residual):+.2g}{unit}. "
+        f"{channel}, {_CAUSES[cause]}; in sweep {int(worst.worst_sweep)} from {_stretch(posterior, worst)} "
+        f"it is off the prediction by {float(worst.worst_residual):+.2g}{unit}. "
         "Do not use this contour. "
         + what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0))
     )
+
+
+def _stretch(posterior: xr.DataTree, worst: xr.Dataset) -> str:
+    """Return drive angles, or travels of a base that is carried, from the beginning to the end of a stretch."""
+    record = record_of(posterior)
+    if int(worst.worst_sweep) not in carried_sweeps(record):
+        return f"{float(worst.worst_from):.3g} to {float(worst.worst_to):.3g} rad"
+    unit = _unit(record, "base_x") or " L"
+    return f"{float(worst.worst_from_travel):.3g} to {float(worst.worst_to_travel):.3g}{unit} of travel"
 
 
 def _neighbours_over_stated(record: xr.Dataset, check: xr.Dataset) -> float:
