@@ -141,7 +141,7 @@ def _numbers(made: Run[xr.Dataset], words: list[str]) -> dict[str, Any]:
         "best": int(found.best),
         "present_width": float(found.present_width),
         "candidates": [
-            {name: float(found[name].values[k]) for name in columns} for k in range(found.sizes["candidate"])
+            {name: found[name].values[k].item() for name in columns} for k in range(found.sizes["candidate"])
         ],
         "files": made.files,
     }

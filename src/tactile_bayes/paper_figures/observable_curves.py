@@ -95,9 +95,9 @@ def _finer(made: Scan, number: int) -> xr.Dataset:
 def _draw_sweep(ax: Axes, sweep: xr.Dataset, events: SweepEvents, channel: str, colour: Any) -> None:
     phase = sweep["truth_contact_phase"].values.astype(object)
     angle, value, phase = with_events(
-        sweep["drive_angle"].values, sweep[channel].values, phase, events, channel, "fixed"
+        np.degrees(sweep["drive_angle"].values), sweep[channel].values, phase, events, channel, "fixed"
     )
     line: dict[str, Any] = {"color": colour, "linestyle": _LINES[events.direction], "zorder": 2.5}
     for run in phase_runs(phase):
-        ax.plot(np.degrees(angle[run]), value[run], linewidth=_WIDTHS[str(phase[run.start])], **line)
+        ax.plot(angle[run], value[run], linewidth=_WIDTHS[str(phase[run.start])], **line)
     draw_events(ax, events, channel, "fixed", _SHRUNK, markeredgewidth=0.7)

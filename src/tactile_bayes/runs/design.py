@@ -44,7 +44,8 @@ def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, *
     found = design(*args, nested=nested, out=Path(out) / "nested" if nested else None, **options)
     folder = Folder(out)
     folder.write_netcdf("design", "design.nc", found)
-    columns = [str(name) for name, values in found.data_vars.items() if values.dims == ("candidate",)]
+    numbers = found.drop_vars("drive").data_vars
+    columns = [str(name) for name, values in numbers.items() if values.dims == ("candidate",)]
     rows = np.stack([found[name].values for name in columns], axis=1)
     lines = [",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
     folder.write_lines("candidates", "candidates.csv", lines)
