@@ -27,7 +27,7 @@ from tactile_bayes.inference import contour_groups
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import default_priors
+from tactile_bayes.inference.experiment import Experiment, default_priors
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
@@ -297,6 +297,13 @@ def test_priors_of_which_little_is_within_reach(monkeypatch):
     result = infer_as_stated(coarse(), seed=1, priors={"q": stats.uniform(0.0, 150.0)}, settings=BRIEF)
     assert 0 < result["prior"].sizes["draw"] < 1000
     assert result["prior"].attrs["share_within_reach"] < 0.01
+
+
+def test_one_draw_is_found_where_one_in_a_hundred_is_within_reach():
+    model = Experiment(coarse(), family="parabola", priors={"q": stats.uniform(0.0, 75.0)}).model
+    shares = [model.draw_prior(np.random.default_rng(seed), 1)[1] for seed in range(5)]
+    assert 0.001 <= np.mean(shares) < 0.1
+    assert min(shares) < 1 / 50
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,9 @@ _FEWEST_UNLOADED = 12
 _MOST_TRIALS = 50
 """Largest number of draws from the prior for each requested draw within reach."""
 
+_FEWEST_TRIALS = 1000
+"""Number of draws from the prior before none within reach is an error, so that one requested draw is found too."""
+
 
 class ContourModel:
     """Prior times likelihood, as a function of arrays of parameters.
@@ -248,7 +251,8 @@ class ContourModel:
             If none of many draws is within reach.
         """
         found, drawn = [np.empty((0, len(self.names)))], 0
-        while (had := sum(map(len, found))) < count and drawn < _MOST_TRIALS * count:
+        most = max(_MOST_TRIALS * count, _FEWEST_TRIALS)
+        while (had := sum(map(len, found))) < count and drawn < most:
             if had and deadline.has_passed:
                 break
             points = np.stack([self.priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
