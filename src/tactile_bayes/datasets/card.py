@@ -19,12 +19,16 @@ def card(spec: Specification, manifest: Manifest) -> str:
     files = len(manifest.shards)
     bases = len(spec.bases)
     where = "" if bases == 1 else f" from {bases} bases"
+    rod = "a flexible rod that is carried" if spec.translations else "a flexible rod on a pivot"
+    sweeps = f"{len(spec.sweeps)} sweeps ({', '.join(spec.directions)}{where})"
+    if spec.translations:
+        sweeps = f"{spec.sweep_count} sweep{'s' * (spec.sweep_count != 1)}"
     lines = [
         f"# {spec.name}",
         "",
         *([spec.description.strip(), ""] if spec.description.strip() else []),
-        f"Simulated sweeps of a flexible rod on a pivot along strictly convex contours: {spec.records} records of "
-        f"{len(spec.sweeps)} sweeps ({', '.join(spec.directions)}{where}) with {spec.drive.samples} samples each, in "
+        f"Simulated sweeps of {rod} along strictly convex contours: {spec.records} records of "
+        f"{sweeps} with {spec.drive.samples} samples each, in "
         f"{files} NetCDF file{'s' * (files != 1)}, {size / 1e6:.1f} MB. "
         + ("Lengths in m, forces in N, moments in N m." if spec.units == "SI" else
            "Lengths in rod lengths L, forces in EI/L², moments in EI/L, angles in rad."),
@@ -55,9 +59,13 @@ def card(spec: Specification, manifest: Manifest) -> str:
     for number, pair in enumerate(spec.bases, start=1):
         pivot = "pivot" if bases == 1 else f"pivot {number}"
         lines += [f"| {pivot}: {axis} | {distribution.text} |" for axis, distribution in zip("xy", pair, strict=True)]
+    for number, one in enumerate(spec.translations, start=1):
+        lines += [f"| translation {number}: {name} | {distribution.text} |" for name, distribution in one.items()]
     lines += [f"| load cell: {name} | {distribution.text} |" for name, distribution in spec.load_cell.items()]
     drive = spec.drive
-    if drive.begin is None:
+    if spec.translations:
+        lines.append(f"| samples | {drive.samples}, evenly spaced from the beginning of the travel to its end |")
+    elif drive.begin is None:
         lines.append(f"| drive angles | from first contact to snap-off, and {drive.margin:g} of that on either side |")
     else:
         lines.append(f"| drive angles | {drive.begin:.6g} to {drive.end:.6g} rad |")
@@ -140,7 +148,7 @@ def _redrawn(spec: Specification, manifest: Manifest) -> str:
 def _to_beware_of(spec: Specification, manifest: Manifest) -> list[str]:
     """Describe records that may not be suitable."""
     lines = []
-    sweeps = spec.records * len(spec.sweeps)
+    sweeps = spec.records * spec.sweep_count
     if manifest.untouched or spec.drive.begin is not None:
         lines += [f"Of {sweeps} sweeps, {manifest.untouched} have no sample in contact (`truth_contact_phase`).", ""]
     if spec.has_thickness:

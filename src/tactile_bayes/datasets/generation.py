@@ -15,6 +15,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.sweep_frame import SweepFrame
+from tactile_bayes.datasets.drives import Drives, drives_of
 from tactile_bayes.datasets.measurement import measure
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import rule_of
@@ -22,11 +23,11 @@ from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.profile import profile_of
-from tactile_bayes.mechanics.reachability import Reachability
+from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.rod import LARGEST_STRAIN
 from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
-__all__ = ["Records", "generate_records"]
+__all__ = ["Records", "directions_of", "generate_records"]
 
 _MOST_DRAWS = 1000
 """Largest number of draws of one record."""
@@ -51,9 +52,11 @@ class Records:
     drawn: dict[str, Floats]
     """Drawn numbers by the keys of the distributions, shape (n,); NaN for parameters of other families."""
     sweep: dict[str, NDArray[Any]]
-    """Columns of sweeps, shape (n, sweeps): base_x, base_y, phases, events, and the largest strain of a thick rod."""
+    """Columns of sweeps, shape (n, sweeps): base_x and base_y of pivots, or directions of sweeps that carry the base (0
+    forward, 1 backward), phases, events, and the largest strain of a thick rod."""
     sample: dict[str, NDArray[Any]]
-    """Columns of samples, shape (n, sweeps, samples): readings, and "truth_" columns."""
+    """Columns of samples, shape (n, sweeps, samples): readings, base_x and base_y of a base that is carried, and
+    "truth_" columns."""
     redrawn: Counter[str]
     """Numbers of rejected draws by reason."""
 
@@ -81,6 +84,8 @@ _CORRECTIONS = {
     "too close to the pivot": _HIGHER,
     "still touched at its other end": _WIDER,
     "touched twice": "give rods that are less curved, or contours that are more so where rods touch them",
+    "touched at the beginning": "begin the translations farther from the contours",
+    "held by friction": "take another heading or drive angle, or less friction",
     "slips off at once": "give rods that are less curved, or bring contours and pivots closer to one another",
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the unloaded rod would still cut the object",
@@ -124,8 +129,16 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         _keep(spec, records, candidates, tried, (is_good & (good_so_far == 1)).ravel())
         left, draws = left[~is_good.any(axis=1)], draws + ahead
         ahead = max(1, min(2 * ahead, max(_AT_ONCE, index.size) // max(left.size, 1), _MOST_DRAWS - draws))
-    measure(spec, index, records.drawn, records.sample)
+    measure(spec, index, records.drawn, records.sample, directions_of(spec, records.sweep))
     return records
+
+
+def directions_of(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
+    """Return the directions of the sweeps, 0 forward and 1 backward, shape (sweeps,), or (n, sweeps) of a base that is
+    carried."""
+    if spec.translations:
+        return sweep["direction"]
+    return np.array([direction == "backward" for _, direction in spec.sweeps], dtype=np.int8)
 
 
 class _Candidates(NamedTuple):
@@ -164,7 +177,7 @@ def _keep(
     spec: Specification, records: Records, candidates: _Candidates, tried: Mapping[int, _Tried], is_kept: Flags
 ) -> None:
     """Write accepted candidates to their records."""
-    count, sweeps = records.index.size, len(spec.sweeps)
+    count, sweeps = records.index.size, spec.sweep_count
     for g, its in tried.items():
         taken = np.flatnonzero(is_kept[its.candidate])
         chosen = its.candidate[taken]
@@ -212,9 +225,7 @@ class _Tried(NamedTuple):
     candidate: Index
     """Indices of the candidates."""
     paths: Paths
-    drive: Floats
-    """Drive angles in the sweep frame, shape (n, k), or shares of the drive angle from first contact to snap-off, shape
-    (k,)."""
+    drives: Drives
     units: ManyUnits
 
 
@@ -225,7 +236,7 @@ def _tried(spec: Specification, candidates: _Candidates) -> tuple[NDArray[Any], 
         contours, built = _built(spec, g, candidates, why)
         if contours is not None:
             tried[g] = _swept(spec, contours, built, {key: v[built] for key, v in candidates.values.items()})
-            why[built] = _judged(tried[g].paths, len(spec.sweeps))
+            why[built] = _judged(tried[g].paths, spec.sweep_count)
     return why, tried
 
 
@@ -252,40 +263,35 @@ def _built(spec: Specification, g: int, candidates: _Candidates, why: NDArray[An
 
 def _swept(spec: Specification, contours: Contour, candidate: Index, values: Mapping[str, Floats]) -> _Tried:
     """Sweep along contours, given the values of all distributions."""
-    sweeps = len(spec.sweeps)
-    place = np.repeat(np.arange(candidate.size), sweeps)
-    base_x, base_y = (
-        np.stack([values[f"scan.bases[{b}][{axis}]"] for b, _ in spec.sweeps], axis=1).ravel() for axis in (0, 1)
-    )
-    backward = np.tile([direction == "backward" for _, direction in spec.sweeps], candidate.size)
+    place = np.repeat(np.arange(candidate.size), spec.sweep_count)
     of_rod = {name: values[f"rod.{name}"][place] for name in spec.rod}
     length, rigidity = (of_rod.get(name, np.ones(place.size)) for name in ("length", "flexural_rigidity"))
     diameter, curvature, taper = (
         of_rod.get(name, np.zeros(place.size)) for name in ("diameter", "rest_curvature", "taper")
     )
     units = ManyUnits(length, rigidity / length, rigidity / length**2)
-    drive, way = spec.drive, np.linspace(0.0, 1.0, spec.drive.samples)
-    if drive.begin is None or drive.end is None:
-        as_seen = (1.0 + 2.0 * drive.margin) * way - drive.margin
-    else:
-        forward = drive.begin + (drive.end - drive.begin) * way
-        as_seen = np.where(backward[:, None], np.pi - forward[::-1], forward)
+    drives = drives_of(spec, values, length)
     paths = trace(
-        SweepFrame(contours.take(place), base_x, base_y, length, 0.5 * diameter, backward, curvature * length, taper),
+        SweepFrame(
+            contours.take(place), *drives[:2], length, 0.5 * diameter, drives.backward, curvature * length, taper
+        ),
         friction_angle=float(np.arctan(spec.friction)),
         profile=profile_of() if spec.has_taper else None,
-        drive_angles=as_seen,
-        relative=as_seen.ndim == 1,
+        drive_angles=drives.way,
+        relative=drives.way.ndim == 1,
         polished=False,
+        lines=drives.lines,
     )
-    return _Tried(candidate, paths, as_seen, units)
+    return _Tried(candidate, paths, drives, units)
 
 
 def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
     """Return the reasons for rejection of candidates with so many sweeps each, side by side."""
     fate = paths.reach.reshape(-1, sweeps).max(axis=1)
     with np.errstate(invalid="ignore"):
-        clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
+        # Rods that are carried may be in contact up to the end of the drive.
+        clear = paths.is_clear() | ((paths.snap_off == SnapOff.NEVER) & (paths.lines is not None))
+    clear = clear.reshape(-1, sweeps).all(axis=1)
     reasons = np.array([one.message for one in Reachability], dtype=object)[fate]
     return np.where((fate == Reachability.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
 
@@ -293,13 +299,16 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
 def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
     """Columns of every sweep, shape (n,)."""
     paths = tried.paths
-    found = {
-        "base_x": paths.sweep_frame.base_x,
-        "base_y": paths.sweep_frame.base_y,
-        "phases": np.array(phases_of(paths), dtype=object),
-    }
+    phases = np.array(phases_of(paths), dtype=object)
+    if spec.translations:
+        found = {"direction": paths.sweep_frame.mirrored.astype(np.int8), "phases": phases}
+    else:
+        found = {"base_x": paths.sweep_frame.base_x, "base_y": paths.sweep_frame.base_y, "phases": phases}
     for event, columns in sweep_events(paths, tried.units).items():
         found |= {f"{event}_{name}": columns[name] for name in EVENT_COLUMNS}
+    if spec.translations:
+        length = tried.units.length_unit
+        found |= {"first_contact_travel": length * paths.first_angle, "snap_off_travel": length * paths.snap_angle}
     found["snap_off_kind"] = paths.snap_off
     if spec.has_thickness:
         found["largest_strain"] = np.nan_to_num(
@@ -310,12 +319,17 @@ def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
 
 def _of_samples(tried: _Tried, index: Index) -> dict[str, NDArray[Any]]:
     """Columns of the samples of sweeps, shape (*index.shape, k)."""
-    paths, drive = tried.paths, tried.drive
-    first, snap = paths.first_angle[index][..., None], paths.snap_angle[index][..., None]
-    as_seen = first + drive * (snap - first) if drive.ndim == 1 else drive[index]
+    paths, way, ends = tried.paths, tried.drives.way, tried.drives.ends
     samples = sweep_samples(paths, tried.units, index)
-    mirrored = paths.sweep_frame.mirrored[index][..., None]
-    found = {"drive_angle": np.where(mirrored, np.pi - as_seen, as_seen)}
+    if ends is None:
+        first, snap = paths.first_angle[index][..., None], paths.snap_angle[index][..., None]
+        as_seen = first + way * (snap - first) if way.ndim == 1 else way[index]
+        mirrored = paths.sweep_frame.mirrored[index][..., None]
+        found = {"drive_angle": np.where(mirrored, np.pi - as_seen, as_seen)}
+    else:
+        begin, end = (ends[index, k, :, None] for k in (0, 1))
+        poses = begin + (end - begin) * np.linspace(0.0, 1.0, way.shape[1])
+        found = {name: poses[..., k, :] for k, name in enumerate(("base_x", "base_y", "drive_angle"))}
     return found | {f"truth_{name}": samples[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
 
 

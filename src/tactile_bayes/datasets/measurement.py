@@ -37,11 +37,17 @@ _HARMLESS: dict[str, tuple[str, int | None]] = {
 """Entries of a data sheet whose validity does not depend on the others: field, and position in it."""
 
 
-def measure(spec: Specification, index: Index, drawn: Mapping[str, Floats], sample: dict[str, NDArray[Any]]) -> None:
-    """Add the readings of the load cell to the true values."""
+def measure(
+    spec: Specification,
+    index: Index,
+    drawn: Mapping[str, Floats],
+    sample: dict[str, NDArray[Any]],
+    backward: NDArray[np.int8],
+) -> None:
+    """Add the readings of the load cell to the true values; directions are 0 forward and 1 backward."""
     cells, cell_of, scale = _cells(spec, drawn, index.size)
     noise = streams(spec.seed, index, NOISE)
-    direction = np.array([direction for _, direction in spec.sweeps])[:, None]
+    direction = np.array(["forward", "backward"])[np.broadcast_to(backward, (index.size, spec.sweep_count))][..., None]
     encoder = any(name.startswith("drive_angle") for name in spec.load_cell)
     if encoder:
         sample["truth_drive_angle"] = sample["drive_angle"].copy()
@@ -61,7 +67,7 @@ def measure(spec: Specification, index: Index, drawn: Mapping[str, Floats], samp
             for k, name in enumerate(CHANNELS):
                 sample[name][some] = readings[..., k]
             if encoder:
-                sample["drive_angle"][some] = corrupted_angles(cell, sample["drive_angle"][some], direction, rng)
+                sample["drive_angle"][some] = corrupted_angles(cell, sample["drive_angle"][some], direction[some], rng)
 
 
 def _cells(spec: Specification, drawn: Mapping[str, Floats], count: int) -> tuple[list[LoadCell], Index, Floats]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.family import FamilyParameter
-from tactile_bayes.datasets.generation import Records, generate_records
+from tactile_bayes.datasets.generation import Records, directions_of, generate_records
 from tactile_bayes.datasets.netcdf import netcdf_of
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_text
@@ -129,7 +129,7 @@ def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
     variables |= _of_samples(spec, records.sample)
     coords: dict[str, Any] = {
         "record": ("record", records.index.astype(np.int64), {"long_name": "number of the record in the data set"}),
-        "sweep": ("sweep", np.arange(len(spec.sweeps)), {"long_name": "number of the sweep in the record"}),
+        "sweep": ("sweep", np.arange(spec.sweep_count), {"long_name": "number of the sweep in the record"}),
     }
     attrs: dict[str, str | float] = {
         "title": spec.name,
@@ -171,10 +171,12 @@ def _unit(spec: Specification, name: str, entries: list[FamilyParameter]) -> str
 
 
 def _of_sweeps(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    backward = np.array([direction == "backward" for _, direction in spec.sweeps], dtype=np.int8)
+    backward, both = directions_of(spec, sweep), ("record", "sweep")
     attrs = _flags("sense of the drive", ("forward", "backward"), np.int8)
-    found: dict[str, Any] = {"direction": ("sweep", backward, attrs)}
+    found: dict[str, Any] = {"direction": (both[-backward.ndim :], backward, attrs)}
     for name, values in sweep.items():
+        if name == "direction":
+            continue
         key = name if name in COLUMNS else f"truth_{name}"
         if name == "phases":
             values = np.array([[PHASE_SEQUENCES.index(word) for word in row] for row in values], dtype=np.int8)
@@ -188,9 +190,12 @@ def _of_sweeps(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> dict[s
             attrs = _described(spec, name)
         else:
             event = "first_contact" if name.startswith("first_contact") else "snap_off"
-            attrs = _described(spec, name.removeprefix(f"{event}_"))
+            what = name.removeprefix(f"{event}_")
+            attrs = _described(spec, "base_x" if what == "travel" else what)
+            if what == "travel":
+                attrs["long_name"] = "way of the base"
             attrs["long_name"] += f" at {event.replace('_', ' ').replace('snap off', 'snap-off')}"
-        found[key] = (("record", "sweep"), values, attrs)
+        found[key] = (both, values, attrs)
     return found
 
 

@@ -122,10 +122,10 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
     count = data.sizes["sample"]
     columns: dict[str, Any] = {
         "sweep": np.repeat(data["sweep"].values, count),
-        "direction": np.repeat([direction for _, direction in spec.sweeps], count),
-        "base_x": np.repeat(data["base_x"].values, count),
-        "base_y": np.repeat(data["base_y"].values, count),
+        "direction": np.repeat(np.array(["forward", "backward"])[data["direction"].values], count),
     }
+    if not spec.translations:
+        columns |= {name: np.repeat(data[name].values, count) for name in ("base_x", "base_y")}
     attrs: dict[str, Any] = {"truth_family": spec.groups[int(data["truth_family"])].family}
     for name, variable in data.data_vars.items():
         name = str(name)

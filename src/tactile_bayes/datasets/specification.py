@@ -76,8 +76,11 @@ class Specification:
         Pivots (x, y) [m, or rod lengths].
     directions : tuple of str
         Directions of the sweeps about each pivot.
+    translations : tuple of mapping of str to Distribution
+        Sweeps in which the base is carried along a line, in place of pivots: base[0], base[1], travel or step [m, or
+        rod lengths], heading and drive_angle [rad].
     drive : Drive
-        Drive angles.
+        Number of samples, and drive angles of rotations.
     friction : float
         Coulomb's coefficient μ.
     load_cell : mapping of str to Distribution
@@ -99,6 +102,7 @@ class Specification:
     rod: Mapping[str, Distribution]
     bases: tuple[tuple[Distribution, Distribution], ...]
     directions: tuple[str, ...]
+    translations: tuple[Mapping[str, Distribution], ...]
     drive: Drive
     friction: float
     load_cell: Mapping[str, Distribution]
@@ -136,12 +140,17 @@ class Specification:
 
     @property
     def sweeps(self) -> tuple[tuple[int, str], ...]:
-        """Base and direction of each sweep of a record."""
+        """Pivot and direction of each sweep of a record; empty if the base is carried."""
         return tuple((base, direction) for base in range(len(self.bases)) for direction in self.directions)
+
+    @property
+    def sweep_count(self) -> int:
+        """Number of sweeps of a record."""
+        return len(self.sweeps) + len(self.translations)
 
     def blocks(self, records: int) -> list[Index]:
         """Split the indices of records into blocks whose samples fit into a processor's cache."""
-        samples = records * len(self.sweeps) * self.drive.samples
+        samples = records * self.sweep_count * self.drive.samples
         return np.array_split(np.arange(records), max(1, -(-samples // _AT_HAND)))
 
     @property
@@ -151,6 +160,7 @@ class Specification:
             **{f"contours[{g}].": group.distributions for g, group in enumerate(self.groups)},
             "rod.": self.rod,
             **{f"scan.bases[{b}]": {"[0]": x, "[1]": y} for b, (x, y) in enumerate(self.bases)},
+            **{f"scan.translations[{k}].": one for k, one in enumerate(self.translations)},
             "load_cell.": self.load_cell,
         }
         return tuple(

@@ -36,10 +36,13 @@ _LARGEST_SEED = 2**63 - 1
 _TABLES: Mapping[str, Iterable[str]] = {
     "": ("name", "description", "records", "seed", "shard_records", "precision", "each_contour"),
     "rod.": ("length", "flexural_rigidity", "diameter", "rest_curvature", "taper"),
-    "scan.": ("bases", "directions", "samples", "from_degrees", "to_degrees", "margin", "friction"),
+    "scan.": ("bases", "directions", "translations", "samples", "from_degrees", "to_degrees", "margin", "friction"),
     "load_cell.": ("frame", *LOAD_CELL_UNITS),
 }
 """Keys of each table."""
+
+_OF_ROTATIONS = ("bases", "directions", "from_degrees", "to_degrees", "margin")
+_OF_TRANSLATIONS = ("base", "heading", "drive_angle", "travel", "step")
 
 _REPLACED = {
     "power-law": ("a", "w", "the width at which it is as high as wide, a^(1/(1 − n))"),
@@ -126,8 +129,9 @@ def _specification(table: Mapping[str, Any], text: str) -> Specification:
         groups=_groups(said),
         each_group=said["each_contour"],
         rod=_rod(_table(table, "rod")),
-        bases=_bases((SCAN | scan)["bases"]),
-        directions=_directions((SCAN | scan)["directions"]),
+        bases=() if "translations" in scan else _bases((SCAN | scan)["bases"]),
+        directions=() if "translations" in scan else _directions((SCAN | scan)["directions"]),
+        translations=_translations(scan),
         drive=_drive(scan),
         friction=_number((SCAN | scan)["friction"], "scan.friction", 0.0, 0.84),
         load_cell=_load_cell(load_cell),
@@ -286,6 +290,48 @@ def _directions(value: Any) -> tuple[str, ...]:
     if value not in (["forward"], ["backward"], ["forward", "backward"], ["backward", "forward"]):
         raise refused("scan.directions", value, "give 'forward', 'backward' or both")
     return tuple(value)
+
+
+def _translations(scan: Mapping[str, Any]) -> tuple[dict[str, Distribution], ...]:
+    if "translations" not in scan:
+        return ()
+    if of_rotations := [name for name in _OF_ROTATIONS if name in scan]:
+        raise SpecificationError(
+            f"scan has translations, and {of_rotations[0]}, which is for rotations: leave the one or the other out"
+        )
+    value = scan["translations"]
+    if not isinstance(value, list) or not value or not all(isinstance(one, dict) for one in value):
+        raise refused(
+            "scan.translations", value, "write [[scan.translations]], in two pairs of brackets, for each sweep"
+        )
+    return tuple(_translation(one, f"scan.translations[{k}]") for k, one in enumerate(value))
+
+
+def _translation(said: Mapping[str, Any], key: str) -> dict[str, Distribution]:
+    _refuse_unknown(said, _OF_TRANSLATIONS, f"{key}.")
+    for name in ("base", "heading", "drive_angle"):
+        if name not in said:
+            raise SpecificationError(
+                f"{key}.{name} is missing: give a number or a distribution for each of its numbers"
+            )
+    if ("travel" in said) == ("step" in said):
+        which = "both travel and step" if "travel" in said else "neither travel nor step"
+        raise SpecificationError(f"{key} has {which}: give the one or the other, since samples are evenly spaced")
+    base = said["base"]
+    if not isinstance(base, list) or len(base) != 2:
+        raise refused(f"{key}.base", base, "give the place [x, y] where the base begins")
+    values = {
+        "base[0]": base[0],
+        "base[1]": base[1],
+        **{name: said[name] for name in _OF_TRANSLATIONS[1:] if name in said},
+    }
+    found = {name: distribution_of(value, f"{key}.{name}") for name, value in values.items()}
+    for name in ("heading", "drive_angle"):
+        for angle in (found[name].least, found[name].greatest):
+            if math.isfinite(angle) and abs(angle) > 2.0 * math.pi:
+                raise SpecificationError(f"{key}.{name} may be {angle:g}: give angles in radians, at most a turn (2π)")
+    _refuse_negative({name: found[name] for name in ("travel", "step") if name in found}, f"{key}.", or_zero=())
+    return found
 
 
 def _drive(scan: Mapping[str, Any]) -> Drive:

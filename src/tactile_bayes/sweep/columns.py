@@ -67,8 +67,9 @@ def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Fl
         ("snap_off", paths.snap_angle, paths.phases),
     ):
         found = to_lab_frame(paths.sweep_frame, index, states.take(index, event), units.of(index))
-        turned = np.where(paths.sweep_frame.mirrored, np.pi - angle, angle)
-        events[name] = {**{column: found[column] for column in EVENT_COLUMNS}, "drive_angle": turned}
+        events[name] = {column: found[column] for column in EVENT_COLUMNS}
+        if paths.lines is None:
+            events[name]["drive_angle"] = np.where(paths.sweep_frame.mirrored, np.pi - angle, angle)
     return events
 
 

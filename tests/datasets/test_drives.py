@@ -1,0 +1,189 @@
+"""Data sets of rods that are carried: truth against scans, files, and refusals."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import tactile_bayes as tb
+from helpers.data_sets import PLAIN, changed
+from helpers.refusals import refused
+from tactile_bayes.datasets import contour_of, generate, read_specification, record, verify
+from tactile_bayes.datasets.generation import generate_records
+from tactile_bayes.datasets.shard import records_as_dataset
+from tactile_bayes.errors import SpecificationError
+from tactile_bayes.record import CHANNELS, rod_of, turned
+
+FIRST = {
+    "base": [0.9, {"uniform": [-0.1, 0.0]}],
+    "heading": {"normal": [3.1, 0.02]},
+    "drive_angle": {"choice": [1.3, 1.5]},
+    "travel": {"uniform": [1.8, 2.0]},
+}
+SECOND = {"base": [-0.9, -0.05], "heading": 0.0, "drive_angle": {"each": [1.6, 1.8]}, "step": 0.04}
+CARRIED = changed(
+    PLAIN,
+    records=6,
+    shard_records=4,
+    contours=[{"family": "circle", "r": {"uniform": [0.4, 0.6]}, "q": {"uniform": [0.6, 0.7]}}],
+    scan={"samples": 40, "translations": [FIRST, SECOND]},
+)
+SI = changed(
+    CARRIED,
+    contours=[{"family": "parabola", "a": {"uniform": [5.0, 8.0]}, "q": {"uniform": [0.06, 0.07]}}],
+    rod={
+        "length": {"uniform": [0.1, 0.12]},
+        "flexural_rigidity": 1e-4,
+        "diameter": 1e-3,
+        "rest_curvature": {"normal": [0.0, 1.0]},
+        "taper": 0.3,
+    },
+    scan={
+        "samples": 30,
+        "friction": 0.2,
+        "translations": [{**FIRST, "base": [0.09, 0.0], "travel": 0.18}, {**SECOND, "base": [-0.09, 0], "step": 0.005}],
+    },
+    load_cell={"frame": "turning", "drive_angle_offset": 0.01, "drive_angle_backlash": 0.004, "force_noise": 1e-5},
+)
+BRIEF = changed(CARRIED, scan__translations=[{**FIRST, "travel": 0.9}])
+
+
+def truth_of(one, name):
+    return one[f"truth_{name}" if f"truth_{name}" in one else name].values
+
+
+@pytest.mark.parametrize("spec", [CARRIED, SI, BRIEF], ids=["dimensionless", "SI", "in contact at the end"])
+def test_the_truth_is_what_a_scan_along_the_drive_says(spec):
+    """Loads to 1e-6 of the largest, contacts to 2e-5 of the rod, events to rounding."""
+    said = read_specification(spec)
+    whole = records_as_dataset(said, generate_records(said, 0, 4))
+    for i in range(4):
+        mine = record(spec, i)
+        rod = rod_of(mine)
+        for number in range(said.sweep_count):
+            one, row = mine.isel(sample=mine["sweep"].values == number), whole.isel(record=i, sweep=number)
+            angle = truth_of(one, "drive_angle")
+            drive = tb.Motion(one.base_x.values, one.base_y.values, angle)
+            scan = tb.scan(contour_of(mine), drive=drive, rod=rod, friction=said.friction)
+            theirs, events = scan.record, scan.sweeps[0]
+            assert set(one.direction.values) == {events.direction}
+            assert theirs.sizes["sample"] == said.drive.samples
+            if said.frame == "turning":
+                force = turned(theirs.force_x.values, theirs.force_y.values, angle)
+                theirs = theirs.assign({n: ("sample", v) for n, v in zip(CHANNELS[1:], force, strict=True)})
+            for name in CHANNELS:
+                scale = np.abs(theirs[name].values).max()
+                np.testing.assert_allclose(one[f"truth_{name}"], theirs[name], rtol=0, atol=1e-6 * scale, err_msg=name)
+            for name in ("contact_x", "contact_y", "contact_arclength"):
+                ours, their = one[f"truth_{name}"].values, theirs[f"truth_{name}"].values
+                np.testing.assert_allclose(ours, their, rtol=0, atol=2e-5 * rod.length, err_msg=name)
+            for event in ("first_contact", "snap_off"):
+                for name in ("travel", "drive_angle", "slope_angle", "contact_x", "contact_y"):
+                    there = getattr(getattr(events, event), name)
+                    np.testing.assert_allclose(float(row[f"truth_{event}_{name}"]), there, rtol=1e-7, atol=1e-9)
+            kinds = row.truth_snap_off_kind.attrs["flag_meanings"].split()
+            assert kinds[int(row.truth_snap_off_kind)] == events.snap_off.kind
+
+
+def test_drives_follow_their_distributions():
+    one, other = record(CARRIED, 1), record(CARRIED, 4)
+    for data, angle in ((one, 1.8), (other, 1.6)):
+        first, second = (data.isel(sample=data["sweep"].values == k) for k in (0, 1))
+        assert [set(sweep.direction.values) for sweep in (first, second)] == [{"forward"}, {"backward"}]
+        assert float(first.base_x[0]) == 0.9
+        assert -0.1 <= float(first.base_y[0]) <= 0.0
+        assert set(first.drive_angle.values) <= {1.3, 1.5}
+        np.testing.assert_array_equal(second.drive_angle, angle)
+        np.testing.assert_allclose(np.diff(second.base_x), 0.04, atol=1e-12)
+        np.testing.assert_array_equal(second.base_y, -0.05)
+        way = np.hypot(first.base_x[-1] - first.base_x[0], first.base_y[-1] - first.base_y[0])
+        assert 1.8 <= float(way) <= 2.0
+    assert float(one.base_y[0]) != float(other.base_y[0])
+
+
+def test_a_heading_decides_the_direction_record_by_record():
+    there = {
+        "base": [0.0, -0.1],
+        "heading": {"each": [0.0, 3.1416], "axis": "side"},
+        "drive_angle": 1.5708,
+        "travel": 1.0,
+    }
+    spec = changed(
+        CARRIED,
+        records=2,
+        contours=[{"family": "parabola", "a": 1.0, "q": 0.5, "x_c": {"each": [0.8, -0.8], "axis": "side"}}],
+        scan={"samples": 10, "translations": [there]},
+    )
+    assert [set(record(spec, i).direction.values) for i in range(2)] == [{"backward"}, {"forward"}]
+
+
+def test_backlash_follows_the_direction():
+    one = record(SI, 0)
+    wrong = one.drive_angle.values - one.truth_drive_angle.values
+    stated = tb.LoadCell.from_record(one)
+    np.testing.assert_allclose(wrong, stated.misread(one.direction.values), atol=1e-14)
+    assert np.unique(wrong.round(9)).size == 2
+
+
+@pytest.mark.parametrize("spec", [CARRIED, changed(SI, precision="single")], ids=["double", "single"])
+def test_files_are_verified_and_inferred_from(spec, tmp_path):
+    generate(spec, tmp_path / "set", workers=1)
+    assert verify(tmp_path / "set", regenerate=1).is_complete
+    data = tb.datasets.open(tmp_path / "set")
+    assert data.base_x.dims == ("record", "sweep", "sample")
+    assert data.direction.dims == data.truth_first_contact_travel.dims == ("record", "sweep")
+    assert "way of the base at first contact" in data.truth_first_contact_travel.attrs["long_name"]
+    card = (tmp_path / "set" / "README.md").read_text()
+    assert "a flexible rod that is carried" in card
+    assert "| translation 2: step |" in card
+    assert "pivot" not in card
+    one = record(tmp_path / "set", 3)
+    xr.testing.assert_identical(one, record(spec, 3))
+    tb.write_record(one, tmp_path / "one.csv")
+    np.testing.assert_allclose(tb.read_record(tmp_path / "one.csv").base_x, one.base_x)
+    contacts = tb.reconstruct(record(tmp_path / "set", 3, truth=False))
+    assert (contacts.status == "ok").sum() > 20
+
+
+def translation(**changes):
+    """PLAIN with one translation, changed; None removes an entry."""
+    one = {name: value for name, value in {**FIRST, **changes}.items() if value is not None}
+    return {"scan": {"translations": [one]}}
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"scan": {"translations": []}}, ["scan.translations is []", "[[scan.translations]]"]),
+        ({"scan": {"translations": FIRST}}, ["scan.translations is", "[[scan.translations]]"]),
+        ({"scan": {"translations": [FIRST], "margin": 0.1}}, ["translations, and margin", "rotations"]),
+        ({"scan": {"translations": [FIRST], "bases": [[0, 0]]}}, ["translations, and bases", "rotations"]),
+        (translation(speed=1.0), ["no key 'scan.translations[0].speed'"]),
+        (translation(heading=None), ["scan.translations[0].heading is missing"]),
+        (translation(base=None), ["scan.translations[0].base is missing"]),
+        (translation(base=0.0), ["scan.translations[0].base is 0.0", "[x, y]"]),
+        (translation(travel=None), ["scan.translations[0] has neither travel nor step"]),
+        (translation(step=0.01), ["scan.translations[0] has both travel and step"]),
+        (translation(travel=0.0), ["scan.translations[0].travel may be 0"]),
+        (translation(travel=None, step={"uniform": [-1, 1]}), ["scan.translations[0].step may be negative"]),
+        (translation(heading=180.0), ["scan.translations[0].heading may be 180", "radians"]),
+        (translation(drive_angle={"each": [1.0, 80.0]}), ["scan.translations[0].drive_angle may be 80"]),
+        (translation(drive_angle="steep"), ["scan.translations[0].drive_angle is 'steep'"]),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
+def test_what_is_no_translation_is_refused_by_its_key(change, named):
+    with refused(SpecificationError, "specification", *named):
+        read_specification(changed(PLAIN, **change))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason", "correction"),
+    [
+        ({"base": [4.0, 0.0], "travel": 0.1}, "out of reach", "closer"),
+        ({"base": [0.1, 0.0], "drive_angle": 1.6}, "touched at the beginning", "begin the translations farther"),
+    ],
+)
+def test_translations_in_vain_are_given_up_with_a_reason(change, reason, correction):
+    spec = changed(PLAIN, records=1, shard_records=1, **translation(**change))
+    with refused(SpecificationError, "record 0", f"1000 {reason}", correction):
+        generate_records(read_specification(spec), 0, 1)
