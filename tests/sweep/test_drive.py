@@ -161,3 +161,12 @@ def test_two_pivots_in_one_sweep_are_still_refused():
     x = np.where(np.arange(record.sizes["sample"]) < 20, 0.0, 0.1)
     with refused(RecordError, "base_x", "0.1"):
         tb.make_record({**{name: record[name].values for name in record}, "base_x": x})
+
+
+@pytest.mark.parametrize("k", range(8))
+def test_a_released_rod_is_clear_however_its_last_touch_is_rounded(k):
+    contour = tb.contours.Circle(*(np.array([1.01660456, 0.38756071, -0.80086393]) * (1.0 + 1e-9 * k)))
+    carried = tb.Translation((-0.9, 0.0), 0.0, np.pi - 1.0, 1.8)
+    found = tb.scan(contour, drive=carried, drive_step=0.01, rod=tb.Rod(rest_curvature=0.4), friction=0.0177)
+    assert found.events["backward"].snap_off.kind == "release"
+    assert found.record.sizes["sample"] == 181

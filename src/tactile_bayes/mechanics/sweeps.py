@@ -33,7 +33,7 @@ from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples, writ
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
 
-_TOUCHES, _NEVER = int(Reachability.TOUCHES), int(SnapOff.NEVER)
+_TOUCHES, _NEVER, _RELEASE = int(Reachability.TOUCHES), int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
 _EXACT = Accuracy(resolved=1e-9, sharp=np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True)
 """Accuracy with states and events to rounding."""
@@ -282,12 +282,15 @@ def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line |
 
 @compiled
 def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: float) -> float:
-    """Travel beyond which the unloaded rod is clear; on lines this only tells whether it is so where contact ends."""
+    """Travel beyond which the unloaded rod is clear; on lines this only tells whether it is so where contact ends.
+
+    A rod that is released touches there without load, which rounding alone would decide.
+    """
     if lines is None:
         return clear_angle(scene.outline, scene.beam, first_step)
     pose = pose_at(line_of(lines, line_at(lines, ends.snap_angle)), ends.snap_angle)
-    is_over = ends.snap_off == _NEVER
-    return -math.inf if is_over or is_clear(scene.outline, scene.beam, pose, first_step) else math.inf
+    jumps = ends.snap_off != _NEVER and ends.snap_off != _RELEASE
+    return -math.inf if not jumps or is_clear(scene.outline, scene.beam, pose, first_step) else math.inf
 
 
 @cached
