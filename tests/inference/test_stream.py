@@ -135,3 +135,12 @@ def test_arguments_are_checked():
         stream_of(stop=1)
     with pytest.raises(InferenceError, match="no samples"):
         stream_of().posterior()
+
+
+def test_the_backlash_enters_with_the_second_direction(measured):
+    stream = stream_of(nuisances=["standard"], particles=100)
+    turns = int((measured.direction.values == "forward").sum())
+    before = stream.update(measured.isel(sample=slice(0, turns)))
+    now = stream.update(measured.isel(sample=slice(turns, turns + 20)))
+    assert "backlash" not in before.parameter.values
+    assert "backlash" in now.parameter.values

@@ -86,8 +86,8 @@ class Stream:
     Parameters
     ----------
     family, load_cell, priors, rod, friction, nuisances
-        As in `infer_contour`. A parameter that only a longer record identifies, like the backlash, which takes both
-        directions, enters with its first sample.
+        As in `infer_contour`. A standard parameter that the record does not identify at first, like the backlash in a
+        single direction, enters with the first sample that does; asked for by name, it is refused before.
     seed : int or numpy.random.SeedSequence
         Seed of all random numbers: the same seed and blocks give the same results.
     particles : int
@@ -106,7 +106,8 @@ class Stream:
     Notes
     -----
     Each update computes the likelihood of the whole record so far again: exact for drifts, correlated noise and
-    integrated biases, but an update costs more the longer the record. The result states its `seconds`.
+    integrated biases, but an update costs more the longer the record. With 1,000 particles of four parameters, updates
+    by 28 samples, up to 330 of a double sweep, took 0.5 to 6 s on one core. The result states its `seconds`.
 
     Examples
     --------
