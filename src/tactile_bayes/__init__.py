@@ -29,6 +29,7 @@ _HOMES = {
     "Rod": "mechanics.rod",
     "Rotation": "sweep",
     "SamplerSettings": "inference.ensembles",
+    "Stream": "inference.stream",
     "Translation": "sweep",
     "calibrate": "calibration.calibrate",
     "calibration_replicate": "calibration.calibrate",
@@ -93,6 +94,7 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.result import read_result as read_result
     from tactile_bayes.inference.result import to_arviz as to_arviz
     from tactile_bayes.inference.result import write_result as write_result
+    from tactile_bayes.inference.stream import Stream as Stream
     from tactile_bayes.load_cell import LoadCell as LoadCell
     from tactile_bayes.load_cell import OrnsteinUhlenbeck as OrnsteinUhlenbeck
     from tactile_bayes.load_cell import RandomWalk as RandomWalk

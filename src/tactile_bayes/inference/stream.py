@@ -1,0 +1,494 @@
+"""The posterior of a contour while its record grows, by sequential Monte Carlo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+from scipy.special import logsumexp
+from threadpoolctl import threadpool_limits
+
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.checks import check_function, check_numbers, check_whole_number
+from tactile_bayes.errors import InferenceError, RecordError
+from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, in_coordinates, seed_sequence
+from tactile_bayes.inference.ensembles.moves import step_ensembles
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.result import provenance
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import carried_sweeps, validate
+
+__all__ = ["Stream"]
+
+_LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
+"""Levels of the quantiles of parameters and of the band."""
+
+_LEAST_SHARE = 0.5
+"""Effective number of particles over their number below which they are resampled and moved."""
+
+_DECORRELATED = 0.2
+"""Largest correlation of a parameter before and after the moves at which these end."""
+
+_MOST_STEPS, _BRIDGE_STEPS = 40, 3
+"""Largest number of steps after the last stage of an update, and number of steps after each stage before it."""
+
+_MOST_STAGES = 200
+"""Largest number of stages of an update."""
+
+_PRIOR_DRAWS = 4000
+"""Number of draws from the prior for the share of contours within reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """A stream after an update."""
+
+    record: xr.Dataset
+    experiment: Experiment
+    points: Floats
+    """Particles, shape (n, parameters of the model)."""
+    values: Floats
+    """Logarithm of prior times likelihood of the particles, shape (n,)."""
+    log_weights: Floats
+    """Shape (n,), normalised."""
+    log_integral: float
+    """Logarithm of the integral of prior times likelihood."""
+    share: float
+    """Share of the prior within reach."""
+    correlation: float
+    """Of the last steps of any update; NaN if there were none."""
+    updates: int
+    evaluations: int
+    seconds: float
+
+
+class Stream:
+    """The posterior of a contour from the record so far, updated with every new block of samples.
+
+    Weighted particles represent the posterior. They come from the prior; each block multiplies their weights by the
+    ratio of the likelihoods of the record with and without it. If their effective number falls below half of them, the
+    block enters by powers of that ratio, and after each the particles are resampled (systematically) and moved by the
+    steps of `infer_contour` (Del Moral, Doucet & Jasra 2006, doi 10.1111/j.1467-9868.2006.00553.x). The likelihood is
+    that of `infer_contour` for the record so far, so that after the last sample both have the same posterior, within
+    the Monte-Carlo error of the particles. Samples without contact count from the first one on.
+
+    Parameters
+    ----------
+    family, load_cell, priors, rod, friction, nuisances
+        As in `infer_contour`. A standard parameter that the record does not identify at first, like the backlash in a
+        single direction, enters with the first sample that does; asked for by name, it is refused before.
+    seed : int or numpy.random.SeedSequence
+        Seed of all random numbers: the same seed and blocks give the same results.
+    particles : int
+        Number of particles, from 100 up.
+    x : array_like, optional
+        Positions at which every update states quantiles of the contour's height [length].
+    stop : callable, optional
+        Rule that tells whether measuring may stop. It is called with the result of each update, and what it returns
+        becomes the result's `may_stop`.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not valid. What depends on the record is checked at the first update.
+
+    Notes
+    -----
+    Each update computes the likelihood of the whole record so far again: exact for drifts, correlated noise and
+    integrated biases, but an update costs more the longer the record. With 1,000 particles of four parameters, updates
+    by 28 samples, up to 330 of a double sweep, took 0.5 to 6 s on one core. The result states its `seconds`.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> stream = Stream(family="parabola", load_cell=cell, nuisances=[], seed=1, particles=200)
+    >>> first = stream.update(measured.isel(sample=slice(0, 10)))
+    >>> now = stream.update(measured.isel(sample=slice(10, None)))
+    >>> int(now.samples) == measured.sizes["sample"]
+    True
+    """
+
+    def __init__(
+        self,
+        *,
+        family: str = "parabola",
+        load_cell: LoadCell | None = None,
+        priors: Mapping[str, Prior] | None = None,
+        seed: Seed,
+        rod: Rod | None = None,
+        friction: float | None = None,
+        nuisances: Sequence[str] = STANDARD,
+        particles: int = 1000,
+        x: ArrayLike | None = None,
+        stop: Callable[[xr.Dataset], object] | None = None,
+    ) -> None:
+        check_whole_number("particles", particles, 100, "give a whole number of at least 100", most=10**7)
+        check_function("stop", stop)
+        self._x = None if x is None else check_numbers("x", x, "give a list of finite numbers", shape=(None,))
+        self._arguments = (family, load_cell, {} if priors is None else priors, rod, friction, nuisances)
+        self._seed, self._entropy = seed, seed_sequence(seed)
+        self._particles, self._stop = particles, stop
+        self._state: _State | None = None
+
+    @property
+    def record(self) -> xr.Dataset | None:
+        """The record so far; None before the first update."""
+        return None if self._state is None else self._state.record
+
+    def update(self, samples: xr.Dataset) -> xr.Dataset:
+        """Take new samples into account, and return the posterior in brief.
+
+        Parameters
+        ----------
+        samples : xr.Dataset
+            A record of the new samples alone, in the order of measurement, with the columns and attributes of those
+            before. They may go on with the last sweep, or begin new ones.
+
+        Returns
+        -------
+        xr.Dataset
+            `samples`, their number so far; `log_evidence`, the logarithm of the density of the record under the prior
+            of contours within reach; `effective_number` of the particles; `stages` and `steps` of this update (0 if
+            weights alone changed), and `correlation`, the largest one of a parameter before and after the last steps,
+            which end below 0.2, or after 40 (NaN without steps); `seconds` that the update took; `parameters` by
+            `parameter` and `level`, their quantiles; with `x`, `height` by `level` and `x`; with a rule, `may_stop`.
+
+        Raises
+        ------
+        RecordError
+            If the samples are no valid record, or do not continue the one before.
+        ParameterError, InferenceError, ReachError
+            As in `infer_contour`. After any error the stream is as before.
+        """
+        began = perf_counter()
+        old = self._state
+        record = validate(samples) if old is None else _continued(old.record, samples)
+        family, load_cell, priors, rod, friction, nuisances = self._arguments
+        experiment = Experiment(record, family, load_cell, priors, rod, friction, nuisances)
+        updates = 0 if old is None else old.updates + 1
+        random = self._random(0, updates)
+        with threadpool_limits(1):
+            advance = _Advance(experiment.model, old, self._particles, random)
+            share = _share_within_reach(experiment.model, random)
+            weights = np.exp(advance.log_weights)
+            result = self._brief(experiment.model, advance, weights)
+        result["samples"] = record.sizes["sample"]
+        result["log_evidence"] = advance.log_integral - np.log(share)
+        result["seconds"] = ((), perf_counter() - began, {"units": "s"})
+        if self._stop is not None:
+            result["may_stop"] = bool(self._stop(result))
+        seconds, evaluations = (0.0, 0) if old is None else (old.seconds, old.evaluations)
+        had = np.nan if old is None else old.correlation
+        self._state = _State(
+            record,
+            experiment,
+            advance.points,
+            advance.values,
+            advance.log_weights,
+            advance.log_integral,
+            share,
+            advance.correlation if advance.steps else had,
+            updates,
+            evaluations + advance.evaluations,
+            seconds + perf_counter() - began,
+        )
+        return result
+
+    def posterior(self) -> xr.DataTree:
+        """Return the posterior of the record so far, as `infer_contour` does, with equally weighted particles as draws.
+
+        There is one chain, whose convergence is not judged by R̂: `converged` is 0 if the last moves of the particles
+        ended before they had lost their places, and the message states their effective number. Where that is less than
+        their number, some draws are repeated.
+
+        Raises
+        ------
+        InferenceError
+            Before the first update.
+        """
+        state = self._state
+        if state is None:
+            raise InferenceError("the stream has no samples yet: call update with some first")
+        model, random = state.experiment.model, self._random(1, state.updates)
+        effective = _effective(state.log_weights)
+        picked = random.permutation(_systematic(np.exp(state.log_weights), random))
+        unknown = np.full(len(model.names), np.nan)
+        draws = Draws(
+            samples=state.points[picked][None],
+            log_probability=state.values[picked][None],
+            names=model.names,
+            walkers=len(picked),
+            steps_kept=1,
+            steps_run=state.updates + 1,
+            r_hat=unknown,
+            ess_bulk=unknown,
+            ess_tail=unknown,
+            acceptance=np.full(1, np.nan),
+            autocorrelation_time=unknown,
+            evaluations=state.evaluations,
+            seconds=state.seconds,
+            converged=not state.correlation >= _DECORRELATED,
+            message=f"sequential Monte Carlo, {effective:.0f} effective of {len(picked)} particles",
+            stuck=0,
+        )
+        with threadpool_limits(1):
+            groups = {**drawn_groups(model, draws), **predicted_groups(model, draws, random)}
+            groups["prior"] = prior_draws(model, random)
+        tree = xr.DataTree.from_dict(groups)
+        about = provenance(draws, seed=self._seed, settings=SamplerSettings(), **state.experiment.about)
+        tree.attrs = {**about, "sampler": "sequential Monte Carlo", "settings": f'{{"particles": {len(picked)}}}'}
+        return tree
+
+    def _random(self, purpose: int, updates: int) -> np.random.Generator:
+        """Return random numbers of an update: they do not depend on calls that were refused."""
+        key = (*self._entropy.spawn_key, purpose, updates)
+        return np.random.default_rng(np.random.SeedSequence(self._entropy.entropy, spawn_key=key))
+
+    def _brief(self, model: ContourModel, advance: _Advance, weights: Floats) -> xr.Dataset:
+        quantiles = _weighted_quantiles(advance.points, weights)
+        units = [unit_of(model, name) for name in model.names]
+        result = xr.Dataset(
+            {
+                "effective_number": _effective(advance.log_weights),
+                "stages": advance.stages,
+                "steps": advance.steps,
+                "correlation": advance.correlation,
+                "parameters": (("level", "parameter"), quantiles),
+            },
+            coords={"level": list(_LEVELS), "parameter": list(model.names), "unit": ("parameter", units)},
+        )
+        if self._x is not None:
+            heights = model.contours(advance.points).take(np.arange(len(weights))[:, None]).height(self._x)
+            result = result.assign_coords(x=self._x)
+            result["height"] = (("level", "x"), _weighted_quantiles(heights, weights))
+        return result
+
+
+class _Advance:
+    """Particles of the record so far, from those of the record before."""
+
+    def __init__(self, model: ContourModel, old: _State | None, count: int, random: np.random.Generator) -> None:
+        self.model = model
+        self.stages, self.steps, self.correlation, self.evaluations = 0, 0, np.nan, 0
+        self._random = np.random.RandomState(random.integers(2**32))
+        self._generator = random
+        self._before, self._added = _model_of(old), []
+        if old is None:
+            self.points, share = self._first(count, random)
+            self.log_weights, self.log_integral = np.full(count, -np.log(count)), float(np.log(share))
+        else:
+            self._added = [name for name in model.names if name not in old.experiment.model.names]
+            self.points = self._extended(old, random)
+            self.log_weights, self.log_integral = old.log_weights, old.log_integral
+        self._coordinates = model.coordinates
+        self.values, self._old = self._both(self.points)
+        self._run()
+
+    def _first(self, count: int, random: np.random.Generator) -> tuple[Floats, float]:
+        points, share = self.model.draw_prior(random, count)
+        return points[np.arange(count) % len(points)], share
+
+    def _extended(self, old: _State, random: np.random.Generator) -> Floats:
+        """Return the particles with new parameters drawn from their priors."""
+        names, count = old.experiment.model.names, len(old.points)
+        columns = [
+            old.points[:, names.index(name)]
+            if name in names
+            else self.model.priors[name].rvs(count, random_state=random)
+            for name in self.model.names
+        ]
+        return np.stack(columns, axis=1)
+
+    def _both(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return the log-density of points with the new samples, and that without them, both with all parameters."""
+        self.evaluations += len(points)
+        new = self.model.log_probability(points)
+        if self._before is None:
+            return new, self.model.log_prior(points)
+        own = points[:, [self.model.names.index(name) for name in self._before.names]]
+        old = self._before.log_probability(own)
+        for name in self._added:
+            old = old + self.model.priors[name].logpdf(points[:, self.model.names.index(name)])
+        return new, old
+
+    def _run(self) -> None:
+        power = 0.0
+        while power < 1.0:
+            with np.errstate(invalid="ignore"):
+                ratio = self.values - self._old
+            ratio[np.isnan(ratio)] = -np.inf
+            if not np.any(np.isfinite(ratio)):
+                raise InferenceError(
+                    "no particle explains the new samples: check them, or begin a stream with more particles"
+                )
+            target, step = _LEAST_SHARE * len(ratio), 1.0 - power
+
+            def excess(part: float, ratio: Floats = ratio, target: float = target) -> float:
+                return _effective(self.log_weights + part * ratio) - target
+
+            if not self.stages and excess(step) >= 0.0:
+                self._weigh(ratio)
+                return
+            self.stages += 1
+            if excess(step) < 0.0:
+                low = 1e-12 * step
+                step = brentq(excess, low, step, xtol=1e-14) if excess(low) > 0.0 else max(low, 1e-3 * step)
+                if self.stages > _MOST_STAGES:
+                    raise InferenceError(
+                        f"the new samples took more than {_MOST_STAGES} stages: give more particles, or smaller blocks"
+                    )
+                power += step
+            else:
+                power = 1.0
+            self._weigh(step * ratio)
+            picked = _systematic(np.exp(self.log_weights), self._generator)
+            self.points, self.values, self._old = self.points[picked], self.values[picked], self._old[picked]
+            self.log_weights = np.full(len(picked), -np.log(len(picked)))
+            self._move(power)
+
+    def _weigh(self, logs: Floats) -> None:
+        weighted = self.log_weights + logs
+        total = float(logsumexp(weighted))
+        self.log_weights, self.log_integral = weighted - total, self.log_integral + total
+
+    def _move(self, power: float) -> None:
+        """Move the particles by the steps of an ensemble, after the last stage until they have lost their places."""
+        coordinates, last = self._coordinates, power == 1.0
+
+        def target(points: Floats) -> Floats:
+            if last:
+                self.evaluations += len(points)
+                return self.model.log_probability(points)
+            new, old = self._both(points)
+            return _between(new, old, power)
+
+        at = coordinates.of(self.points)
+        began = at
+        ensemble = at[None]
+        _, growth = coordinates.parameters(at)
+        density = (_between(self.values, self._old, power) + growth)[None]
+        transformed, moves = in_coordinates(target, coordinates), coordinates.moves()
+        for step in range(_MOST_STEPS if last else _BRIDGE_STEPS):
+            ensemble, density = step_ensembles(transformed, moves, [self._random], ensemble, density)
+            self.steps += 1
+            self.correlation = _correlation(began, ensemble[0])
+            if last and step and self.correlation < _DECORRELATED:
+                break
+        self.points, growth = coordinates.parameters(ensemble[0])
+        if last:
+            self.values = density[0] - growth
+        else:
+            self.values, self._old = self._both(self.points)
+
+
+def _model_of(state: _State | None) -> ContourModel | None:
+    return None if state is None else state.experiment.model
+
+
+def _between(new: Floats, old: Floats, power: float) -> Floats:
+    """Return the log-density between two, −inf where either is."""
+    if power == 1.0:
+        return new
+    with np.errstate(invalid="ignore"):
+        values = power * new + (1.0 - power) * old
+    return np.where(np.isnan(values), -np.inf, values)
+
+
+def _effective(log_weights: Floats) -> float:
+    """Return the effective number of particles, for weights that need not be normalised."""
+    return float(np.exp(2.0 * logsumexp(log_weights) - logsumexp(2.0 * log_weights)))
+
+
+def _systematic(weights: Floats, random: np.random.Generator) -> Index:
+    """Return as many indices as weights, each as often as its weight demands, rounded up or down."""
+    count = len(weights)
+    places = np.cumsum(weights)
+    return np.searchsorted(places / places[-1], (random.random() + np.arange(count)) / count).clip(max=count - 1)
+
+
+def _correlation(before: Floats, after: Floats) -> float:
+    """Return the largest correlation of a column with itself, before and after, in absolute value."""
+    one, two = before - before.mean(axis=0), after - after.mean(axis=0)
+    norm = np.sqrt((one**2).sum(axis=0) * (two**2).sum(axis=0))
+    return float(np.max(np.abs((one * two).sum(axis=0)) / np.where(norm > 0.0, norm, np.inf)))
+
+
+def _weighted_quantiles(values: Floats, weights: Floats) -> Floats:
+    """Return quantiles of every column, shape (levels, columns); NaN where a value is."""
+    out = np.full((len(_LEVELS), values.shape[1]), np.nan)
+    for i, column in enumerate(values.T):
+        if np.all(np.isfinite(column)):
+            order = np.argsort(column)
+            own = weights[order]
+            out[:, i] = np.interp(_LEVELS, np.cumsum(own) - 0.5 * own, column[order])
+    return out
+
+
+def _share_within_reach(model: ContourModel, random: np.random.Generator) -> float:
+    """Return the share of the prior's contours that are within reach, at least 1/count."""
+    points = np.stack([model.priors[name].rvs(_PRIOR_DRAWS, random_state=random) for name in model.names], axis=1)
+    points = points[np.isfinite(model.log_prior(points))]
+    usable = int(model.likelihood.usable(model.contours(points), model.rig(points)).sum()) if len(points) else 0
+    return max(usable, 1) / _PRIOR_DRAWS
+
+
+def _continued(record: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
+    """Return a record with new samples behind its own.
+
+    Raises
+    ------
+    RecordError
+        If the new samples do not continue the record.
+    """
+    new = validate(samples)
+    for name in sorted({*record.attrs, *new.attrs}, key=str):
+        one, other = record.attrs.get(name), new.attrs.get(name)
+        if not np.array_equal(_plain(one), _plain(other)):
+            raise RecordError(
+                f"attribute {name!r} of the new samples is {other!r}, but was {one!r}: give all samples in the same "
+                "units, of the same rod and load cell"
+            )
+    if set(record.variables) != set(new.variables):
+        odd = ", ".join(map(repr, sorted(map(str, set(record.variables) ^ set(new.variables)))))
+        raise RecordError(f"the new samples and those before do not have the same columns, they differ in {odd}")
+    last, first = int(record.sweep[-1]), int(new.sweep[0])
+    had = set(record.sweep.values.tolist()) - {last}
+    if again := sorted(had & set(new.sweep.values.tolist())):
+        raise RecordError(
+            f"sweep {again[0]} was over when sweep {last} began: give samples in the order in which they were measured"
+        )
+    joined = validate(xr.concat([record, new], "sample", combine_attrs="override"))
+    if first == last and last not in carried_sweeps(joined):
+        _refuse_return(record, new, last)
+    return joined
+
+
+def _refuse_return(record: xr.Dataset, new: xr.Dataset, sweep: int) -> None:
+    """Refuse new samples that begin further back in a sweep than its encoder scatters."""
+    sense = 1.0 if str(new.direction.values[0]) == "forward" else -1.0
+    before, after = (sense * each.drive_angle.values[each.sweep.values == sweep] for each in (record, new))
+    scatter = max((float(-np.diff(part).min(initial=0.0)) for part in (before, after)), default=0.0)
+    scatter = max(scatter, float(record.attrs.get("load_cell_drive_angle_noise", 0.0)))
+    if after[0] < before[-1] - 6.0 * scatter - 1e-9:
+        raise RecordError(
+            f"the new samples of sweep {sweep} begin at a drive angle of {sense * after[0]:.6g} rad, behind the last "
+            f"one, {sense * before[-1]:.6g} rad: give each sample once, in the order in which they were measured"
+        )
+
+
+def _plain(value: Any) -> Any:
+    return "" if value is None else value
