@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats, Index
@@ -21,6 +21,7 @@ from tactile_bayes.inference.contour_groups import drawn_groups, predicted_group
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, in_coordinates, seed_sequence
 from tactile_bayes.inference.ensembles.moves import step_ensembles
+from tactile_bayes.inference.ensembles.proposal import effective
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
@@ -224,7 +225,7 @@ class Stream:
         if state is None:
             raise InferenceError("the stream has no samples yet: call update with some first")
         model, random = state.experiment.model, self._random(1, state.updates)
-        effective = _effective(state.log_weights)
+        left = _effective(state.log_weights)
         picked = random.permutation(_systematic(np.exp(state.log_weights), random))
         unknown = np.full(len(model.names), np.nan)
         draws = Draws(
@@ -242,7 +243,7 @@ class Stream:
             evaluations=state.evaluations,
             seconds=state.seconds,
             converged=not state.correlation >= _DECORRELATED,
-            message=f"sequential Monte Carlo, {effective:.0f} effective of {len(picked)} particles",
+            message=f"sequential Monte Carlo, {left:.0f} effective of {len(picked)} particles",
             stuck=0,
         )
         with threadpool_limits(1):
@@ -410,7 +411,7 @@ def _between(new: Floats, old: Floats, power: float) -> Floats:
 
 def _effective(log_weights: Floats) -> float:
     """Return the effective number of particles, for weights that need not be normalised."""
-    return float(np.exp(2.0 * logsumexp(log_weights) - logsumexp(2.0 * log_weights)))
+    return effective(softmax(log_weights))
 
 
 def _systematic(weights: Floats, random: np.random.Generator) -> Index:
