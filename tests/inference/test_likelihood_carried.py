@@ -16,6 +16,8 @@ SHIFTS = [
     tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6),
     tb.Translation((-0.8, 0.0), 0.0, np.pi - 1.1, 1.6),
 ]
+WAY = np.linspace(0.0, 1.0, 500)
+CURVED = tb.Motion(0.9 - 1.8 * WAY, 0.1 * np.sin(3.0 * WAY), 0.7 + 1.2 * WAY)
 TURNS = [tb.Motion([0.8, -0.8], 0.0, [1.2, 1.9]), tb.Rotation()]
 
 
@@ -24,7 +26,7 @@ def model(drive, family="circle", nuisances=STANDARD):
     return Experiment(measured, family, CELL, {}, None, None, nuisances).model
 
 
-@pytest.mark.parametrize("drive", [SHIFTS, TURNS])
+@pytest.mark.parametrize("drive", [SHIFTS, TURNS, CURVED])
 def test_the_fast_mode_agrees_with_the_exact_one(drive):
     """For contours and rigs drawn from the default priors: events, and loads to a small share of the noise."""
     of_record = model(drive)
@@ -39,7 +41,7 @@ def test_the_fast_mode_agrees_with_the_exact_one(drive):
     assert np.all(np.abs(loads - exact) < 5e-3 * np.array([0.02, 0.05, 0.05]))
 
 
-@pytest.mark.parametrize("drive", [SHIFTS, TURNS])
+@pytest.mark.parametrize("drive", [SHIFTS, TURNS, CURVED])
 def test_predicted_loads_are_those_of_a_scan(drive):
     record = tb.scan(CIRCLE, drive=drive).record
     likelihood = RecordLikelihood(record, CELL, exact=True)

@@ -115,12 +115,16 @@ second."""
 _AIM, _BACK, _LEAST_PACE, _MOST_PACE = 0.01, 0.8, 0.3, 2.0
 """Share of the tolerated error that is aimed at, and bounds on the change of the length."""
 
-_MOST = 256
-"""Largest number of legs of a path, and a quarter of the largest number that are tried."""
+_MOST, _MOST_ON_LINE = 256, 2
+"""Largest number of legs of a path, to which a number for each line of its drive is added, and a quarter of the largest
+number that are tried."""
 
 _ROOM_IN_TIP, _ROOM_PAST_TIP = 0.3, 0.02
 """How far a leg of a rod that is not smooth at its tip may go beyond the change of the phase, in ψ1 [rad] and in arc
 length [L]."""
+
+_ROOM_PAST_LINE = 1.1
+"""How far a leg may go on a line of the drive, over the travel up to its end."""
 
 _PAST_TIP = 1e-6
 """Share of a leg by which it passes the tip of a rod that is not smooth there."""
@@ -193,10 +197,11 @@ class BranchWorkspace(NamedTuple):
     """Their series, shape (legs, 7, order)."""
 
 
-def branch_workspace(samples: int, order: int, knots: int) -> BranchWorkspace:
-    """Workspace for at most so many samples, with `order` nodes on a leg and `knots` knots of the contour."""
+def branch_workspace(samples: int, order: int, knots: int, lines: int) -> BranchWorkspace:
+    """Workspace for at most so many samples, `order` nodes on a leg, knots of the contour, and lines of the drive."""
+    legs = _MOST + _MOST_ON_LINE * lines
     return BranchWorkspace(
-        leg_curves(order), asked(samples), np.empty(knots), np.empty((_MOST, 15)), np.empty((_MOST, 7, order))
+        leg_curves(order), asked(samples), np.empty(knots), np.empty((legs, 15)), np.empty((legs, 7, order))
     )
 
 
@@ -278,6 +283,16 @@ def _share_in_phase(leg: Leg, psi1: float) -> float:
     """Share of a leg up to somewhat beyond the change of the phase, as far as its direction tells."""
     room = leg.begin.q - psi1 + _ROOM_IN_TIP if leg.tip else 1.0 + _ROOM_PAST_TIP - leg.begin.q
     pace = -leg.along.q if leg.tip else leg.along.q
+    return room / pace if pace > room > 0.0 else 1.0
+
+
+@compiled
+def _share_on_line(line: Line | None, begin: Balance, leg: Leg) -> float:
+    """Share of a leg up to somewhat beyond the end of the line of the drive, as far as its travel's rate tells."""
+    if line is None:
+        return 1.0
+    room = _ROOM_PAST_LINE * (line.end - begin.travel)
+    pace = begin.travel_rate / dot(leg.normal, begin.tangent)
     return room / pace if pace > room > 0.0 else 1.0
 
 
@@ -479,12 +494,16 @@ def follow_branch(
     begin_angle, last_at, last_tip, fate = first, z, loaded.tip, _NEVER
     changes, largest, is_first, done, runs_out, is_over = 0, math.nan, True, 0, False, False
     wants_states = found.changes.shape[0] > 0
-    for _ in range(4 * _MOST):
-        if done == _MOST:
+    most = workspace.followed.shape[0]
+    for _ in range(4 * most):
+        if done == most:
             break
         leg = leg_from(loaded, begin, onward_from, length)
         if known == 0.0 and scene.beam.varied is not None:
             share = _share_in_phase(leg, psi1)
+            leg, length = shortened(leg, share), share * length
+        if known == 0.0 and lines is not None:
+            share = _share_on_line(scene.line, begin, leg)
             leg, length = shortened(leg, share), share * length
         share = math.nan if lines is None else _released(loaded, leg)
         released = share <= 1.0

@@ -48,8 +48,8 @@ _ROUNDING = 1e-14
 """Distance from the end of the rod's reach [L] that counts as zero."""
 
 
-_LOOKS, _COARSE = 8, 1e-3
-"""Number of parts of a line between which a carried rod is looked at, and last step of searches there."""
+_LOOKS, _FEWEST_LOOKS, _COARSE = 8, 2, 1e-3
+"""Parts of a drive, and fewest of a line, between which a carried rod is looked at, and last step of searches there."""
 
 _CLOSE = 1e-3
 """Angle [rad] to which first contact of a carried rod is found; a search for the equilibrium there follows."""
@@ -239,14 +239,19 @@ def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> _Turned:
 
 
 @compiled
-def _arrival_on(outline: Outline, beam: Beam, line: Line, is_first: bool) -> tuple[_Turned, float]:
-    """First contact on a line, and its travel; NaN if there is none."""
-    size = (line.end - line.travel) / _LOOKS
+def _arrival_on(outline: Outline, beam: Beam, line: Line, way: float, is_first: bool) -> tuple[_Turned, float]:
+    """First contact on a line of a drive of some way, and its travel; NaN if there is none.
+
+    The least gap between two looks is looked for where it may be less than none: if the least found is no larger than
+    its changes from look to look.
+    """
+    looks = max(math.ceil(_LOOKS * (line.end - line.travel) / way), _FEWEST_LOOKS)
+    size = (line.end - line.travel) / looks
     before, looked = line.travel, _look(outline, beam, line, line.travel)
-    nearest, least, gap = before, math.inf, looked.gap
+    nearest, least, gap, change = before, math.inf, looked.gap, 0.0
     if gap <= 0.0 and (is_first or looked.reach == _CUTS_PIVOT or looked.reach == _TOO_CLOSE):
         return looked, before
-    for k in range(1, _LOOKS + 1):
+    for k in range(1, looks + 1):
         travel = line.travel + k * size
         looked = _look(outline, beam, line, travel)
         if gap > 0.0 and looked.gap <= 0.0:
@@ -255,8 +260,9 @@ def _arrival_on(outline: Outline, beam: Beam, line: Line, is_first: bool) -> tup
                 return found, at
         elif gap > 0.0 and looked.gap < least:
             nearest, least = travel, looked.gap
+        change = max(change, abs(looked.gap - gap))
         before, gap = travel, looked.gap
-    if least == math.inf:
+    if least > change:
         return looked, math.nan
     low, high = max(nearest - size, line.travel), min(nearest + size, line.end)
     for _ in range(_DEEPEST):
@@ -298,12 +304,15 @@ def _between(
 @compiled
 def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int, float]:
     """First contact of a rod that is carried along lines, the number of the line, and the travel."""
-    reach, distance = _TOO_FAR, math.inf
+    reach, distance, way = _TOO_FAR, math.inf, 0.0
+    for k in range(lines.shape[0]):
+        if not math.isnan(lines[k, 7]):
+            way = lines[k, 7]
     for k in range(lines.shape[0]):
         if math.isnan(lines[k, 0]):
             break
         line = line_of(lines, k)
-        found, travel = _arrival_on(outline, beam, line, k == 0)
+        found, travel = _arrival_on(outline, beam, line, way, k == 0)
         distance = min(distance, found.distance)
         if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
             return Approach(found.reach, found.distance, math.nan, True, math.nan), k, travel

@@ -399,6 +399,7 @@ def solve_sweeps(
     changes = np.full((sweep.size, MOST_CHANGES + 1 if states else 0, 6), np.nan)
     events = np.empty(sweep.size, dtype=_EVENTS)
     longest = int(np.diff(segments.first).max(initial=0))
+    lines = 0 if segments.lines is None else segments.lines.shape[1]
     _solve(
         shapes,
         varied_of(profile),
@@ -410,7 +411,7 @@ def solve_sweeps(
         accuracy,
         _NEVER_MISSED if tolerance is None else tolerance,
         asks_clearance,
-        branch_workspace(longest, order, shapes.knots.shape[1]),
+        branch_workspace(longest, order, shapes.knots.shape[1], lines),
         np.empty(shapes.tables.shape[1:]),
         loads,
         all_states,
