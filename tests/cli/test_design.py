@@ -1,5 +1,6 @@
 """The command design, and the figure."""
 
+import csv
 import json
 
 import numpy as np
@@ -36,6 +37,21 @@ def test_it_says_where_and_writes_what_it_found(made):
     table = np.genfromtxt(out / "candidates.csv", delimiter=",", names=True)
     np.testing.assert_allclose(table["width"], found.width.values, rtol=1e-8)
     np.testing.assert_allclose(table["base_x"], [0.0, 0.2])
+
+
+def test_drives_that_carry_the_base_are_candidates(tmp_path):
+    poses = tmp_path / "poses.csv"
+    poses.write_text("x,y,drive_angle\n0.8,0,65\n0,0.05,85\n-0.8,0,115\n")
+    result = run("--carry", "0.8,0,180,65,1.6", "--poses", poses, "--out", tmp_path, "--json")
+    assert result.exit_code == 0, result.output
+    candidates = json.loads(result.stdout)["candidates"]
+    assert [one["is_pivot"] for one in candidates] == [True, True, False, False]
+    assert candidates[3]["drive"] == "carried from (0.8, 0) to (-0.8, 0) at 65° to 115°"
+    assert candidates[0]["samples"] > candidates[2]["samples"] > 20
+    with (tmp_path / "candidates.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["drive"] for row in rows] == [one["drive"] for one in candidates]
+    np.testing.assert_allclose([float(row["width"]) for row in rows], [one["width"] for one in candidates], rtol=1e-8)
 
 
 def test_json_for_scripts(tmp_path):

@@ -120,3 +120,18 @@ def test_the_figure_is_as_large_as_its_map(xs, ys):
 def test_the_map_looks_as_it_did(tmp_path):
     ax = design(made_up(XS, YS, pivots=[(0.1, -0.1)]), ax=mpl.figure.Figure(figsize=(5.0, 3.0)).subplots())
     assert difference(ax.figure, "design_map", tmp_path) is None
+
+
+@pytest.mark.parametrize("steps", [(0.05,), (0.05, 0.1)])
+def test_other_drives_have_a_row_each(steps):
+    found = made_up((0.0, 0.1), (0.0,), steps=steps)
+    count = found.sizes["candidate"]
+    words = ["carried from (0.8, 0) to (-0.8, 0) at 65°", *(f"turned about (0, 0.{k})" for k in range(1, count))]
+    found = found.assign(drive=("candidate", words), is_pivot=("candidate", np.arange(count) > 0))
+    ax = design(found)
+    said = [" ".join(label.get_text().split()) for label in ax.get_yticklabels()]
+    assert len(said) == count
+    assert all(one.startswith(words[k]) for k, one in enumerate(said))
+    assert ("or as many" in said[0]) == (len(steps) == 2)
+    ring = next(line for line in ax.lines if line.get_label() == "best")
+    assert (ring.get_xdata()[0], ring.get_ydata()[0]) == (found.width.values[int(found.best)], int(found.best))

@@ -14,6 +14,7 @@ from tactile_bayes.record import carried_sweeps, travels_of
 CIRCLE = tb.contours.Circle(0.3, 0.8)
 THERE = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
 BACK = tb.Translation(base=(-0.8, 0.0), heading=0.0, drive_angle=1.2, travel=1.6)
+SHORT = tb.Translation(base=(0.6, 0.0), heading=np.pi, drive_angle=1.2, travel=1.2)
 ROD = tb.Rod(length=0.1, flexural_rigidity=1.2e-5)
 
 
@@ -59,6 +60,30 @@ def test_sweeps_and_directions_follow_from_the_motion(tmp_path, drive):
     read = tb.read_record(_stage(tmp_path / "stage.csv", record, columns=columns), split_sweeps=True)
     np.testing.assert_array_equal(read.direction, record.direction)
     assert len(set(read.sweep.values.tolist())) == len(drive)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        [tb.Rotation(), THERE],
+        [SHORT, tb.Rotation((-0.6, 0.0)), tb.Rotation((0.2, 0.0))],
+        [tb.Rotation((0.6, 0.0)), SHORT, BACK, tb.Rotation()],
+        [tb.Rotation(), tb.Motion(x=[0.8, -0.8], y=0.0, drive_angle=[0.9, 1.7]), tb.Rotation((0.1, -0.1))],
+    ],
+    ids=["beside", "from-its-end", "from-its-begin", "a-motion-between"],
+)
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_a_record_of_both_kinds_is_parted_where_the_base_begins_or_stops_to_move(tmp_path, drive, noise):
+    """Also with noise of the encoder, and where a pivot is where the base begins or ends to move."""
+    record = tb.scan(CIRCLE, drive=drive).record
+    angle = record.drive_angle.values + np.random.default_rng(1).normal(0.0, noise, record.sizes["sample"])
+    record = record.assign(drive_angle=("sample", angle, record.drive_angle.attrs))
+    columns = ("base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y")
+    read = tb.read_record(_stage(tmp_path / "stage.csv", record, columns=columns), split_sweeps=True)
+    ends, found = (np.flatnonzero(np.diff(one.sweep)) for one in (record, read))
+    assert found.size == ends.size
+    assert np.abs(found - ends).max() <= 1  # a sample at which the drive turns back belongs to either sweep
+    assert np.count_nonzero(read.direction != record.direction) <= np.count_nonzero(found != ends)
 
 
 def test_a_rod_that_moves_along_itself_has_no_direction(tmp_path):

@@ -16,6 +16,10 @@ def found(places, widths, gaps):
             "base_x": ("candidate", x, metres),
             "base_y": ("candidate", y, metres),
             "drive_step": ("candidate", np.full(count, np.radians(2.0))),
+            "drive": ("candidate", [f"turned about {place}" for place in places]),
+            "is_pivot": ("candidate", np.ones(count, dtype=bool)),
+            "samples": ("candidate", np.full(count, 242)),
+            "information": ("candidate", np.full(count, 3.0)),
             "width": ("candidate", np.asarray(widths, dtype=float)),
             "gap": ("candidate", np.asarray(gaps, dtype=float)),
             "reached": ("candidate", np.ones(count)),
@@ -47,3 +51,13 @@ def test_the_outermost_candidate_is_said_to_be_so(best, outermost):
 def test_a_gap_that_is_not_known_is_not_told():
     first, *_ = design_messages(found(GRID[:2], [1e-3, 2e-3], [np.nan, 3e-3]))
     assert first.endswith("band is then 1 mm wide on the mean; now it is 5 mm.")
+
+
+def test_drives_that_carry_the_base_have_words_and_what_they_tell_for_each_reading():
+    carried = "carried from (0.1, 0) to (-0.1, 0) at 90°"
+    made = found(GRID[:2], [1e-3, 4e-3], [3e-3, 3e-3])
+    made.is_pivot[0], made.samples[0], made["drive"] = False, 100, ("candidate", [carried, "turned about (0, 0)"])
+    words = design_messages(made)
+    assert words[0].startswith(f"The best drive: {carried} [m], with 100 readings: the 95% band is then 1 mm wide")
+    assert f"Per reading this tells the most: {carried} [m], 3 nats in 100 readings." in words
+    assert not any(sentence.startswith("It is the ") for sentence in words)

@@ -1,4 +1,4 @@
-"""The command `design`: the best pivot and drive step for the next record."""
+"""The command `design`: the best drive for the next record."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.drive_options import CarryOptions
 from tactile_bayes.cli.numbers import numbers_asked
 from tactile_bayes.cli.rig_options import NoiseOptions, RodOptions, UnknownOptions
 from tactile_bayes.cli.task_bar import counted, resumable_bar
@@ -55,7 +56,8 @@ def design(
     base: Annotated[
         list[str] | None,
         typer.Option(
-            help="A pivot to choose from, X,Y [m, or L]; may be repeated. By default eleven across at three heights."
+            help="A pivot to choose from, X,Y [m, or L]; may be repeated. By default, without --carry and --poses, "
+            "eleven across at three heights."
         ),
     ] = None,
     drive_step: Annotated[
@@ -73,6 +75,7 @@ def design(
         ),
     ] = False,
     draws: Annotated[int, typer.Option(help="Number of objects drawn from posterior or prior.", min=2)] = 24,
+    carries: CarryOptions,
     noise: _NoiseOptions,
     rod: _RodOptions,
     unknown: UnknownOptions,
@@ -80,13 +83,17 @@ def design(
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
-    """Choose the pivot and the drive step of the next record, so that the contour's band becomes narrowest."""
+    """Choose the drive of the next record, so that the contour's band becomes narrowest.
+
+    Candidates are pivots (--base) and drives that carry the base (--carry, --poses), each with every --drive-step.
+    """
     import numpy as np
 
     from tactile_bayes.planning.design import ABOVE, ACROSS
     from tactile_bayes.runs.design import design_into
 
     pivots = [numbers_asked(pivot, "--base", 2) for pivot in base] if base else None
+    drives = carries.carried or None
     options: dict[str, Any] = {}
     known: xr.DataTree | str = family
     if run is not None:
@@ -99,7 +106,8 @@ def design(
             "nuisances": unknown.nuisances,
         }
     steps = drive_step or [2.0]
-    count = (len(pivots) if pivots else ACROSS.size * ABOVE.size) * len(steps)
+    usual = 0 if drives else ACROSS.size * ABOVE.size
+    count = (len(pivots or ()) + len(drives or ()) or usual) * len(steps)
 
     def have(done: int | None) -> str:
         if not nested:
@@ -113,6 +121,7 @@ def design(
             known,
             seed=seed,
             bases=pivots,
+            drives=drives,
             drive_steps=np.radians(steps),
             criterion=criterion,
             nested=nested,

@@ -1,4 +1,4 @@
-"""Options of the drive that is simulated: its steps, and how it carries the base."""
+"""Options of drives: how they carry the base, and their steps."""
 
 from __future__ import annotations
 
@@ -14,22 +14,18 @@ from tactile_bayes.cli.numbers import columns_in, numbers_asked
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tactile_bayes.sweep import Drive
+    from tactile_bayes.sweep import Carried, Drive
 
-__all__ = ["DriveOptions"]
+__all__ = ["CarryOptions", "DriveOptions"]
 
 _USUAL_STEP = 1.0
 """Step of rotations if no option gives one [degrees]."""
 
 
 @dataclass(frozen=True)
-class DriveOptions:
-    """Steps of the drive, and drives that carry the base."""
+class CarryOptions:
+    """Drives that carry the base."""
 
-    drive_step: Annotated[
-        float | None,
-        typer.Option(help="Step of rotations [degrees]; by default 1.", min=0.001, max=28.0),
-    ] = None
     carry: Annotated[
         list[str] | None,
         typer.Option(
@@ -46,6 +42,41 @@ class DriveOptions:
             dir_okay=False,
         ),
     ] = None
+
+    @property
+    def carries(self) -> bool:
+        """True if an option carries the base."""
+        return bool(self.carry or self.poses)
+
+    @property
+    def carried(self) -> list[Carried]:
+        """Translations, then motions.
+
+        Raises
+        ------
+        ParameterError
+            If an option is no drive.
+        """
+        from tactile_bayes.sweep import Motion, Translation
+
+        drives: list[Carried] = []
+        for text in self.carry or []:
+            x, y, heading, angle, travel = numbers_asked(text, "--carry", 5)
+            drives.append(Translation((x, y), math.radians(heading), math.radians(angle), travel))
+        for path in self.poses or []:
+            x_of, y_of, angle_of = columns_in(path, ("x", "y", "drive_angle"), "pose")
+            drives.append(Motion(x_of, y_of, [math.radians(angle) for angle in angle_of]))
+        return drives
+
+
+@dataclass(frozen=True)
+class DriveOptions(CarryOptions):
+    """Drives that are simulated, and their steps."""
+
+    drive_step: Annotated[
+        float | None,
+        typer.Option(help="Step of rotations [degrees]; by default 1.", min=0.001, max=28.0),
+    ] = None
     travel_step: Annotated[
         float | None,
         typer.Option(
@@ -53,11 +84,6 @@ class DriveOptions:
             "if they are more than 8."
         ),
     ] = None
-
-    @property
-    def carries(self) -> bool:
-        """True if an option carries the base."""
-        return bool(self.carry or self.poses)
 
     def drives(self, pivots: Sequence[Sequence[float]]) -> list[Drive]:
         """Return rotations about pivots, then the drives that carry the base.
@@ -67,16 +93,9 @@ class DriveOptions:
         ParameterError
             If an option is no drive.
         """
-        from tactile_bayes.sweep import Motion, Rotation, Translation
+        from tactile_bayes.sweep import Rotation
 
-        drives: list[Drive] = [Rotation((x, y)) for x, y in pivots]
-        for text in self.carry or []:
-            x, y, heading, angle, travel = numbers_asked(text, "--carry", 5)
-            drives.append(Translation((x, y), math.radians(heading), math.radians(angle), travel))
-        for path in self.poses or []:
-            x_of, y_of, angle_of = columns_in(path, ("x", "y", "drive_angle"), "pose")
-            drives.append(Motion(x_of, y_of, [math.radians(angle) for angle in angle_of]))
-        return drives
+        return [*(Rotation((x, y)) for x, y in pivots), *self.carried]
 
     def step(self, drives: Sequence[Drive]) -> float | None:
         """Return the step of the drives [rad or length] if all of them have one.

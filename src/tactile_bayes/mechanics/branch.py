@@ -287,13 +287,14 @@ def _share_in_phase(leg: Leg, psi1: float) -> float:
 
 
 @compiled
-def _share_on_line(line: Line | None, begin: Balance, leg: Leg) -> float:
-    """Share of a leg up to somewhat beyond the end of the line of the drive, as far as its travel's rate tells."""
+def _length_on_line(line: Line | None, loaded: Loaded, begin: Balance, before: Equilibrium, length: float) -> float:
+    """Length of a leg up to somewhat beyond the end of the line of the drive, as far as its travel's rate tells."""
     if line is None:
-        return 1.0
+        return length
+    leg = leg_from(loaded, begin, before, length)
     room = _ROOM_PAST_LINE * (line.end - begin.travel)
     pace = begin.travel_rate / dot(leg.normal, begin.tangent)
-    return room / pace if pace > room > 0.0 else 1.0
+    return length * room / pace if pace > room > 0.0 else length
 
 
 @compiled
@@ -491,7 +492,7 @@ def follow_branch(
     behind_begin, length, known = nothing, _FIRST, 0.0
     settled, power = max(SETTLED, 0.1 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
     shortest, excess_before = _LONGEST * 0.5**accuracy.halvings, math.inf
-    begin_angle, last_at, last_tip, fate = first, z, loaded.tip, _NEVER
+    begin_angle, last_at, last_tip, fate, longest = first, z, loaded.tip, _NEVER, _LONGEST
     changes, largest, is_first, done, runs_out, is_over = 0, math.nan, True, 0, False, False
     wants_states = found.changes.shape[0] > 0
     most = workspace.followed.shape[0]
@@ -501,9 +502,6 @@ def follow_branch(
         leg = leg_from(loaded, begin, onward_from, length)
         if known == 0.0 and scene.beam.varied is not None:
             share = _share_in_phase(leg, psi1)
-            leg, length = shortened(leg, share), share * length
-        if known == 0.0 and lines is not None:
-            share = _share_on_line(scene.line, begin, leg)
             leg, length = shortened(leg, share), share * length
         share = math.nan if lines is None else _released(loaded, leg)
         released = share <= 1.0
@@ -622,6 +620,9 @@ def follow_branch(
             loaded = in_phase(scene, leg.tip)
             begin = settle(loaded, at_over.at, at_over.at, leg.normal, 0.0, SETTLED)
             onward_from = times(math.copysign(1.0, begin.travel_rate), begin.tangent)
+            longest = _LONGEST
+            if _goes_on(lines, line):
+                longest = _length_on_line(scene.line, loaded, begin, onward_from, _LONGEST)
         elif change <= 1.0:
             loaded = in_phase(scene, not leg.tip)
             begin = balance(loaded, Equilibrium(at_change.at.p, 1.0 if leg.tip else psi1, at_change.at.force))[0]
@@ -634,7 +635,7 @@ def follow_branch(
             if knot == low:
                 runs_out = True
                 break
-        length = max(min((max(pace, 1.0) if noisy else pace) * length, _LONGEST), shortest)
+        length = max(min((max(pace, 1.0) if noisy else pace) * length, longest), shortest)
         if not math.isfinite(begin.at.p):
             break
     if fate == _NEVER and not is_over:

@@ -1,4 +1,4 @@
-"""A candidate for the next record: its pivot, its drive step, and its expected results."""
+"""A candidate for the next record: its drives, their step, and its expected results."""
 
 from __future__ import annotations
 
@@ -45,6 +45,11 @@ class Candidate:
         first = self.drives[0]
         x, y = first.poses[0, :2].tolist() if isinstance(first, Carried) else first.base
         return x, y
+
+    @property
+    def is_pivot(self) -> bool:
+        """True if the rod is turned about one pivot."""
+        return len(self.drives) == 1 and isinstance(self.drives[0], Rotation)
 
     @property
     def described(self) -> dict[str, Any]:
@@ -103,38 +108,45 @@ class Expected(NamedTuple):
 
 
 def expected_of(task: tuple[Question, int]) -> Expected:
-    """Return the expected results of one candidate, by its index."""
+    """Return the expected results of one candidate, by its index.
+
+    What a draw's record tells is that of the drives that touch it.
+    """
     question, number = task
-    candidate = question.candidates[number]
-    model = question.known.model_from(candidate.drives, candidate.drive_step)
-    question = replace(question, known=question.known.of(model))
-    known = question.known
+    candidate, step = question.candidates[number], question.candidates[number].drive_step
     wide = band_factor(question.probability)
-    usable = model.likelihood.usable(model.contours(known.points), model.rig(known.points))
+    touched = np.stack([_usable(question.known, (drive,), step) for drive in candidate.drives], axis=1)
+    usable: Flags = np.any(touched, axis=1, keepdims=False)
     rows: dict[str, list[float]] = {
         name: [] for name in ("width", "information", "nested_width", "nested_information", "draws")
     }
-    prior_logdet = _logdet(known.precision)
-    numbers = np.asarray([*candidate.base, candidate.drive_step])
+    numbers = np.asarray([*candidate.base, step])
     paths = [drive.poses.ravel() for drive in candidate.drives if isinstance(drive, Carried)]
     numbers = np.concatenate([numbers, *paths])
     rng = np.random.default_rng([question.seed, *numbers.view(np.uint32)])
-    for point, is_usable in zip(known.points, usable, strict=True):
+    by_touch: dict[bytes, tuple[Question, ContourModel]] = {}
+    for k, touches in enumerate(touched):
+        if touches.tobytes() not in by_touch:
+            drives = [drive for drive, it in zip(candidate.drives, touches, strict=True) if it or not touches.any()]
+            model = question.known.model_from(drives, step)
+            by_touch[touches.tobytes()] = replace(question, known=question.known.of(model)), model
+        of_draw, model = by_touch[touches.tobytes()]
+        known, point = of_draw.known, of_draw.known.points[k]
         slopes = height_slopes(model, point, question.x)
         gained = np.zeros_like(known.precision)
-        if is_usable:
+        if usable[k]:
             try:
                 gained = record_information(model, point, slopes=reading_slopes(model, point, _COARSE_STEP)).matrix
             except ReachError:
                 gained = np.zeros_like(known.precision)
         precision = known.precision + gained
         rows["width"].append(wide * float(deviation_of_heights(slopes, precision).mean()))
-        rows["information"].append(0.5 * (_logdet(precision) - prior_logdet))
-        if question.nested and is_usable:
-            found = _nested(question, model, point, precision, rng)
+        rows["information"].append(0.5 * (_logdet(precision) - _logdet(known.precision)))
+        if question.nested and usable[k]:
+            found = _nested(of_draw, model, point, precision, rng)
             for name, value in zip(("nested_width", "nested_information", "draws"), found, strict=True):
                 rows[name].append(value)
-    gaps = _gaps(task[0].known, candidate, usable)
+    gaps = _gaps(question.known, candidate, usable)
     means = {name: _mean(np.array(values)) for name, values in rows.items()}
     return Expected(
         means["width"],
@@ -145,6 +157,13 @@ def expected_of(task: tuple[Question, int]) -> Expected:
         means["nested_information"],
         float(np.median(rows["draws"])) if rows["draws"] else np.nan,
     )
+
+
+def _usable(known: Knowledge, drives: tuple[Drive, ...], step: float) -> Flags:
+    """Return which draws a rod touches in these drives."""
+    model = known.model_from(drives, step)
+    points = known.of(model).points
+    return model.likelihood.usable(model.contours(points), model.rig(points))
 
 
 def _nested(

@@ -1,4 +1,4 @@
-"""Experimental design: the pivot and the drive step of the next record."""
+"""Experimental design: the drive of the next record and its step."""
 
 from __future__ import annotations
 
@@ -84,10 +84,10 @@ def design(
     scheduler: str | None = None,
     progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.Dataset:
-    """Return the expected results of the next record from every candidate pivot, and the best candidate.
+    """Return the expected results of the next record for every candidate drive, and the best candidate.
 
     Objects are drawn from the prior or the posterior so far; the information of the next record about each is added to
-    it, and the resulting band is averaged. Every record is a forward and a backward sweep.
+    it, and the resulting band is averaged. A record from a pivot is a forward and a backward sweep.
 
     Parameters
     ----------
@@ -128,8 +128,9 @@ def design(
     Returns
     -------
     xr.Dataset
-        Over "candidate", with base_x, base_y (the pivot, or where the first drive begins) [length], drive_step [rad]
-        and drive, in words:
+        Over "candidate", with base_x, base_y (the pivot, or where the first drive begins) [length], drive_step [rad],
+        drive, in words, is_pivot (whether it turns about one pivot), and samples, the number of readings of its record,
+        by which candidates that take the same time can be chosen:
 
         width, width_error
             Expected mean width of the band over the span [length], and its standard error over draws. For objects that
@@ -221,7 +222,7 @@ def _out_of_reach(question: Question) -> str:
     above = f"y = {low:g}" if low == high else f"y from {low:g} to {high:g}"
     return (
         f"the rod, {known.rod.length:g}{unit or ' L'} long, reaches no possible object from any candidate, at "
-        f"{across}{unit} and {above}{unit}: give pivots nearer to it, in that unit"
+        f"{across}{unit} and {above}{unit}: give others, nearer to it, in that unit"
     )
 
 
@@ -263,6 +264,8 @@ def _labelled(question: Question, expected: Sequence[Expected], criterion: Crite
         "base_x": ("candidate", np.array([candidate.base[0] for candidate in candidates]), metres),
         "base_y": ("candidate", np.array([candidate.base[1] for candidate in candidates]), metres),
         "drive": ("candidate", np.array([candidate.words for candidate in candidates])),
+        "is_pivot": ("candidate", np.array([candidate.is_pivot for candidate in candidates])),
+        "samples": ("candidate", np.array([_samples(known, candidate) for candidate in candidates])),
         "drive_step": ("candidate", np.array([candidate.drive_step for candidate in candidates]), {"units": "rad"}),
         "reached": ("candidate", np.array([row.reached for row in expected])),
         "nested_draws": ("candidate", np.array([row.nested_draws for row in expected])),
@@ -286,6 +289,11 @@ def _labelled(question: Question, expected: Sequence[Expected], criterion: Crite
         coords={"x": ("x", question.x, metres)},
         attrs={"criterion": criterion, "probability": question.probability, "family": known.experiment.family},
     )
+
+
+def _samples(known: Knowledge, candidate: Candidate) -> int:
+    """Return the number of samples of a candidate's record."""
+    return int(known.model_from(candidate.drives, candidate.drive_step).measured.sizes["sample"])
 
 
 def _present_width(question: Question) -> float:

@@ -1,14 +1,15 @@
-"""Figures of a design: the expected criterion over candidate pivots."""
+"""Figures of a design: the expected criterion of candidate drives."""
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.plotting.axes import check_dataset, single_axes, tile_edges
+from tactile_bayes.plotting.axes import check_dataset, new_panels, single_axes, tile_edges
 from tactile_bayes.plotting.labels import number, shown_unit
 from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, label_map
@@ -21,6 +22,9 @@ __all__ = ["design"]
 
 _HEIGHTS_OF_A_MAP = 3
 """Smallest number of rows and columns of pivots that is drawn as a map, not as lines."""
+
+_ROW_WIDTH = 44
+"""Largest number of characters in a line of a candidate's words."""
 
 _HIGHEST, _ROOM = 7.0, 0.1
 """Largest height of a map's figure, and the margin in it [inches]."""
@@ -35,11 +39,12 @@ _BARS: dict[str, Any] = {"markersize": 4.0, "linewidth": 1.2, "elinewidth": 0.8,
 
 
 def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
-    """Draw the criterion of a design over candidate pivots, the best of them, and the pivots so far.
+    """Draw the criterion of a design for its candidates, the best of them, and the pivots so far.
 
     Candidates that form a grid of at least three rows and columns are drawn as a map of tiles, for the drive step of
     the best candidate. Otherwise each height and drive step has a line, with bars of two standard errors over the
-    objects drawn; crosses show values from sampled posteriors, where there are some.
+    objects drawn; crosses show values from sampled posteriors, where there are some. If some candidates are other
+    drives than pivots, each candidate has a row.
 
     Parameters
     ----------
@@ -68,7 +73,11 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> design(found, ax=Figure().subplots()).get_xlabel()
     'position of the pivot $x$ [$L$]'
     """
-    check_dataset(found, {"base_x", "drive_step", "best", "present_base_x"}, "design", "tactile_bayes.design")
+    check_dataset(
+        found, {"base_x", "drive_step", "is_pivot", "best", "present_base_x"}, "design", "tactile_bayes.design"
+    )
+    if not found["is_pivot"].values.all():
+        return _draw_rows(ax, found)
     pivots = np.stack([found["present_base_x"].values, found["present_base_y"].values], axis=-1)
     own, ax = ax is None, single_axes() if ax is None else ax
     grid = _grid_of(found)
@@ -127,6 +136,40 @@ def _draw_lines(ax: Axes, found: xr.Dataset, pivots: Floats) -> None:
     ax.spines[["top", "right"]].set_visible(False)
     if len(ax.get_legend_handles_labels()[1]) > 1:
         legend(ax)
+
+
+def _draw_rows(ax: Axes | None, found: xr.Dataset) -> Axes:
+    """Draw a row for each candidate, under each other."""
+    name, label, is_length = _kind_of(found)
+    si = found["base_x"].attrs.get("units") == "m"
+    count, best, scale = found.sizes["candidate"], int(found["best"]), 1e3 if si and is_length else 1.0
+    if ax is None:
+        ax = new_panels(1, 1, 1.2 + 0.4 * count)[0, 0]
+    values, errors = scale * found[name].values, scale * found[f"{name}_error"].values
+    rows = np.arange(count)
+    bars: dict[str, Any] = {
+        "color": PALETTE["tip"],
+        "marker": "o",
+        "linestyle": "none",
+        "label": "Laplace's approximation",
+    }
+    ax.errorbar(values, rows, xerr=2.0 * np.nan_to_num(errors), **bars | _BARS)
+    nested = scale * found[f"nested_{name}"].values if f"nested_{name}" in found else np.full(count, np.nan)
+    if np.isfinite(nested).any():
+        ax.plot(nested, rows, "x", color=PALETTE["tip"], markersize=7.0, label="sampled posteriors")
+    ring: dict[str, Any] = {"markersize": 12.0, "markerfacecolor": "none", "color": PALETTE["change"]}
+    ax.plot(values[best], best, "o", label="best", **ring)
+    ends, steps = [f"{drive}" for drive in found["drive"].values], np.degrees(found["drive_step"].values)
+    if np.ptp(steps) > 0.0:
+        ends = [f"{drive}, {step:.3g}° or as many" for drive, step in zip(ends, steps, strict=True)]
+    ax.set_yticks(rows, [textwrap.fill(words, _ROW_WIDTH) for words in ends])
+    ax.set_ylim(count - 0.5, -0.5)
+    ax.tick_params(axis="y", length=0.0)
+    ax.set_xlim(left=0.0 if is_length else None)
+    ax.set_xlabel(f"{label} [{'mm' if si else '$L$'}]" if is_length else label)
+    ax.spines[["top", "right"]].set_visible(False)
+    legend_above(ax, 3)
+    return ax
 
 
 class _Grid(NamedTuple):

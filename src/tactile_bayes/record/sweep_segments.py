@@ -22,6 +22,9 @@ _WIDEST = 0.5
 _MOST = 0.5
 """Share of the steps beyond which a base that moves is carried, and not one of several pivots."""
 
+_LEAST_TURN, _FEW = 0.05, 2
+"""Angle that a drive turns about a pivot [rad], and number of samples beyond which a base between pivots is carried."""
+
 SHARE = 0.1
 """Least return of the drive angle after a turning point, as a share of its whole range."""
 
@@ -69,7 +72,8 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
 
     If the base moves in more than half of the steps, the drive carries it. A sweep then ends in the same way where the
     base turns back on the line along which it moves most, and it is forward if the rod's left side leads: if the middle
-    of the unloaded rod, of this length [length], moves to its left on average.
+    of the unloaded rod, of this length [length], moves to its left on average. In a record of both kinds each stretch
+    in which the base rests while the drive turns, or is carried, is split in its own way.
 
     Raises
     ------
@@ -91,25 +95,58 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
         raise source.cell_error(
             sample, "drive_angle", f"the value is {float(angle[sample])!r}: give a finite number, or remove the row"
         )
-    least = SHARE * float(np.ptp(angle))
-    moved = np.zeros(angle.size, dtype=bool)
-    for name in ("base_x", "base_y"):
+    base = np.zeros((angle.size, 2))
+    for column, name in enumerate(("base_x", "base_y")):
         if name in table.columns:
-            base = parsed_column(name, table.columns[name][0], source)
-            moved[1:] |= base[1:] != base[:-1]
+            base[:, column] = parsed_column(name, table.columns[name][0], source)
+    moved = np.append(False, np.any(base[1:] != base[:-1], axis=1))
     _refuse_wrapped(angle, moved, source)
-    if np.count_nonzero(moved) > max(1.0, _MOST * (angle.size - 1)):
-        return _split_carried(table, angle, length)
-    starts = []
+    sweep, direction = np.zeros(angle.size, dtype=np.int64), np.empty(angle.size, dtype="U8")
+    sweeps: list[tuple[int, int, bool]] = []
+    for stretch, is_carried in _stretches(angle, moved):
+        if not is_carried:
+            sweeps += _turned_sweeps(stretch, angle, moved, source)
+        elif np.isfinite(base).all():
+            sweeps += _carried_sweeps(stretch, angle, base, length, source)
+        else:  # refused later, with its row
+            return table
+    for number, (begin, end, is_forward) in enumerate(sweeps):
+        sweep[begin:end] = number
+        direction[begin:end] = "forward" if is_forward else "backward"
+    return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, source)
+
+
+def _stretches(angle: Floats, moved: Flags) -> list[tuple[slice, bool]]:
+    """Return stretches of samples in their order, each with whether the base is carried in it.
+
+    A base that rests while the drive turns is a pivot. Where there are such stretches and others, of more than a few
+    samples, the record is of both kinds. `moved` tells at which samples the base is not where it was before.
+    """
+    turns = np.zeros(angle.size, dtype=bool)
     for begin, end in pairwise([0, *np.flatnonzero(moved).tolist(), angle.size]):
+        turns[begin:end] = np.ptp(angle[begin:end]) > _LEAST_TURN
+    edges = [0, *(np.flatnonzero(turns[1:] != turns[:-1]) + 1).tolist(), angle.size]
+    carried = [(begin, end) for begin, end in pairwise(edges) if not turns[begin] and end - begin > _FEW]
+    if not (turns.any() and carried):
+        return [(slice(0, angle.size), bool(np.count_nonzero(moved) > max(1.0, _MOST * (angle.size - 1))))]
+    jumps = np.append(np.abs(np.diff(angle)) > _WIDEST, False)
+    stretches, last = [], 0
+    for begin, end in carried:  # its first or last sample may lie at a pivot
+        own = slice(begin - int(begin > 1 and jumps[begin - 2]), end + int(jumps[end]) if end < angle.size else end)
+        stretches += [(slice(last, own.start), False)] * (own.start > last) + [(own, True)]
+        last = own.stop
+    return stretches + [(slice(last, angle.size), False)] * (last < angle.size)
+
+
+def _turned_sweeps(stretch: slice, angle: Floats, moved: Flags, source: Source) -> list[tuple[int, int, bool]]:
+    """Return begin and end of each sweep about pivots, and whether it is forward."""
+    least, starts = SHARE * float(np.ptp(angle[stretch])), []
+    moves = stretch.start + 1 + np.flatnonzero(moved[stretch][1:])
+    for begin, end in pairwise([stretch.start, *moves.tolist(), stretch.stop]):
         turns = turning_points(angle[begin:end], least)
-        is_reset = [False, *(turn == before + 1 for before, turn in pairwise(turns))]
-        starts += [begin, *(begin + turn + 1 for turn, reset in zip(turns, is_reset, strict=False) if not reset)]
-    sweep = np.zeros(angle.size, dtype=np.int64)
-    sweep[starts[1:]] = 1
-    np.cumsum(sweep, out=sweep)
-    direction = np.empty(angle.size, dtype="U8")
-    for begin, end in pairwise([*starts, angle.size]):
+        starts += [begin, *(begin + turn for turn in _starts(turns))]
+    sweeps = []
+    for begin, end in pairwise([*starts, stretch.stop]):
         trend = _trend(angle[begin:end])
         if trend == 0.0:
             if end - begin == 1:
@@ -121,26 +158,20 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
                     "sweep has no direction: remove these samples"
                 )
             raise source.error(f"{what}, or give columns 'sweep' and 'direction'")
-        direction[begin:end] = "forward" if trend > 0.0 else "backward"
-    return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, source)
+        sweeps.append((begin, end, trend > 0.0))
+    return sweeps
 
 
-def _split_carried(table: Table, angle: Floats, length: float) -> Table:
-    """Add sweeps and directions to a table whose base moves."""
-    source = table.source
-    base = np.zeros((angle.size, 2))
-    for column, name in enumerate(("base_x", "base_y")):
-        if name in table.columns:
-            base[:, column] = parsed_column(name, table.columns[name][0], source)
-    if not np.isfinite(base).all():  # refused later, with its row
-        return table
-    offset = base - base.mean(axis=0)
+def _carried_sweeps(
+    stretch: slice, angle: Floats, base: Floats, length: float, source: Source
+) -> list[tuple[int, int, bool]]:
+    """Return begin and end of each sweep in which the base is carried, and whether it is forward."""
+    offset = base[stretch] - base[stretch].mean(axis=0)
     along = offset @ np.linalg.eigh(offset.T @ offset)[1][:, -1]
     turns = turning_points(along, SHARE * float(np.ptp(along)))
-    is_reset = [False, *(turn == before + 1 for before, turn in pairwise(turns))]
-    starts = [0, *(turn + 1 for turn, reset in zip(turns, is_reset, strict=False) if not reset)]
-    sweep, direction = np.zeros(angle.size, dtype=np.int64), np.empty(angle.size, dtype="U8")
-    for number, (begin, end) in enumerate(pairwise([*starts, angle.size])):
+    starts = [stretch.start, *(stretch.start + turn for turn in _starts(turns))]
+    sweeps = []
+    for begin, end in pairwise([*starts, stretch.stop]):
         step, middle = np.diff(base[begin:end], axis=0), 0.5 * (angle[begin : end - 1] + angle[begin + 1 : end])
         left = -np.sin(middle) * step[:, 0] + np.cos(middle) * step[:, 1] + 0.5 * length * np.diff(angle[begin:end])
         if not abs(left.sum()) > _ROUNDING * np.abs(step).sum():
@@ -148,9 +179,14 @@ def _split_carried(table: Table, angle: Floats, length: float) -> Table:
                 f"from {source.row(begin)} to {source.row(end - 1)} the base moves along the rod, or not at all, so "
                 "that no side of the rod leads and the sweep has no direction: give columns 'sweep' and 'direction'"
             )
-        sweep[begin:end] = number
-        direction[begin:end] = "forward" if left.sum() > 0.0 else "backward"
-    return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, source)
+        sweeps.append((begin, end, left.sum() > 0.0))
+    return sweeps
+
+
+def _starts(turns: list[int]) -> list[int]:
+    """Return where sweeps begin after the first, from turning points: not after those by which a drive was reset."""
+    is_reset = [False, *(turn == before + 1 for before, turn in pairwise(turns))]
+    return [turn + 1 for turn, reset in zip(turns, is_reset, strict=False) if not reset]
 
 
 def _refuse_wrapped(angle: Floats, moved: Flags, source: Source) -> None:

@@ -44,10 +44,12 @@ def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, *
     found = design(*args, nested=nested, out=Path(out) / "nested" if nested else None, **options)
     folder = Folder(out)
     folder.write_netcdf("design", "design.nc", found)
-    numbers = found.drop_vars("drive").data_vars
+    numbers = found.drop_vars(["drive", "is_pivot"]).data_vars
     columns = [str(name) for name, values in numbers.items() if values.dims == ("candidate",)]
     rows = np.stack([found[name].values for name in columns], axis=1)
     lines = [",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+    if not found.is_pivot.values.all():
+        lines = [f'{line},"{drive}"' for line, drive in zip(lines, ["drive", *found.drive.values], strict=True)]
     folder.write_lines("candidates", "candidates.csv", lines)
     folder.write_lines("words", "words.txt", design_messages(found))
     folder.draw("figure", "design.png", plotting.design, found)
@@ -62,31 +64,45 @@ def design_messages(found: xr.Dataset) -> tuple[str, ...]:
     def length(value: float) -> str:
         return f"{1e3 * value:.3g} mm" if si else f"{value:.3g} L"
 
-    place = f"({length(float(best.base_x))}, {length(float(best.base_y))})"
-    probability = f"{found.attrs['probability']:.0%}"
+    def place(candidate: xr.Dataset) -> str:
+        return f"({length(float(candidate.base_x))}, {length(float(candidate.base_y))})"
+
+    def words(candidate: xr.Dataset) -> str:
+        return f"the pivot {place(candidate)}" if candidate.is_pivot else f"{candidate.drive.item()}{' [m]' * si}"
+
+    if best.is_pivot:
+        what = f"Put the pivot at {place(best)} and step the drive by {np.degrees(float(best.drive_step)):.3g}°"
+    else:
+        what = f"The best drive: {words(best)}, with {int(best.samples):,} readings"
     sentences = [
-        f"Put the pivot at {place} and step the drive by {np.degrees(float(best.drive_step)):.3g}°: the {probability} "
-        f"band is then {length(float(best.width))} wide on the mean; now it is "
-        f"{length(float(found.present_width))}."
+        f"{what}: the {found.attrs['probability']:.0%} band is then {length(float(best.width))} wide on the mean; now "
+        f"it is {length(float(found.present_width))}."
     ]
     if np.isfinite(float(best.gap)):
         sentences[0] += f" Of the contour between the outermost contacts {length(float(best.gap))} stay untouched."
     sides = (("base_x", "leftmost", "rightmost"), ("base_y", "lowest", "highest"))
     end = outermost((found[name].values, float(best[name]), least, most) for name, least, most in sides)
-    if end:
+    if end and found.is_pivot.values.all():
         sentences.append(f"It is the {end} of the candidates: a better one may lie beyond, try more.")
     worst = found.isel(candidate=int(np.nanargmax(found.width.values)))
     if found.sizes["candidate"] > 1:
         ratio = float(worst.width / best.width)
         sentences.append(
-            f"From the worst of {found.sizes['candidate']} candidates, ({length(float(worst.base_x))}, "
-            f"{length(float(worst.base_y))}), the band would be {ratio:.2g} times as wide."
+            f"With the worst of {found.sizes['candidate']} candidates, {words(worst)}, the band would be {ratio:.2g} "
+            "times as wide."
+        )
+    alike = found.isel(candidate=np.flatnonzero(found.drive_step == best.drive_step))
+    if np.ptp(alike.samples.values) > 0:
+        most = alike.isel(candidate=int(np.nanargmax(alike.information / alike.samples)))
+        sentences.append(
+            f"Per reading this tells the most: {words(most)}, {float(most.information):.3g} nats in "
+            f"{int(most.samples):,} readings."
         )
     if float(best.reached) < 1.0:
-        sentences.append(f"From there the rod reaches {float(best.reached):.0%} of the possible objects.")
+        sentences.append(f"With it the rod reaches {float(best.reached):.0%} of the possible objects.")
     if np.isfinite(float(best.nested_width)):
         sentences.append(
-            f"Sampled posteriors give {length(float(best.nested_width))} ± {length(float(best.nested_width_error))} "
-            f"there, Laplace's approximation {length(float(best.width))}."
+            f"Sampled posteriors give {length(float(best.nested_width))} ± {length(float(best.nested_width_error))}, "
+            f"Laplace's approximation {length(float(best.width))}."
         )
     return tuple(sentences)
