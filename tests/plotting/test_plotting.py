@@ -22,7 +22,7 @@ from tactile_bayes.plotting import posteriors, touch_map
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.plotting.tightening import _fit_map, _panels
 from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
-from tactile_bayes.sweep import scan
+from tactile_bayes.sweep import Rotation, Translation, scan
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 
 ROD = Rod(length=0.1, flexural_rigidity=1.2e-5)
@@ -675,3 +675,13 @@ def test_a_gap_is_taken_as_it_comes():
     )
     patch = plotting.contour((-1.0, 1.0), gap=bounds).patches[0]
     assert (patch.get_x(), patch.get_width()) == (-0.1, pytest.approx(0.2))
+
+
+def test_the_way_of_a_base_that_is_carried_is_drawn_to_the_end_of_contact():
+    there = Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
+    carried = scan(Circle(0.3, 0.8), drive=[there, Rotation()])
+    ax = plotting.touched(carried)
+    way = next(line for line in ax.lines if line.get_xdata()[0] == 0.8 and len(line.get_xdata()) == 2)
+    assert way.get_xdata()[1] == pytest.approx(carried.sweeps[0].snap_off.base_x)
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"base from (0.8, 0) $L$", "base (0, 0) $L$"} <= set(words)

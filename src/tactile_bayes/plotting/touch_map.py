@@ -1,4 +1,4 @@
-"""Touched arcs of the contour between first contact and snap-off, and the gaps between them."""
+"""Touched arcs of the contour between first contact and the end of contact, and the gaps between them."""
 
 from __future__ import annotations
 
@@ -41,8 +41,9 @@ _OFFSET = np.sqrt(2.0) * _ARC_WIDTH
 def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     """Draw the arcs of the contour that the sweeps touched, in a colour for each base, and the gaps between them.
 
-    An arc extends from first contact to snap-off. Arcs of the first base lie on the contour, those of every further
-    base a line's width below; x is true everywhere. From the seventh base on, lines are dashed. A gap is a stretch
+    An arc extends from first contact to the end of contact. Arcs of the first base lie on the contour, those of every
+    further base a line's width below; x is true everywhere. The way of a base that is carried is drawn up to the end of
+    contact. From the seventh base on, lines are dashed. A gap is a stretch
     between the outermost contacts that no sweep touched; its width in x is written where there is room. If no gap
     remains, "no gap" is written.
 
@@ -93,14 +94,17 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
         line.set_transform(ax.transData + lowered)  # only now, so that the limits are those of the arc itself
         if x[-1] - x[0] <= same:  # the sweep touched an edge alone
             line.set_marker("o")
-    pivots = np.array(list(lines))
+    ends = {sweep.base: (sweep.snap_off.base_x, sweep.snap_off.base_y) for sweep in scan.sweeps}
+    pivots = np.array([*lines, *ends.values()])
     x, y = (np.concatenate([*(arc[axis] for arc in arcs), pivots[:, axis]]) for axis in (0, 1))
     draw_object(ax, scan.contour, x, y, room=0.05 * rod.length_unit)
     power, unit = shown_unit("contact_x", attrs, limits_of(ax))
     for base, style in lines.items():
+        ax.plot(*zip(base, ends[base], strict=True), color=style["color"], linewidth=1.0, zorder=1.5)
         draw_pivot(ax, base, colour=style["color"], label="")
         place = ", ".join(number(part, power) for part in base)
-        legend_entry(ax, f"base ({place}) {unit}", **style, marker="o", markerfacecolor="white")
+        what = "base" if ends[base] == base else "base from"
+        legend_entry(ax, f"{what} ({place}) {unit}", **style, marker="o", markerfacecolor="white")
 
     gaps = _gaps(arcs, same)
     texts = [
