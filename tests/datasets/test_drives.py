@@ -44,6 +44,11 @@ SI = changed(
     },
     load_cell={"frame": "turning", "drive_angle_offset": 0.01, "drive_angle_backlash": 0.004, "force_noise": 1e-5},
 )
+TURNED = changed(
+    CARRIED,
+    scan__translations=[{**FIRST, "drive_angle": 0.9, "turn": {"uniform": [0.5, 0.7]}}, {**SECOND, "turn": 0.2}],
+)
+TURNED_SI = changed(SI, scan__translations=[{**FIRST, "base": [0.09, 0.0], "travel": 0.18, "turn": -0.1}])
 BRIEF = changed(CARRIED, scan__translations=[{**FIRST, "travel": 0.9}])
 
 
@@ -51,7 +56,11 @@ def truth_of(one, name):
     return one[f"truth_{name}" if f"truth_{name}" in one else name].values
 
 
-@pytest.mark.parametrize("spec", [CARRIED, SI, BRIEF], ids=["dimensionless", "SI", "in contact at the end"])
+@pytest.mark.parametrize(
+    "spec",
+    [CARRIED, SI, TURNED, TURNED_SI, BRIEF],
+    ids=["dimensionless", "SI", "turned", "turned, SI", "in contact at the end"],
+)
 def test_the_truth_is_what_a_scan_along_the_drive_says(spec):
     """Loads to 1e-6 of the largest, contacts to 2e-5 of the rod, events to rounding."""
     said = read_specification(spec)

@@ -1,4 +1,4 @@
-"""Drives of the sweeps of many records: rotations about pivots, or translations."""
+"""Drives of the sweeps of many records: rotations about pivots, or translations, turned on their way or not."""
 
 from __future__ import annotations
 
@@ -29,7 +29,14 @@ class Drives(NamedTuple):
     ends: Floats | None = None
     """Poses between which the base is carried, shape (n, 2, 3)."""
     lines: Floats | None = None
-    """Its lines, as `trace` takes them."""
+    """Its lines, as `trace` takes them, along which it turns too."""
+
+    @property
+    def travel_share(self) -> Floats:
+        """Travel over the way along its lines, shape (n,), of a base that is carried."""
+        turn = 0.0 if self.ends is None else self.ends[:, 1, 2] - self.ends[:, 0, 2]
+        travel = np.sqrt(self.way[:, -1] ** 2 - turn**2)
+        return np.asarray(np.where(turn == 0.0, 1.0, travel / self.way[:, -1]))
 
 
 def drives_of(spec: Specification, values: Mapping[str, Floats], length: Floats) -> Drives:
@@ -71,12 +78,16 @@ def _translations(spec: Specification, values: Mapping[str, Floats], length: Flo
         for name in ("travel", "step")
         if name in one
     ]
-    heading, angle, travel = column("heading"), column("drive_angle"), np.stack(ways, axis=1).ravel()
+    turns = [values.get(f"scan.translations[{k}].turn", np.zeros(len(ways[k]))) for k in range(spec.sweep_count)]
+    turn, travel = (np.stack(each, axis=1).ravel() for each in (turns, ways))
+    heading, angle = column("heading"), column("drive_angle")
     ahead = np.stack([np.cos(heading), np.sin(heading), np.zeros(heading.size)], axis=1)
     ahead[np.abs(ahead) < _ROUNDING] = 0.0
     begin = np.stack([column("base[0]"), column("base[1]"), angle], axis=1)
-    ends = np.stack([begin, begin + travel[:, None] * ahead], axis=1)
-    backward = ahead[:, 1] * np.cos(angle) < ahead[:, 0] * np.sin(angle)
+    steps = travel[:, None] * ahead
+    steps[:, 2] = turn
+    ends = np.stack([begin, begin + steps], axis=1)
+    backward = steps[:, 1] * np.cos(angle) + 0.5 * length * turn < steps[:, 0] * np.sin(angle)
     through = [lines_through(*one, backward=mirrored) for *one, mirrored in zip(ends, length, backward, strict=True)]
     way = np.stack([path.travels[-1] * np.linspace(0.0, 1.0, spec.drive.samples) for path in through])
     return Drives(ends[:, 0, 0], ends[:, 0, 1], backward, way, ends, np.stack([path.lines for path in through]))

@@ -307,7 +307,7 @@ def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
     for event, columns in sweep_events(paths, tried.units).items():
         found |= {f"{event}_{name}": columns[name] for name in EVENT_COLUMNS}
     if spec.translations:
-        length = tried.units.length_unit
+        length = tried.units.length_unit * tried.drives.travel_share
         found |= {"first_contact_travel": length * paths.first_angle, "snap_off_travel": length * paths.snap_angle}
     found["snap_off_kind"] = paths.snap_off
     if spec.has_thickness:

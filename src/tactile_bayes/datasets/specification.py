@@ -78,7 +78,7 @@ class Specification:
         Directions of the sweeps about each pivot.
     translations : tuple of mapping of str to Distribution
         Sweeps in which the base is carried along a line, in place of pivots: base[0], base[1], travel or step [m, or
-        rod lengths], heading and drive_angle [rad].
+        rod lengths], heading, drive_angle, and turn, the change of the drive angle on the way [rad].
     drive : Drive
         Number of samples, and drive angles of rotations.
     friction : float

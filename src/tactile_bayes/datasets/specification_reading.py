@@ -42,7 +42,7 @@ _TABLES: Mapping[str, Iterable[str]] = {
 """Keys of each table."""
 
 _OF_ROTATIONS = ("bases", "directions", "from_degrees", "to_degrees", "margin")
-_OF_TRANSLATIONS = ("base", "heading", "drive_angle", "travel", "step")
+_OF_TRANSLATIONS = ("base", "heading", "drive_angle", "turn", "travel", "step")
 
 _REPLACED = {
     "power-law": ("a", "w", "the width at which it is as high as wide, a^(1/(1 − n))"),
@@ -326,8 +326,8 @@ def _translation(said: Mapping[str, Any], key: str) -> dict[str, Distribution]:
         **{name: said[name] for name in _OF_TRANSLATIONS[1:] if name in said},
     }
     found = {name: distribution_of(value, f"{key}.{name}") for name, value in values.items()}
-    for name in ("heading", "drive_angle"):
-        for angle in (found[name].least, found[name].greatest):
+    for name in ("heading", "drive_angle", "turn"):
+        for angle in (found[name].least, found[name].greatest) if name in found else ():
             if math.isfinite(angle) and abs(angle) > 2.0 * math.pi:
                 raise SpecificationError(f"{key}.{name} may be {angle:g}: give angles in radians, at most a turn (2π)")
     _refuse_negative({name: found[name] for name in ("travel", "step") if name in found}, f"{key}.", or_zero=())
