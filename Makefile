@@ -13,15 +13,18 @@ export MPLBACKEND ?= Agg
 # Bytecode halves the time that a process takes to start, and tests and notebooks start many.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-lowest test-slow bench coverage calibration shapes recognition misspecification trust designs efficiency nuisances samplers images docs dist lint clean
+.PHONY: demo test notebooks test-lowest test-slow bench coverage calibration shapes recognition misspecification trust designs efficiency nuisances samplers images docs dist lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
 
-# Notebooks in the middle: they take long, and need what the examples in docstrings compile. Each process takes one core.
-test: export OPENBLAS_NUM_THREADS = 1
+# Of the notebooks the first, and that of one's own record. Each process takes one core.
+test notebooks: export OPENBLAS_NUM_THREADS = 1
 test: $(READY)
-	$(BIN)/python -m pytest -n auto --nbmake --doctest-modules src notebooks tests
+	$(BIN)/python -m pytest -n auto --nbmake --doctest-modules src notebooks/1_*.ipynb notebooks/7_*.ipynb tests
+
+notebooks: $(READY)
+	$(BIN)/python -m pytest -n auto --nbmake notebooks
 
 # With the lowest versions of the dependencies; their warnings about one another are not errors here.
 test-lowest: $(READY)
@@ -31,7 +34,7 @@ test-lowest: $(READY)
 	.venv-lowest/bin/python -m pip install --quiet --requirement .venv-lowest/lowest.txt --group dev --editable .
 	NUMBA_CACHE_DIR=.venv-lowest/numba .venv-lowest/bin/python -m pytest -n auto -o filterwarnings=default
 
-test-slow: $(READY)
+test-slow: notebooks
 	$(BIN)/python -m pytest -m slow
 
 bench: $(READY)

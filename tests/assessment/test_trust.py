@@ -31,7 +31,7 @@ def test_a_record_of_the_model_holds_and_says_so():
 
 
 def test_a_wrong_family_is_not_to_be_relied_on():
-    record = CELL.measure(swept(tb.contours.paper_profile("IV", q=0.5)), seed=2)
+    record = CELL.measure(swept(tb.contours.paper_profile("III", q=0.5)), seed=2)
     found = trust(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND), replicates=0, assumptions=False)
     assert found.attrs["conclusion"] == "do not rely on it"
     assert found.attrs["summary"].startswith("Do not rely on the band, because ")

@@ -134,10 +134,10 @@ def trust(
     >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> slippery = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.05)
-    >>> for friction in (0.0, 0.3):
-    ...     sweep = scan(paper_profile("II", q=0.5), drive_step=0.05, friction=friction).record
-    ...     posterior = infer_contour(cell.measure(sweep, seed=1), nuisances=[], seed=1, settings=slippery)
+    >>> quick = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.05)
+    >>> for friction in (0.0, 0.005):
+    ...     sweep = scan(paper_profile("II", q=0.5), drive_step=0.1, friction=friction).record
+    ...     posterior = infer_contour(cell.measure(sweep, seed=1), nuisances=[], seed=1, settings=quick)
     ...     print(trust(posterior, replicates=0, assumptions=False).attrs["conclusion"])
     holds
     do not rely on it
