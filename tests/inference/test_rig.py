@@ -62,6 +62,7 @@ def drawn(priors=("rigidity_scale", "lever_x"), **attrs):
     draws = xr.Dataset({name: (("chain", "draw"), values[name][None]) for name in priors})
     tree = xr.DataTree.from_dict({"posterior": draws})
     stated = {"gauge": "", "converged": 1, "nuisances": json.dumps(list(priors)), "data_sha256": "0"}
+    stated |= {"load_cell_frame": "fixed", "rod_length": 1.0, "rod_flexural_rigidity": 1.0, "rod_diameter": 0.0}
     tree.attrs = {**stated, "units": "dimensionless", **attrs}
     return tree
 
@@ -172,7 +173,7 @@ def test_others_are_refused():
 
 def test_other_gauges_are_refused():
     record = read(PIN, 1)
-    for contour in ("circle", Circle(r=[0.2, 0.3], q=0.5), from_function(lambda x: 0.5 + x * x)):
+    for contour in ("circle", Circle(r=[0.2, 0.3], q=0.5), from_function(lambda x: 0.5 + x * x, (-1.0, 1.0))):
         with refused(ParameterError, "contour"):
             infer_rig(record, contour=contour, seed=1)
     with refused(ParameterError, "nuisances"):
