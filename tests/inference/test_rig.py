@@ -150,6 +150,9 @@ def test_what_a_record_does_not_show_is_left_out_and_what_it_cannot_tell_is_kept
     model = Experiment(record, load_cell=CELL, nuisances=(), joint=rig_prior(drawn())).model
     assert "rigidity_scale" in model.names
     assert "lever_x" not in model.names
+    forward = read(OBJECT, 2).isel(sample=read(OBJECT, 2).direction.values == "forward")
+    backlash = RigPrior({"backlash": stats.norm(0.0, 0.002)}, np.eye(1), 0.0, "0")
+    assert "backlash" in Experiment(forward, load_cell=CELL, nuisances=(), joint=backlash).model.names
 
 
 def test_others_are_refused():
