@@ -204,9 +204,7 @@ def infer_contour(
     given = {} if priors is None else priors
     joint = None if rig is None else rig_prior(rig)
     experiment = Experiment(measured, family, load_cell, given, rod, friction, nuisances, events, joint=joint)
-    if rig is not None:
-        refuse_other_rig(rig.attrs, experiment.about)
-    return _posterior_of(experiment, seed, settings, checkpoint, progress, keep)
+    return _posterior_of(experiment, rig, seed, settings, checkpoint, progress, keep)
 
 
 def infer_rig(
@@ -224,6 +222,7 @@ def infer_rig(
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
     keep: Callable[[xr.DataTree], object] | None = None,
+    rig: xr.DataTree | None = None,
 ) -> xr.DataTree:
     """Return the posterior of a rig's parameters from sweeps along a gauge, whose contour is known.
 
@@ -239,6 +238,10 @@ def infer_rig(
         its position from the pivot are taken as exact.
     load_cell, priors, seed, rod, friction, nuisances, events, settings, checkpoint, progress, keep
         As in `infer_contour`.
+    rig : xr.DataTree, optional
+        Result of `infer_rig` for another record of the same rig, of this gauge or of another one: its posterior is the
+        prior, as in `infer_contour`, so that the result rests on both records. Each has its own zeros, drifts, noise,
+        shifts of pivots and friction.
 
     Returns
     -------
@@ -276,21 +279,25 @@ def infer_rig(
         nuisances=nuisances,
         events=events,
         gauge=gauge,
+        joint=None if rig is None else rig_prior(rig),
     )
     if not experiment.rig.names:
         raise ParameterError("nuisances are empty: name at least one parameter of the rig, like rigidity_scale")
-    return _posterior_of(experiment, seed, settings, checkpoint, progress, keep)
+    return _posterior_of(experiment, rig, seed, settings, checkpoint, progress, keep)
 
 
 def _posterior_of(
     experiment: Experiment,
+    rig: xr.DataTree | None,
     seed: Seed,
-    settings: SamplerSettings | None = None,
-    checkpoint: str | os.PathLike[str] | None = None,
-    progress: Callable[[Progress], object] | None = None,
-    keep: Callable[[xr.DataTree], object] | None = None,
+    settings: SamplerSettings | None,
+    checkpoint: str | os.PathLike[str] | None,
+    progress: Callable[[Progress], object] | None,
+    keep: Callable[[xr.DataTree], object] | None,
 ) -> xr.DataTree:
     """Return the posterior of an experiment; arguments are checked and used as in `infer_contour`."""
+    if rig is not None:
+        refuse_other_rig(rig.attrs, experiment.about)
     settings = settings_of(settings)
     if checkpoint is not None:
         check_path("checkpoint", checkpoint, "give the path of a folder, or None")

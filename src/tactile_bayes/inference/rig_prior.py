@@ -48,9 +48,9 @@ class RigPrior:
         Correlations of the parameters' normal scores.
     error : float
         Largest difference between quantiles of draws and density, along each parameter and each principal axis, in
-        standard deviations.
+        standard deviations; with several records of gauges, that of the worst density.
     source : str
-        SHA-256 of the record of the gauge.
+        SHA-256 of the record of the gauge, or of all of them with blanks between.
     """
 
     priors: Mapping[str, Prior]
@@ -130,10 +130,11 @@ def rig_prior(rig: xr.DataTree) -> RigPrior:
         raise InferenceError("no parameter of the rig lasts beyond its record: infer it with nuisances=['standard']")
     points = np.stack([draws[name].values.ravel() for name in names], axis=1)
     priors = {name: _fitted(name, values) for name, values in zip(names, points.T, strict=True)}
-    found = RigPrior(priors, np.eye(len(names)), 0.0, str(rig.attrs["data_sha256"]))
-    scores = found._scores(points)
+    source = f"{rig.attrs.get('rig_data_sha256', '')} {rig.attrs['data_sha256']}".strip()
+    scores = RigPrior(priors, np.eye(len(names)), 0.0, source)._scores(points)
     correlation = np.atleast_2d(np.corrcoef(scores.T))
-    return RigPrior(priors, correlation, _error(scores, correlation), found.source)
+    error = max(_error(scores, correlation), float(rig.attrs.get("rig_density_error", 0.0)))
+    return RigPrior(priors, correlation, error, source)
 
 
 def refuse_other_rig(rig: Mapping[Any, Any], own: Mapping[str, Any]) -> None:
@@ -142,8 +143,10 @@ def refuse_other_rig(rig: Mapping[Any, Any], own: Mapping[str, Any]) -> None:
     Raises
     ------
     ParameterError
-        If they differ.
+        If they differ, or the rig was inferred from the record of the experiment.
     """
+    if own["data_sha256"] in (rig["data_sha256"], *str(rig.get("rig_data_sha256", "")).split()):
+        raise ParameterError("the rig was inferred from this very record, which would count twice: give another record")
     names = {str(name) for name in (*rig, *own) if str(name).startswith(_SENSES)} - set(_NOISES)
     for name in sorted(names):
         stated, here = rig.get(name, "nothing"), own.get(name, "nothing")
