@@ -11,6 +11,7 @@ from tactile_bayes.checks import check_kind
 from tactile_bayes.contours import Circle, Contour, Parabola, Single
 from tactile_bayes.contours.family import Family, FamilyParameter
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.misfit import GAUGE
 
 __all__ = ["Gauge"]
 
@@ -42,7 +43,7 @@ class Gauge(Family):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        return "gauge"
+        return GAUGE
 
     @property
     def table(self) -> Mapping[str, FamilyParameter]:  # type: ignore[override]
