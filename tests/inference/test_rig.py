@@ -187,6 +187,22 @@ def test_a_stored_posterior_has_the_same_prior():
     np.testing.assert_allclose(model.log_prior(points), given.log_prior(points), atol=0.02)  # six digits of priors
 
 
+def test_its_dependence_counts_as_the_prior_of_the_rig(monkeypatch):
+    """What is left for the likelihood is the likelihood."""
+    from tactile_bayes.assessment import prior_sensitivity as module
+
+    tree, parts = found("rig"), []
+    monkeypatch.setattr(
+        module, "_weights", lambda part, power: parts.append(part) or np.full(part.shape, 1 / part.size)
+    )
+    model = experiment_of(tree).model
+    module.prior_sensitivity(tree, model, {})
+    points = np.stack([tree["posterior"][name].values for name in model.names], axis=-1)
+    expected = model.log_likelihood(points[:, :5].reshape(-1, len(model.names)))
+    offset = parts[-1][:, :5].ravel() - expected
+    np.testing.assert_allclose(offset, offset[0], atol=0.05)  # six digits of priors
+
+
 def test_what_a_record_does_not_show_is_left_out_and_what_it_cannot_tell_is_kept():
     record = read(OBJECT, 2)
     record["holding_moment"] = record.holding_moment * np.nan
