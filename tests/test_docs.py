@@ -122,7 +122,7 @@ COMMANDS = dict(commands_of(PROGRAM)) | {(): PROGRAM}
 
 
 def test_every_command_is_named() -> None:
-    named = re.findall(r"^\| `tactile-bayes ([\w ]+)` \|", TEXTS[DOCS / "commands.md"], flags=re.MULTILINE)
+    named = re.findall(r"^\| `tactile-bayes ([\w -]+)` \|", TEXTS[DOCS / "commands.md"], flags=re.MULTILINE)
     assert set(named) == {" ".join(words) for words in COMMANDS if words}
 
 

@@ -49,6 +49,7 @@ _HOMES = {
     "infer_contacts": "inference.contact_posterior",
     "infer_contour": "inference.contour",
     "infer_point_load": "inference.point_load",
+    "infer_rig": "inference.contour",
     "inspect_record": "diagnostics.inspection",
     "make_record": "record",
     "normal_band": "uncertainty.normal_band",
@@ -89,6 +90,7 @@ if TYPE_CHECKING:
     from tactile_bayes.diagnostics.verdicts import verdicts as verdicts
     from tactile_bayes.inference.contact_posterior import infer_contacts as infer_contacts
     from tactile_bayes.inference.contour import infer_contour as infer_contour
+    from tactile_bayes.inference.contour import infer_rig as infer_rig
     from tactile_bayes.inference.ensembles import SamplerSettings as SamplerSettings
     from tactile_bayes.inference.point_load import infer_point_load as infer_point_load
     from tactile_bayes.inference.result import read_result as read_result

@@ -30,6 +30,24 @@ def test_gains_take_the_place_of_the_rigidity_which_has_the_same_effect():
     assert found.rig.names == ("moment_gain", "force_x_gain", "force_y_gain")
 
 
+def test_a_calibrated_rig_does_not_add_what_is_fixed():
+    from scipy import stats
+
+    from tactile_bayes.inference.rig_prior import RigPrior
+
+    priors = {"rigidity_scale": stats.lognorm(s=0.01), "lever_x": stats.norm(0.0, 0.01)}
+    joint = RigPrior(priors, np.array([[1.0, 0.8], [0.8, 1.0]]), 0.1, "0")
+    found = names_of([], joint=joint)
+    assert found["rigidity_scale as stated"].experiment.rig.names == ("lever_x",)
+    assert found["lever as stated"].experiment.rig.names == ("rigidity_scale",)
+    added = found["backlash inferred"].experiment.rig
+    assert set(added.names) == {"rigidity_scale", "lever_x", "backlash"}
+    assert added.joint is not None
+    assert set(found["family circle"].experiment.rig.names) == set(priors)
+    gains = found["gain inferred for rigidity_scale"].experiment.rig.names
+    assert set(gains) == {"lever_x", "moment_gain", "force_x_gain", "force_y_gain"}
+
+
 def test_friction_that_is_known_is_not_inferred():
     assert "friction inferred" not in names_of([], friction=0.2)
 

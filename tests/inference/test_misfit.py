@@ -51,3 +51,11 @@ def test_a_comparison_in_which_none_fits_names_both():
     words = verdict_on(found)
     assert words.startswith(f"{NONE_FITS} (parabola, circle). ")
     assert words.endswith(what_to_try(["parabola", "circle"], ["rigidity_scale", "friction"]))
+
+
+def test_a_gauge_is_no_family_to_be_exchanged():
+    words = what_to_try(["gauge"], ["rigidity_scale"])
+    assert words.startswith(
+        "It may be the gauge or the rig. Check the size of the gauge and its place from the pivot, or"
+    )
+    assert "family" not in words

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any, NamedTuple
@@ -168,20 +168,28 @@ def alternatives_of(experiment: Experiment) -> list[Alternative]:
         members = {name for name in names if is_inferred(group, [name])}
         left = [name for name in names if name not in members]
         if members:
-            found.append(Alternative(f"{group} as stated", "fixed", _with(experiment, nuisances=left)))
+            found.append(Alternative(f"{group} as stated", "fixed", _of_rig(experiment, left)))
             continue
         label = f"{group} inferred"
         if group == "gain" and "rigidity_scale" in names:  # which has the same effect as all gains
             left.remove("rigidity_scale")
             label += " for rigidity_scale"
         try:
-            other = _with(experiment, nuisances=[*left, group])
+            other = _of_rig(experiment, [*left, group])
             if set(other.rig.names) - set(names):
                 found.append(Alternative(label, "added", other))
         except ParameterError:  # the record cannot identify it, or it is known
             continue
     families = [name for name in SHAPES if name != experiment.family]
     return [*found, *(Alternative(f"family {name}", "family", _with(experiment, family=name)) for name in families)]
+
+
+def _of_rig(experiment: Experiment, nuisances: Sequence[str]) -> Experiment:
+    """Return the experiment with other nuisance parameters, to which the prior of a calibrated rig adds none."""
+    joint = experiment.joint
+    if joint is not None:
+        joint = joint.without(set(joint.priors) - set(nuisances))
+    return _with(experiment, nuisances=nuisances, joint=joint)
 
 
 def _with(experiment: Experiment, **changes: Any) -> Experiment:

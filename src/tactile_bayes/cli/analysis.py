@@ -13,15 +13,18 @@ from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed
 from tactile_bayes.cli.interrupts import acknowledge_interrupt
 from tactile_bayes.cli.record_options import Record, RecordOptions
-from tactile_bayes.cli.rig_options import UnknownOptions
+from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
 from tactile_bayes.cli.sampling_bar import sampling_bar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
+    import xarray as xr
+    from rich.table import Table
+
     from tactile_bayes.runs.contour import ContourRun
 
-__all__ = ["demo", "infer"]
+__all__ = ["demo", "infer", "quantities"]
 
 _STOPPING = "stopping; the draws made so far are checked, plotted and written now (Ctrl-C again discards them)"
 
@@ -40,6 +43,7 @@ def infer(
     ] = "parabola",
     reading: RecordOptions,
     unknown: UnknownOptions,
+    rig: KnownRig = None,
     probability: Annotated[float, typer.Option(help="Probability of band and intervals.", min=0.0, max=1.0)] = 0.95,
     max_steps: Annotated[int, typer.Option(help="Largest number of steps of each walker.", min=1)] = 20_000,
     max_seconds: Annotated[
@@ -63,7 +67,7 @@ def infer(
     from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.contour import analyse
 
-    nuisances = unknown.nuisances
+    nuisances, known = unknown.nuisances, rig_in(rig)
     measured, cell = reading.read(record)
     with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent, max_seconds=max_seconds) as progress:
         run = analyse(
@@ -73,6 +77,7 @@ def infer(
             load_cell=cell,
             friction=unknown.friction,
             nuisances=nuisances,
+            rig=known,
             checkpoint=checkpoint,
             probability=probability,
             seed=seed,
@@ -175,10 +180,8 @@ def _numbers(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, flo
 
 def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float]) -> Iterator[Any]:
     yield from run.verdicts
-    share = f"{run.summary.attrs['probability']:.0%}"
-    heads = ["quantity", *(["truth"] if truth else []), "estimate", f"{share} from", "to", "unit", "R̂", "eff. draws"]
     yield ""
-    yield table_of(heads, _rows(run, truth), left=["quantity", "unit"], may_wrap=True)
+    yield quantities(run.summary, truth)
     attrs = run.posterior.attrs
     if attrs["converged"]:  # else the verdicts contain it
         yield attrs["message"]
@@ -195,8 +198,14 @@ def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float
     yield files
 
 
-def _rows(run: ContourRun, truth: Mapping[str, float]) -> Iterable[list[str]]:
-    numbers = run.summary
+def quantities(numbers: xr.Dataset, truth: Mapping[str, float]) -> Table:
+    """Return the table of a summary, with the true values of a demonstration."""
+    share = f"{numbers.attrs['probability']:.0%}"
+    heads = ["quantity", *(["truth"] if truth else []), "estimate", f"{share} from", "to", "unit", "R̂", "eff. draws"]
+    return table_of(heads, _rows(numbers, truth), left=["quantity", "unit"], may_wrap=True)
+
+
+def _rows(numbers: xr.Dataset, truth: Mapping[str, float]) -> Iterable[list[str]]:
     for name in numbers.quantity.values:
         if name.startswith("z_"):  # a weight of a random function, which has no meaning by itself
             continue

@@ -20,6 +20,7 @@ from tactile_bayes.cli.inspection import inspect
 from tactile_bayes.cli.measurement import measure
 from tactile_bayes.cli.reconstruction import reconstruct
 from tactile_bayes.cli.report import report
+from tactile_bayes.cli.rig_calibration import calibrate_rig
 from tactile_bayes.cli.scanning import scan
 from tactile_bayes.cli.sensitivity import sensitivity
 from tactile_bayes.cli.trust import trust
@@ -126,6 +127,7 @@ _EXAMPLES: dict[Callable[..., Answer], str] = {
     design: "design run/ --base 0.05,0 --base 0.1,0 --out design/",
     figures: "figures --only 3 --distance 0.4 --format pdf --out figures/",
     trust: "trust run/",
+    calibrate_rig: "calibrate-rig gauge.csv --family circle --parameter r=0.01 --parameter q=0.05 --out rig/",
     report: "report run/",
     demo: "demo --out results/demo",
 }

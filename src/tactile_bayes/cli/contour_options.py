@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from tactile_bayes.contours import Contour
 
-__all__ = ["ContourOptions"]
+__all__ = ["ContourOptions", "GaugeOptions"]
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,36 @@ class ContourOptions:
         return enlarged(
             paper_profile(self.profile or "II", q=0.5 if self.distance is None else self.distance), rod_length
         )
+
+
+@dataclass(frozen=True)
+class GaugeOptions:
+    """A gauge: a known contour of a family."""
+
+    family: Annotated[
+        str,
+        typer.Option(help="Shape of the gauge, as for scan: circle, parabola, ellipse, power-law, or two with /."),
+    ]
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Parameter of the gauge in the record's coordinates, exactly known [m, or L]: r=0.01, q=0.05; may be "
+            "repeated. x_c is 0 if it is left out."
+        ),
+    ] = None
+
+    @property
+    def contour(self) -> Contour:
+        """The contour of the gauge.
+
+        Raises
+        ------
+        ParameterError
+            If the family is unknown, or lacks a parameter.
+        ContourError
+            If there is no such contour.
+        """
+        return _of_family(self.family, self.parameter)
 
 
 def _of_family(name: str, options: Sequence[str] | None) -> Contour:

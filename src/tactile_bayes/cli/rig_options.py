@@ -11,10 +11,12 @@ import typer
 from tactile_bayes.cli.numbers import columns_in, numbers_asked
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.mechanics.rod import Rod
 
-__all__ = ["Friction", "NoiseOptions", "RigOptions", "RodOptions", "UnknownOptions"]
+__all__ = ["Friction", "KnownRig", "NoiseOptions", "RigOptions", "RodOptions", "UnknownOptions", "rig_in"]
 
 Friction = Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)]
 
@@ -116,6 +118,30 @@ class RigOptions(RodOptions):
     def pivots(self) -> list[tuple[float, ...]]:
         """Coordinates of the pivots."""
         return [numbers_asked(pivot, "--base", 2) for pivot in self.base or ["0,0"]]
+
+
+KnownRig = Annotated[
+    Path | None,
+    typer.Option(
+        help="rig.nc of calibrate-rig: its posterior is the prior of stiffness, encoder, lever, gains and shape of the "
+        "rod, in place of the default priors; with --as-stated nothing else of the rig is inferred.",
+        dir_okay=False,
+    ),
+]
+"""File of a rig that a gauge has calibrated."""
+
+
+def rig_in(path: Path | None) -> xr.DataTree | None:
+    """Return the posterior of a rig from its file; None without a file.
+
+    Raises
+    ------
+    InferenceError
+        If there is no such file, or it holds no posterior or is damaged.
+    """
+    from tactile_bayes.inference.result import read_result
+
+    return None if path is None else read_result(path)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from tactile_bayes.diagnostics.record_check import Residuals, check_record, resi
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.discrepancy import PARAMETERS
-from tactile_bayes.inference.misfit import CHECK_RIG, is_inferred, what_to_try
+from tactile_bayes.inference.misfit import CHECK_RIG, GAUGE, is_inferred, what_to_try
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
@@ -61,12 +61,12 @@ _CAUSES = {
 def verdicts(
     posterior: xr.DataTree, contacts: xr.Dataset | None = None, trust: xr.Dataset | None = None
 ) -> tuple[str, ...]:
-    """Judge a result of `infer_contour`: what is wrong, the most serious first, or that all is well.
+    """Judge a result of `infer_contour` or `infer_rig`: what is wrong, the most serious first, or that all is well.
 
     Parameters
     ----------
     posterior : xr.DataTree
-        From `infer_contour`.
+        From `infer_contour` or `infer_rig`.
     contacts : xr.Dataset, optional
         From `reconstruct` by method="constrained", whose misfits show whether the loads of a sample agree.
     trust : xr.Dataset, optional
@@ -85,7 +85,7 @@ def verdicts(
     Raises
     ------
     InferenceError
-        If the tree is not a result of `infer_contour` with its record and predictions.
+        If the tree is not such a result with its record and predictions.
 
     Examples
     --------
@@ -199,15 +199,16 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
     channel, cause = (str(score[dim].values[int(place[dim])]) for dim in ("channel", "discrepancy"))
     worst = check.sel(channel=channel)
     unit = "" if str(worst.unit.values) == "1" else f" {worst.unit.values}"
-    family, predictions = posterior.attrs["family"], check.attrs["predictions"]
+    family, predictions = posterior.attrs.get("family", GAUGE), check.attrs["predictions"]
+    described, result = ("gauge", "rig") if family == GAUGE else (f"family {family}", "contour")
     # The share of predictions alone: the record itself is no prediction.
     like = round(float(check.overall_p_value) * (predictions + 1)) - 1
     return (
-        f"The family {family} and the rig as assumed do not describe the record: {like or 'none'} of {predictions} "
+        f"The {described} and the rig as assumed do not describe the record: {like or 'none'} of {predictions} "
         f"records that the posterior predicts {'are' if like > 1 else 'is'} so far off. The worst channel is "
         f"{channel}, {_CAUSES[cause]}; in sweep {int(worst.worst_sweep)} from {_stretch(posterior, worst)} "
         f"it is off the prediction by {float(worst.worst_residual):+.2g}{unit}. "
-        "Do not use this contour. "
+        f"Do not use this {result}. "
         + what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0))
     )
 
@@ -304,7 +305,8 @@ def _beyond_message(beyond: Mapping[str, str]) -> list[str]:
 
 def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[str]:
     draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
-    mute = {*_NOISES, *family_named(posterior.attrs["family"]).roughness}
+    family = posterior.attrs.get("family", GAUGE)
+    mute = {*_NOISES, *(() if family == GAUGE else family_named(family).roughness)}
     names = [str(name) for name in draws.data_vars if name not in mute and name not in known]
     names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
     if not names:

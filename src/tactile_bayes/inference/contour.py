@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.errors import InferenceError, ReachError
+from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
@@ -31,15 +31,17 @@ from tactile_bayes.inference.ensembles import (
     spawn,
 )
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.gauge import Gauge
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import provenance
+from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import CONTACT_SIDES
 
-__all__ = ["Sampled", "contours_of", "infer_contour", "sampled"]
+__all__ = ["Sampled", "contours_of", "infer_contour", "infer_rig", "sampled"]
 
 _PRIOR_SECONDS = 3.0
 """Time limit for draws from the prior [s] if time is limited, since a rod may reach few contours."""
@@ -60,6 +62,7 @@ def infer_contour(
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
     keep: Callable[[xr.DataTree], object] | None = None,
+    rig: xr.DataTree | None = None,
 ) -> xr.DataTree:
     """Return the posterior of a contour's parameters from a whole record, by independent emcee ensembles.
 
@@ -123,6 +126,13 @@ def infer_contour(
     keep : callable, optional
         Called with the posterior as soon as it is drawn, without the derived groups (predictions, events, draws from
         the prior), so that it can be stored before they can fail.
+    rig : xr.DataTree, optional
+        Result of `infer_rig` for the same rig, whose posterior is the prior of the parameters that last: stiffness,
+        encoder offset, backlash, lever, gains, compliance, and the rod's curvature and taper. They are inferred without
+        being named, with their correlations. Zeros, drifts, noise and shifts of pivots belong to a record, and friction
+        to the surfaces of rod and object: they keep their own priors. The attribute `rig_density_error` of the result
+        is the largest difference between quantiles of the rig's draws and of the density fitted to them, along each
+        parameter and principal axis, in standard deviations.
 
     Returns
     -------
@@ -139,11 +149,12 @@ def infer_contour(
     RecordError
         If `measured` is no record.
     ParameterError
-        If the family is unknown, a prior does not belong to a parameter, the seed is no whole number from 0 up, or the
-        load cell has noise on some channels, and none on another.
+        If the family is unknown, a prior does not belong to a parameter, the seed is no whole number from 0 up, the
+        load cell has noise on some channels, and none on another, the rig has another rod, load cell or unit, or there
+        is a prior of a parameter of the rig beside it.
     InferenceError
-        If no sample carries a load, no contour of the family is found that the rod can reach, or the checkpoint is of
-        another run, damaged or in use.
+        If the rig is no result of `infer_rig` or has not converged, no sample carries a load, no contour of the family
+        is found that the rod can reach, or the checkpoint is of another run, damaged or in use.
 
     Notes
     -----
@@ -191,7 +202,102 @@ def infer_contour(
     (True, ['a', 'q', 'x_c', 'noise_scale'])
     """
     given = {} if priors is None else priors
-    experiment = Experiment(measured, family, load_cell, given, rod, friction, nuisances, events)
+    joint = None if rig is None else rig_prior(rig)
+    experiment = Experiment(measured, family, load_cell, given, rod, friction, nuisances, events, joint=joint)
+    return _posterior_of(experiment, rig, seed, settings, checkpoint, progress, keep)
+
+
+def infer_rig(
+    records: xr.Dataset,
+    *,
+    contour: Contour,
+    load_cell: LoadCell | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    seed: Seed,
+    rod: Rod | None = None,
+    friction: float | None = None,
+    nuisances: Sequence[str] = STANDARD,
+    events: bool = True,
+    settings: SamplerSettings | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: Callable[[Progress], object] | None = None,
+    keep: Callable[[xr.DataTree], object] | None = None,
+    rig: xr.DataTree | None = None,
+) -> xr.DataTree:
+    """Return the posterior of a rig's parameters from sweeps along a gauge, whose contour is known.
+
+    Likelihood, priors and sampler are those of `infer_contour`; the contour has no parameters. The result is the prior
+    of `infer_contour(rig=...)`.
+
+    Parameters
+    ----------
+    records : xr.Dataset
+        A record of the gauge, with any number of sweeps, pivots and drives.
+    contour : Contour
+        Contour of the gauge in the coordinates and the unit of length of the record, one of a family. Its shape and
+        its position from the pivot are taken as exact.
+    load_cell, priors, seed, rod, friction, nuisances, events, settings, checkpoint, progress, keep
+        As in `infer_contour`.
+    rig : xr.DataTree, optional
+        Result of `infer_rig` for another record of the same rig, of this gauge or of another one: its posterior is the
+        prior, as in `infer_contour`, so that the result rests on both records. Each has its own zeros, drifts, noise,
+        shifts of pivots and friction.
+
+    Returns
+    -------
+    xr.DataTree
+        As from `infer_contour`, without parameters of a contour. The attribute `gauge` describes it.
+
+    Raises
+    ------
+    RecordError
+        If `records` is no record.
+    ParameterError
+        If the contour is none of a family or holds several, or no parameter of the rig is to be inferred; else as in
+        `infer_contour`.
+    InferenceError
+        As in `infer_contour`.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, scan
+    >>> from tactile_bayes.contours import Circle
+    >>> pin, cell = Circle(r=0.2, q=0.5), LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(pin, drive_step=0.1).record, seed=1)
+    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
+    >>> rig = infer_rig(measured, contour=pin, load_cell=cell, nuisances=["rigidity_scale"], seed=1, settings=quick)
+    >>> list(rig["posterior"].data_vars)
+    ['rigidity_scale', 'noise_scale']
+    """
+    gauge, given = Gauge(contour), {} if priors is None else priors
+    experiment = Experiment(
+        records,
+        load_cell=load_cell,
+        priors=given,
+        rod=rod,
+        friction=friction,
+        nuisances=nuisances,
+        events=events,
+        gauge=gauge,
+        joint=None if rig is None else rig_prior(rig),
+    )
+    if not experiment.rig.names:
+        raise ParameterError("nuisances are empty: name at least one parameter of the rig, like rigidity_scale")
+    return _posterior_of(experiment, rig, seed, settings, checkpoint, progress, keep)
+
+
+def _posterior_of(
+    experiment: Experiment,
+    rig: xr.DataTree | None,
+    seed: Seed,
+    settings: SamplerSettings | None,
+    checkpoint: str | os.PathLike[str] | None,
+    progress: Callable[[Progress], object] | None,
+    keep: Callable[[xr.DataTree], object] | None,
+) -> xr.DataTree:
+    """Return the posterior of an experiment; arguments are checked and used as in `infer_contour`."""
+    if rig is not None:
+        refuse_other_rig(rig.attrs, experiment.about)
     settings = settings_of(settings)
     if checkpoint is not None:
         check_path("checkpoint", checkpoint, "give the path of a folder, or None")

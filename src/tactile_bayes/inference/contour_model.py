@@ -92,6 +92,7 @@ class ContourModel:
         for i, name in enumerate(self.names):
             columns.setdefault(id(priors[name]), []).append(i)
         self._columns = [(log_density_of(priors[self.names[which[0]]]), which) for which in columns.values()]
+        self._jointly = [self.names.index(name) for name in nuisances.joint.priors] if nuisances.joint else []
         rubs = bool(nuisances.friction) or "friction" in nuisances.names
         self.likelihood = RecordLikelihood(
             measured, noise.cell, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
@@ -147,7 +148,8 @@ class ContourModel:
 
     def contours(self, points: Floats) -> Contour:
         """Return the contours of points, with parameters of shape (n,)."""
-        return self.family.build(*points[:, : len(self.family.parameters)].T)
+        built = self.family.build(*points[:, : len(self.family.parameters)].T)
+        return built if built.shape else built.broadcast_to((len(points),))
 
     def values(self, points: Floats) -> dict[str, Floats]:
         """Return the columns of points, shape (n, d), by name; those of the noise may be missing."""
@@ -215,6 +217,8 @@ class ContourModel:
         values = np.zeros(len(points))
         for log_density, columns in self._columns:
             values += log_density(points[:, columns]).sum(axis=1)
+        if self.nuisances.joint is not None:
+            values += self.nuisances.joint.log_dependence(points[:, self._jointly])
         values[~((points > self.low) & (points < self.high)).all(axis=1)] = -np.inf
         return values
 
@@ -256,6 +260,8 @@ class ContourModel:
             if had and deadline.has_passed:
                 break
             points = np.stack([self.priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
+            if self.nuisances.joint is not None:
+                points[:, self._jointly] = self.nuisances.joint.draw(rng, count)
             drawn += count
             points = points[np.isfinite(self.log_prior(points))]
             if len(points):

@@ -15,12 +15,16 @@ from scipy.stats import rv_histogram
 
 from tactile_bayes.checks import check_names, check_optional, check_switch
 from tactile_bayes.contours.families import family_named
+from tactile_bayes.contours.family import Family
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.discrepancy import discrepancy_priors
+from tactile_bayes.inference.gauge import Gauge
 from tactile_bayes.inference.noise import Noise, noise_of
 from tactile_bayes.inference.nuisances import STANDARD, Nuisances, nuisances_of
 from tactile_bayes.inference.priors import Prior, check_priors, refuse_unknown_priors
 from tactile_bayes.inference.priors import default_priors as contour_priors
+from tactile_bayes.inference.rig_prior import RigPrior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import CONTACT_SIDES
@@ -40,6 +44,10 @@ class Experiment:
         Measured record, or a template.
     family, load_cell, priors, rod, friction, nuisances, events
         As in `infer_contour`.
+    gauge : Gauge, optional
+        The known contour, in place of a family.
+    joint : RigPrior, optional
+        Joint prior of the rig's parameters that a calibration has found.
 
     Raises
     ------
@@ -63,6 +71,8 @@ class Experiment:
     friction: float | None = None
     nuisances: Sequence[str] = STANDARD
     events: bool = True
+    gauge: Gauge | None = None
+    joint: RigPrior | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "record", with_rod(validate(self.record), self.rod))
@@ -70,6 +80,9 @@ class Experiment:
         object.__setattr__(self, "events", check_switch("events", self.events))
         check_priors("priors", self.priors)
         object.__setattr__(self, "nuisances", tuple(check_names("nuisances", self.nuisances)))
+        both = sorted(set(self.priors) & set(self.joint.priors)) if self.joint is not None else []
+        if both:
+            raise ParameterError(f"there is a prior of {', '.join(both)} beside that of the rig: leave one of the two")
         more = ", and of the rig moment_gain, friction and so on, which help(infer_contour) lists"
         refuse_unknown_priors(self.priors, self.default_priors, more=more)
 
@@ -85,20 +98,26 @@ class Experiment:
     @cached_property
     def rig(self) -> Nuisances:
         """Nuisance parameters of the rig."""
-        return nuisances_of(self.record, self.nuisances, self.priors, self.noise.cell, self.friction)
+        return nuisances_of(self.record, self.nuisances, self.priors, self.noise.cell, self.friction, self.joint)
+
+    @property
+    def shapes(self) -> Family:
+        """Family of the contour."""
+        return family_named(self.family) if self.gauge is None else self.gauge
 
     @cached_property
     def default_priors(self) -> dict[str, Prior]:
         """Default priors of all parameters: the contour's, the rig's and the noise's."""
         base = float(self.record.base_x.mean()), float(self.record.base_y.mean())
-        of_contour = contour_priors(family_named(self.family), base, rod_of(self.record).length)
+        known = self.gauge is not None
+        of_contour = {} if known else contour_priors(self.shapes, base, rod_of(self.record).length)
         return {**of_contour, **self.rig.priors, **self.noise.priors}
 
     @cached_property
     def model(self) -> ContourModel:
         """Prior times likelihood of all samples."""
         priors = {**self.default_priors, **self.priors}
-        return ContourModel(self.record, family_named(self.family), self.rig, self.noise, priors)
+        return ContourModel(self.record, self.shapes, self.rig, self.noise, priors)
 
     @property
     def about(self) -> dict[str, Any]:
@@ -106,7 +125,7 @@ class Experiment:
         attrs, cell = self.record.attrs, self.noise.cell
         return {
             "data_sha256": record_hash(self.record),
-            "family": self.family,
+            **({"family": self.family} if self.gauge is None else {"gauge": repr(self.gauge.known)}),
             "friction": self.rig.friction,
             "nuisances": json.dumps((*self.rig.names, *self.noise.of_discrepancy)),
             "events": int(self.events),
@@ -115,6 +134,7 @@ class Experiment:
             "load_cell_frame": frame_of(self.record),
             **{name: attrs[name] for name in (CONTACT_SIDES,) if name in attrs},
             **rod_attributes(rod_of(self.record)),
+            **({} if self.rig.joint is None else self.rig.joint.entries),
             "approximations": "; ".join(cell.approximations),
             **{f"load_cell_{name}": v for name, v in cell.entries().items() if name not in self.noise.inferred},
         }

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-__all__ = ["CHECK_RIG", "is_inferred", "what_to_try"]
+__all__ = ["CHECK_RIG", "GAUGE", "is_inferred", "what_to_try"]
 
 CHECK_RIG = (
     "check the rod (length, flexural rigidity, rest curvature, taper), unit, sign and axes of each load, the zero of "
     "the drive angle and its backlash, the point where the load cell takes its moment, and the friction"
 )
 """Advice if loads contradict one another for any contour: the cause is the rig."""
+
+GAUGE = "gauge"
+"""Name of the family of a gauge, whose contour is known."""
 
 _SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance", "rest_curvature", "taper")
 """Nuisance parameters, or groups of them, that may cause a misfit."""
@@ -42,7 +45,7 @@ def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, f
     Parameters
     ----------
     families : collection of str
-        Families that were tried.
+        Families that were tried, or `GAUGE`.
     nuisances : collection of str
         Nuisance parameters that were inferred: they are not suggested again.
     friction : float
@@ -60,5 +63,7 @@ def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, f
     instead = " in place of rigidity_scale"  # which measures the same as all gains
     named = [f"{name}{instead}" if name == "gain" and "rigidity_scale" in nuisances else name for name in left]
     more = f", or infer more of the rig (--nuisance {', '.join(named)})" if named else ""
+    if GAUGE in families:
+        return f"It may be the gauge or the rig. Check the size of the gauge and its place from the pivot{more}."
     others = "another family (compare)" if _SMOOTH in families else "another family (--family shape-free, or compare)"
     return f"It may be the family or the rig. Try {others}{more}."

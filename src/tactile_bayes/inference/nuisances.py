@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -22,6 +22,9 @@ from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
+
+if TYPE_CHECKING:
+    from tactile_bayes.inference.rig_prior import RigPrior
 
 __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
 
@@ -97,6 +100,8 @@ class Nuisances:
         Coulomb's coefficient if it is not inferred.
     elapsed : ndarray, shape (samples,)
         Position of each sample in the record, linear from the first (−½) to the last (½), for drift.
+    joint : RigPrior, optional
+        Joint prior of the parameters that a calibration of the rig has found; their `priors` are its marginals.
     """
 
     names: tuple[str, ...]
@@ -104,6 +109,7 @@ class Nuisances:
     rod: Rod
     friction: float
     elapsed: Floats = field(default_factory=lambda: np.zeros(1))
+    joint: RigPrior | None = None
     units: Mapping[str, float] = field(init=False)
     """Unit of each parameter in dimensionless calculations, in the record's units."""
 
@@ -191,7 +197,12 @@ def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
 
 
 def nuisances_of(
-    measured: xr.Dataset, chosen: Sequence[str], priors: Mapping[str, Prior], cell: LoadCell, friction: float | None
+    measured: xr.Dataset,
+    chosen: Sequence[str],
+    priors: Mapping[str, Prior],
+    cell: LoadCell,
+    friction: float | None,
+    joint: RigPrior | None = None,
 ) -> Nuisances:
     """Return the nuisance parameters that are chosen by name or have a prior, with default priors.
 
@@ -211,6 +222,9 @@ def nuisances_of(
         In the record's units.
     friction : float, optional
         Coulomb's coefficient if it is known.
+    joint : RigPrior, optional
+        Joint prior from a calibration of the rig. Its parameters are inferred, and need not be identifiable from this
+        record, except those that no measured channel shows, which are left out.
 
     Raises
     ------
@@ -219,15 +233,22 @@ def nuisances_of(
     """
     chosen = [name for name in check_names("nuisances", chosen) if not is_discrepancy(name)]
     unidentifiable = _unidentifiable(measured)
+    present = [_SHORT[name] for name in present_channels(measured)]
+    every_gain = [f"{name}_gain" for name in present]
+    if joint is not None:
+        joint = joint.without([name for name in joint.priors if not _is_shown(name, present)])
+    found = set(joint.priors) if joint is not None else set()
     known = set() if friction is None else {"friction"}
+    if set(every_gain) <= found:
+        known.add("rigidity_scale")
     standard = [name for name in STANDARD if name not in unidentifiable.keys() | known]
     if tuple(chosen) == STANDARD:
         chosen = [_STANDARD]
     chosen = [each for name in chosen for each in (standard if name == _STANDARD else [name])]
-    present = [_SHORT[name] for name in present_channels(measured)]
     uncertain = dict(zip(_GROUPS["bias"], cell.bias_uncertainty, strict=True))
     names: list[str] = []
-    for name in (*chosen, *(name for name in priors if name in _KINDS or _BASE.fullmatch(name))):
+    of_priors = (name for name in priors if name in _KINDS or _BASE.fullmatch(name))
+    for name in (*chosen, *of_priors, *(joint.priors if joint is not None else ())):
         if name in ("base", "base_x", "base_y") or _BASE.fullmatch(name):
             names += _bases_off(name, measured)
             continue
@@ -236,7 +257,7 @@ def nuisances_of(
                 f"there is no nuisance parameter {name!r}: choose from "
                 f"{', '.join([_STANDARD, *_GROUPS, *_KINDS, DISCREPANCY])}, or base"
             )
-        if name in unidentifiable:
+        if name in unidentifiable and name not in found:
             raise ParameterError(f"{name} cannot be inferred: {unidentifiable[name]}")
         members = [n for n in _GROUPS[name] if _is_measured(n, present)] if name in _GROUPS else [name]
         for member in members:
@@ -255,7 +276,6 @@ def nuisances_of(
     check_number("friction", friction, f"give a coefficient from 0 to {most:.2f}", least=0.0, most=most)
     if "friction" in names and friction:
         raise ParameterError(f"friction is {friction!r} and to be inferred as well: leave one of the two")
-    every_gain = [f"{name}_gain" for name in present]
     if "rigidity_scale" in names and set(every_gain) <= set(names):
         raise ParameterError(
             f"rigidity_scale and {', '.join(every_gain)} cannot all be inferred: a stiffer rod and larger gains "
@@ -271,7 +291,9 @@ def nuisances_of(
     if "taper" in defaults:
         ends = ((end - rod.taper) / _TAPER for end in nuisances.bounds("taper"))
         defaults["taper"] = stats.truncnorm(*ends, loc=rod.taper, scale=_TAPER)
-    return replace(nuisances, priors=defaults)
+    if joint is None or not found:
+        return replace(nuisances, priors=defaults)
+    return replace(nuisances, priors={**defaults, **joint.priors}, joint=joint)
 
 
 def _unidentifiable(measured: xr.Dataset) -> dict[str, str]:
@@ -294,6 +316,11 @@ def _is_measured(name: str, present: Sequence[str]) -> bool:
     """Return True if the channel of a parameter, if any, was measured."""
     channel, _, what = name.rpartition("_")
     return channel in present or name not in _GROUPS.get(what, ())
+
+
+def _is_shown(name: str, present: Sequence[str]) -> bool:
+    """Return True if a measured channel depends on a parameter."""
+    return _is_measured(name, present) and (name not in _GROUPS["lever"] or "moment" in present)
 
 
 def _bases_off(name: str, measured: xr.Dataset) -> list[str]:

@@ -16,8 +16,9 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.experiment import Experiment, prior_in_words
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import contour_draws, record_of
+from tactile_bayes.inference.rig_prior import RigPrior
 
-__all__ = ["experiment_of", "points_of", "predicted_points"]
+__all__ = ["experiment_of", "joint_of", "points_of", "predicted_points"]
 
 _WORDS = re.compile(r"(\w+)\((.*)\)")
 
@@ -60,10 +61,13 @@ def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = N
         friction=float(attrs["friction"]),
         nuisances=json.loads(attrs["nuisances"]),
         events=bool(attrs.get("events", 1)),
+        joint=joint_of(attrs),
     )
     default, given = experiment.default_priors, {} if priors is None else dict(priors)
     own: dict[str, Prior] = {}
     for name, words in json.loads(attrs["priors"]).items():
+        if experiment.joint is not None and name in experiment.joint.priors:
+            continue
         if name in given or name not in default or prior_in_words(default[name]) != words:
             own[name] = given.get(name) or _distribution(name, words)
             if prior_in_words(own[name]) != words:
@@ -75,7 +79,17 @@ def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = N
         friction=experiment.friction,
         nuisances=experiment.nuisances,
         events=experiment.events,
+        joint=experiment.joint,
     )
+
+
+def joint_of(attrs: Mapping[Any, Any]) -> RigPrior | None:
+    """Return the joint prior of the rig that the attributes of a posterior state; None without."""
+    if "rig_parameters" not in attrs:
+        return None
+    words = json.loads(attrs["priors"])
+    own = {name: _distribution(name, words[name]) for name in json.loads(attrs["rig_parameters"])}
+    return RigPrior.from_entries(attrs, own)
 
 
 def points_of(posterior: xr.DataTree, names: tuple[str, ...]) -> Floats:

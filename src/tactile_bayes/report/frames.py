@@ -15,6 +15,7 @@ from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, record_of
+from tactile_bayes.inference.stored_experiment import joint_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
@@ -95,7 +96,9 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     contour = contours_of(draw, posterior.attrs["family"])
     cell = LoadCell.from_record(record) or LoadCell()
     friction = float(posterior.attrs["friction"])
-    nuisances = nuisances_of(record, json.loads(posterior.attrs["nuisances"]), {}, cell, friction)
+    nuisances = nuisances_of(
+        record, json.loads(posterior.attrs["nuisances"]), {}, cell, friction, joint_of(posterior.attrs)
+    )
     rig = nuisances.rig({name: np.atleast_1d(draw[name].values) for name in nuisances.names})
     likelihood = RecordLikelihood(record, cell, friction)
     paths = likelihood.paths(contour, rig)

@@ -14,6 +14,9 @@ from tactile_bayes.load_cell import LoadCell
 
 __all__ = ["command_of", "hindrances", "python_lines"]
 
+_RIG = "rig_parameters"
+"""Attribute of a posterior whose prior is that of a calibrated rig."""
+
 
 def command_of(attrs: Mapping[Any, Any]) -> str:
     """Return the shell command that made the run; "" if the posterior does not state it."""
@@ -51,6 +54,7 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
         f"friction={float(attrs['friction'])!r}",
         f"nuisances={json.dumps(json.loads(attrs['nuisances']))}",
         *(["events=False"] if not attrs.get("events", 1) else []),
+        *(['rig=tb.read_result("rig.nc")'] if _RIG in attrs else []),
         f"seed={_seed(seed)}",
         "settings=tb.SamplerSettings(",
         *(f"    {name}={value!r}," for name, value in settings.items()),
@@ -84,7 +88,10 @@ def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
         found.append("The run was interrupted: without an interrupt it makes more steps.")
     usual = default_priors(record, attrs["family"], LoadCell.from_record(record), json.loads(attrs["nuisances"]))
     words = {name: prior_in_words(prior) for name, prior in usual.items()}
-    own = [name for name, said in json.loads(attrs["priors"]).items() if words.get(name) != said]
+    of_rig = json.loads(attrs.get(_RIG, "[]"))
+    own = [name for name, said in json.loads(attrs["priors"]).items() if words.get(name) != said and name not in of_rig]
+    if of_rig:
+        found.append("The rig is read from the file that calibrate-rig wrote, here rig.nc: give its path.")
     if own:
         found.append(f"Priors of your own have to be given again: priors={{…}} for {', '.join(own)}.")
     if not attrs.get("events", 1):

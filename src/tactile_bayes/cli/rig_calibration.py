@@ -1,0 +1,75 @@
+"""The command `calibrate-rig`: the rig, from records of a gauge whose contour is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tactile_bayes.cli.analysis import quantities
+from tactile_bayes.cli.answer import Answer, columns_of
+from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.contour_options import GaugeOptions
+from tactile_bayes.cli.record_options import RecordOptions
+from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
+from tactile_bayes.cli.sampling_bar import sampling_bar
+
+if TYPE_CHECKING:
+    from tactile_bayes.runs.rig import RigRun
+
+__all__ = ["calibrate_rig"]
+
+
+def calibrate_rig(
+    *,
+    record: Annotated[
+        list[Path],
+        typer.Argument(help="Records of the gauge, .csv or .nc, each with its own zeros and its pivots."),
+    ],
+    out: Out,
+    gauge: GaugeOptions,
+    reading: RecordOptions,
+    unknown: UnknownOptions,
+    rig: KnownRig = None,
+    probability: Annotated[float, typer.Option(help="Probability of the intervals.", min=0.0, max=1.0)] = 0.95,
+    max_steps: Annotated[int, typer.Option(help="Largest number of steps of each walker.", min=1)] = 20_000,
+    seed: Seed = 1,
+    output: Output,
+) -> Answer:
+    """Calibrate the rig on a gauge: infer stiffness, encoder, lever and the like from sweeps along a known contour.
+
+    infer --rig takes the result over. With --rig, records of another gauge or place add to a former calibration.
+    """
+    from tactile_bayes.inference.ensembles import SamplerSettings
+    from tactile_bayes.runs.rig import calibrate_rig_into
+
+    contour, nuisances, known = gauge.contour, unknown.nuisances, rig_in(rig)
+    records = [reading.read(path) for path in record]
+    with sampling_bar(output.is_silent) as progress:
+        run = calibrate_rig_into(
+            out,
+            records,
+            contour=contour,
+            probability=probability,
+            rig=known,
+            friction=unknown.friction,
+            nuisances=nuisances,
+            seed=seed,
+            settings=SamplerSettings(max_steps=max_steps),
+            progress=progress,
+        )
+    return Answer([*run.messages, "", quantities(run.summary, {}), "", run.files], lambda: _numbers(run))
+
+
+def _numbers(run: RigRun) -> dict[str, Any]:
+    attrs = run.result.attrs
+    return {
+        "words": run.messages,
+        "converged": bool(attrs["converged"]),
+        "message": attrs["message"],
+        "gauge": attrs["gauge"],
+        "probability": run.summary.attrs["probability"],
+        "quantities": columns_of(run.summary, "quantity"),
+        "files": run.files,
+    }

@@ -1,0 +1,110 @@
+"""The command `calibrate-rig`, and `infer --rig`, which takes its result over."""
+
+import json
+
+import numpy as np
+import pytest
+
+from helpers.commands import assert_misused, assert_refused, call
+from helpers.contour_posteriors import CELL, swept
+from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.inference.result import read_result
+from tactile_bayes.record import write_record
+
+PIN = ("--family", "circle", "--parameter", "r=0.2", "--parameter", "q=0.5")
+ONE = ("--nuisance", "rigidity_scale", "--quiet")
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    """Records of a pin from two pivots, and of a parabola, by a rod that is 4 % stiffer than stated."""
+    folder = tmp_path_factory.mktemp("records")
+    sources = {
+        "pin": swept(Circle(r=0.2, q=0.5), step=0.05),
+        "again": swept(Circle(r=0.2, q=0.5), step=0.05, bases=((0.1, 0.15),)),
+        "object": swept(Parabola(0.7, 0.45), step=0.05),
+    }
+    for seed, (name, ideal) in enumerate(sources.items(), start=1):
+        for channel in ("holding_moment", "force_x", "force_y"):
+            ideal[channel] = 1.04 * ideal[channel]
+        write_record(CELL.measure(ideal, seed=seed), folder / f"{name}.nc")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def calibrated(records, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rig") / "made"
+    return call("calibrate-rig", records / "pin.nc", *PIN, "--out", folder, *ONE), folder
+
+
+def test_words_come_first_then_the_table_then_the_files(calibrated):
+    result, folder = calibrated
+    assert result.exit_code == 0, result.output
+    words, table, files = result.stdout.split("\n\n")
+    assert words.startswith("All is well: the ensembles agree")
+    assert words.splitlines()[-1].startswith("infer --rig takes over rigidity_scale, as a density")
+    rows = {line.split()[0]: line.split()[1:] for line in table.splitlines()}
+    assert list(rows) == ["quantity", "rigidity_scale", "noise_scale"]
+    estimate, low, high = map(float, rows["rigidity_scale"][:3])
+    assert low < estimate < high
+    assert abs(estimate - 1.04) < 1.5 * (high - low)  # six standard deviations
+    assert {path.name for path in folder.iterdir()} == {"rig.nc", "summary.txt", "summary.csv"}
+    assert {line.split(maxsplit=1)[1] for line in files.splitlines()} == {str(path) for path in folder.iterdir()}
+    assert (folder / "summary.txt").read_text(encoding="utf-8").startswith(words)
+
+
+def test_several_records_add_up(records, calibrated, tmp_path):
+    """At once, or one after the other with --rig: the same numbers."""
+    asked = ("calibrate-rig", records / "pin.nc", records / "again.nc", *PIN, *ONE, "--json")
+    at_once = call(*asked, "--out", tmp_path / "both")
+    added = call("calibrate-rig", asked[2], *PIN, *ONE, "--rig", calibrated[1] / "rig.nc", "--out", tmp_path / "added")
+    assert at_once.exit_code == added.exit_code == 0, at_once.output + added.output
+    said = json.loads(at_once.stdout)
+    assert [word[:10] for word in said["words"][:2]] == ["Record 1: ", "Record 2: "]
+    assert said["converged"]
+    assert said["gauge"] == repr(Circle(r=0.2, q=0.5))
+    assert said["files"]["rig"] == str(tmp_path / "both" / "rig.nc")
+    both, after, first = (
+        read_result(folder / "rig.nc") for folder in (tmp_path / "both", tmp_path / "added", calibrated[1])
+    )
+    assert both.attrs["rig_data_sha256"] == first.attrs["data_sha256"]
+    np.testing.assert_array_equal(both["posterior"].rigidity_scale, after["posterior"].rigidity_scale)
+    # The second record has as many sweeps as the first: the deviation falls by about the root of two.
+    assert both["posterior"].rigidity_scale.std() < 0.85 * first["posterior"].rigidity_scale.std()
+
+
+@pytest.mark.usefixtures("quick")
+def test_infer_takes_the_rig_over(records, calibrated, tmp_path):
+    folder = calibrated[1]
+    options = ("--as-stated", "--rig", folder / "rig.nc", "--out", tmp_path, "--quiet")
+    result = call("infer", records / "object.nc", *options)
+    assert result.exit_code == 0, result.output
+    run = read_result(tmp_path / "posterior.nc")
+    assert list(run["posterior"].data_vars) == ["a", "q", "x_c", "rigidity_scale", "noise_scale"]
+    assert run.attrs["rig_data_sha256"] == read_result(folder / "rig.nc").attrs["data_sha256"]
+    page = call("report", tmp_path)
+    assert page.exit_code == 0, page.output
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "The rig is read from the file that calibrate-rig wrote" in text
+    assert "Priors of your own" not in text
+
+
+def test_a_wrong_gauge_is_the_first_thing_said(records, tmp_path):
+    wrong = ("--family", "circle", "--parameter", "r=0.3", "--parameter", "q=0.5")
+    result = call("calibrate-rig", records / "pin.nc", *wrong, "--out", tmp_path, *ONE)
+    assert result.exit_code == 0, result.output
+    first = result.stdout.splitlines()[0]
+    assert first.startswith("The gauge and the rig as assumed do not describe the record: ")
+    assert "Do not use this rig. It may be the gauge or the rig. Check the size of the gauge and its place" in first
+
+
+def test_what_is_not_possible_is_refused(records, calibrated, tmp_path):
+    pin, out = records / "pin.nc", ("--out", tmp_path / "no", *ONE)
+    assert_refused(call("calibrate-rig", pin, *PIN[:4], *out), "give --parameter q=... as well")
+    assert_refused(call("calibrate-rig", pin, *PIN, "--out", tmp_path, "--as-stated"), "name at least one parameter")
+    twice = call("calibrate-rig", pin, *PIN, "--rig", calibrated[1] / "rig.nc", *out)
+    assert_refused(twice, "was inferred from this very record")
+    absent = call("infer", pin, "--rig", tmp_path / "rig.nc", *out)
+    assert_refused(absent, f"there is no file {tmp_path / 'rig.nc'}")
+    assert_misused(call("calibrate-rig", pin, *out), "Missing option '--family'")
+    assert not (tmp_path / "no").exists()
