@@ -11,6 +11,7 @@ from scipy import stats
 
 from helpers.contour_posteriors import CELL, QUICK, SOUND, assert_near, swept
 from helpers.refusals import refused
+from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.contours import Circle, Parabola, from_function
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import infer_contour, infer_rig
@@ -185,6 +186,20 @@ def test_a_stored_posterior_has_the_same_prior():
     points = np.array([[0.7, 0.45, 0.0, *TRUE.values(), 1.0]])
     given = Experiment(read(OBJECT, 2), load_cell=CELL, nuisances=(), joint=rig_prior(rig())).model
     np.testing.assert_allclose(model.log_prior(points), given.log_prior(points), atol=0.02)  # six digits of priors
+
+
+def test_families_are_compared_with_the_rig():
+    """One parameter has no correlations: its prior given by hand has the same evidence, up to the error of bridges."""
+    record, alone = read(OBJECT, 2), drawn(("rigidity_scale",))
+    priors = dict.fromkeys(("parabola", "circle"), rig_prior(alone).priors)
+    known = {"families": list(priors), "load_cell": CELL, "nuisances": (), "leave_one_out": False, "seed": 1}
+    with_rig = compare_families(record, rig=alone, settings=SOUND, **known)
+    by_hand = compare_families(record, priors=priors, settings=SOUND, **known)
+    assert with_rig.attrs["most_probable"] == "parabola"
+    evidences = (one["log_evidence"].sel(family="parabola") for one in (with_rig, by_hand))
+    assert abs(float(next(evidences) - next(evidences))) < 0.2
+    with refused(ParameterError, "rod_length"):
+        compare_families(record, rig=drawn(rod_length=0.1), settings=QUICK, **known)
 
 
 def test_its_dependence_counts_as_the_prior_of_the_rig(monkeypatch):

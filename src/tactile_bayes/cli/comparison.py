@@ -9,7 +9,7 @@ import typer
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed
 from tactile_bayes.cli.record_options import Record, RecordOptions
-from tactile_bayes.cli.rig_options import UnknownOptions
+from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
 from tactile_bayes.cli.sampling_bar import sampling_bar
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def compare(
     ] = None,
     reading: RecordOptions,
     unknown: UnknownOptions,
+    rig: KnownRig = None,
     leave_one_out: Annotated[
         bool,
         typer.Option(
@@ -58,7 +59,7 @@ def compare(
     from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.comparison import compare_into
 
-    nuisances = unknown.nuisances
+    nuisances, known = unknown.nuisances, rig_in(rig)
     measured, cell = reading.read(record)
     with sampling_bar(output.is_silent, max_seconds=max_seconds) as show:
 
@@ -73,6 +74,7 @@ def compare(
             load_cell=cell,
             friction=unknown.friction,
             nuisances=nuisances,
+            rig=known,
             leave_one_out=leave_one_out,
             seed=seed,
             settings=SamplerSettings(max_seconds=max_seconds),

@@ -31,6 +31,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.matched_priors import matched_priors
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.numerics.selection import evenly_spread
@@ -84,6 +85,7 @@ def compare_families(
     false_alarm: float = 1e-3,
     settings: SamplerSettings | None = None,
     progress: Callable[[str, Progress], object] | None = None,
+    rig: xr.DataTree | None = None,
 ) -> xr.Dataset:
     """Compare families of contours for a record, and return the probability of each.
 
@@ -113,6 +115,8 @@ def compare_families(
         Settings of the sampler for every posterior.
     progress : callable, optional
         Called with a family and a `Progress` after each diagnosis.
+    rig : xr.DataTree, optional
+        Result of `infer_rig`, as for `infer_contour`, the same for all families.
 
     Returns
     -------
@@ -191,7 +195,10 @@ def compare_families(
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
     check_function("progress", progress)
     names = _checked(families, priors)
-    experiment = Experiment(measured, SHAPE_FREE.name, load_cell, {}, rod, friction, nuisances)
+    joint = None if rig is None else rig_prior(rig)
+    experiment = Experiment(measured, SHAPE_FREE.name, load_cell, {}, rod, friction, nuisances, joint=joint)
+    if rig is not None:
+        refuse_other_rig(rig.attrs, experiment.about)
     length = rod_of(experiment.record).length
     seeds = dict(zip(names, spawn(seed, len(names)), strict=True))
     tried: dict[str, _Tried] = {}
