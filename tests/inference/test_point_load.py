@@ -220,7 +220,7 @@ def test_known_parameters_are_left_out_and_seeds_count():
     ("wrong", "kind", "named"),
     [
         ({"axial": np.zeros(31)}, ParameterError, ["length"]),
-        ({"lateral": np.where(np.arange(32) == 3, np.nan, made_up_readings(5)[1])}, ParameterError, ["lateral[3]"]),
+        ({"lateral": np.where(np.arange(32) == 3, np.nan, probe_points()[1])}, ParameterError, ["lateral[3]"]),
         ({name: np.ones(9) for name in ("axial", "lateral", "reading")}, ParameterError, [10]),
         ({"reading": np.ones(32)}, ParameterError, ["readings", "same"]),
         ({"priors": {"clamp_axail": 1.0}}, ParameterError, ["clamp_axail"]),
