@@ -138,7 +138,7 @@ def test_a_misfit_of_a_carried_sweep_is_placed_by_its_travel(carried, tmp_path):
     measured, _ = carried
     record = tb.read_record(measured)
     bent = tmp_path / "bent.csv"
-    tb.write_record(record.assign(force_y=record.force_y + 0.3 * np.sin(40.0 * record.base_x)), bent)
+    tb.write_record(record.assign(force_y=record.force_y + 0.15 * np.sin(40.0 * record.base_x)), bent)
     result = call("infer", bent, "--family", "circle", "--as-stated", "--out", tmp_path / "run")
     assert "do not describe the record" in result.stdout
     assert " L of travel it is off" in result.stdout.replace("\n", " ")

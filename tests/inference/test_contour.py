@@ -419,7 +419,7 @@ def test_a_prior_that_ends_before_what_the_record_wants_is_named():
     record, deviation = coarse(), 3e-4  # by Fisher information
     narrow = {"q": stats.uniform(TRUTH["q"] - 0.2, 0.15)}
     with pytest.raises(InferenceError, match=r"q = 0\.\d+ .*0\.\d+ to 0\.\d+"):
-        infer_contour(record, priors=narrow, nuisances=[], seed=1, settings=BRIEF)
+        infer_contour(measured(), priors=narrow, nuisances=[], seed=1, settings=BRIEF)
     edged = {"q": stats.uniform(TRUTH["q"] - 0.2, 0.2 - deviation)}
     found = infer_contour(record, priors=edged, nuisances=[], seed=1, settings=BRIEF)
     assert float(found["posterior"].q.max()) < TRUTH["q"] - deviation

@@ -77,7 +77,7 @@ def test_a_posterior_of_a_carried_rod_finds_the_circle():
         nuisances=[],
         friction=0.0,
         seed=1,
-        settings=tb.SamplerSettings(walkers=32),
+        settings=tb.SamplerSettings(ensembles=2, walkers=32, min_ess=400, max_r_hat=1.05),
     )
     for name, true in (("r", 0.3), ("q", 0.8), ("x_c", 0.0)):
         draws = posterior["posterior"][name].values

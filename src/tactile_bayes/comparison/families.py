@@ -183,7 +183,7 @@ def compare_families(
     >>> from tactile_bayes import LoadCell, SamplerSettings, scan
     >>> from tactile_bayes.contours import Circle
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(Circle(0.8, q=0.5), drive_step=0.1).record, seed=1)
+    >>> measured = cell.measure(scan(Circle(1.0, q=0.5), drive_step=0.04).record, seed=1)
     >>> quick = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.1)
     >>> options = {"load_cell": cell, "nuisances": [], "leave_one_out": False, "settings": quick}
     >>> found = compare_families(measured, families=["circle", "ellipse", "parabola"], seed=1, **options)

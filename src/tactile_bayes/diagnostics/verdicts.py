@@ -92,7 +92,7 @@ def verdicts(
     >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.02, moment_noise=0.008)
-    >>> measured = cell.measure(scan(paper_profile("IV", q=0.3), drive_step=0.03).record, seed=1)
+    >>> measured = cell.measure(scan(paper_profile("III", q=0.5), drive_step=0.03).record, seed=1)
     >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=50)
     >>> found = verdicts(infer_contour(measured, load_cell=cell, nuisances=[], seed=1, settings=quick))
     >>> print(found[0].split(":")[0])
