@@ -10,6 +10,7 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import amplification
+from tactile_bayes.planning.candidate import Candidate
 from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 
@@ -77,3 +78,22 @@ def test_drives_are_candidates_of_a_design():
     assert float(pivot.width[0]) == pytest.approx(float(found.width[2]), rel=1e-12)
     with refused(ParameterError, "drive"):
         tb.design("circle", drives=["left"], **options)
+
+
+def test_a_posterior_of_a_carried_rod_is_what_is_known():
+    """Its drive is none of the pivots so far, and what it touched leaves no gap."""
+    measured = CELL.measure(tb.scan(CIRCLE, drive=SHIFTS[0], drive_step=0.04).record, seed=1)
+    settings = tb.SamplerSettings(walkers=32, ensembles=2)
+    posterior = tb.infer_contour(
+        measured, family="circle", load_cell=CELL, nuisances=[], friction=0.0, seed=1, settings=settings
+    )
+    found = tb.design(posterior, drives=[SHIFTS[1]], bases=[(0.0, 0.0)], draws=4, seed=1)
+    assert found.sizes["pivot"] == 0
+    assert np.all(found.width < found.present_width)
+    assert np.all(found.gap == 0.0)
+
+
+def test_candidates_that_begin_alike_are_told_apart():
+    turns = [tb.Rotation(), tb.Rotation((0.1, 0.0))], [tb.Rotation(), tb.Rotation((0.2, 0.0))]
+    one, other = (Candidate(tuple(drives), 0.05).described for drives in turns)
+    assert one != other

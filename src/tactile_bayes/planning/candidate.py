@@ -54,7 +54,7 @@ class Candidate:
     @property
     def described(self) -> dict[str, Any]:
         """Everything that it consists of, as JSON has it."""
-        if all(isinstance(drive, Rotation) for drive in self.drives):
+        if self.is_pivot:
             return {"base": self.base, "drive_step": self.drive_step}
         drives = [drive.poses.tolist() if isinstance(drive, Carried) else drive.base for drive in self.drives]
         return {"drives": drives, "drive_step": self.drive_step}
@@ -229,7 +229,7 @@ def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats
 
 def _gaps(known: Knowledge, candidate: Candidate, usable: Flags) -> Floats:
     """Return the width that no sweep touches between the outermost first contacts, for each usable draw."""
-    model = known.model_from([*map(Rotation, known.bases), *candidate.drives], COARSE)
+    model = known.model_from([*known.drives, *candidate.drives], COARSE)
     points = known.of(model).points[usable]
     if not len(points):
         return np.array([np.nan])

@@ -309,7 +309,7 @@ def _identity(question: Question) -> dict[str, str]:
     known = question.known
     return known.experiment.assumptions | {
         "what is known": hashlib.sha256(known.points.tobytes()).hexdigest(),
-        "bases": json.dumps(known.bases),
+        "drives": json.dumps(Candidate(known.drives, COARSE).described),
         "candidates": json.dumps([candidate.described for candidate in question.candidates]),
         "span": json.dumps([float(question.x[0]), float(question.x[-1])]),
         "probability": repr(question.probability),

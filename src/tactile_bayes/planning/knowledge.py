@@ -21,7 +21,7 @@ from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import carried_sweeps, rod_of
-from tactile_bayes.sweep import Drive, Rotation, record_template
+from tactile_bayes.sweep import Drive, Rotation, record_template, recorded_drives
 
 __all__ = ["COARSE", "Base", "Knowledge", "empty_record", "known_from_posterior", "known_from_prior"]
 
@@ -38,19 +38,24 @@ class Knowledge:
     Attributes
     ----------
     experiment : Experiment
-        Experiment on an empty record from the pivots so far, or from the origin if there are none.
+        Experiment on an empty record of the drives so far, or of a rotation about the origin if there are none.
     points : ndarray, shape (n, d)
         Draws of the contour's parameters, the rig's and the noise's, in the order of the names of `model`.
     precision : ndarray, shape (d, d)
         Inverse of the covariance of the draws.
-    bases : tuple of (float, float)
-        Pivots of the sweeps so far [length].
+    drives : tuple of Rotation or Carried
+        Drives of the sweeps so far.
     """
 
     experiment: Experiment
     points: Floats
     precision: Floats
-    bases: tuple[Base, ...]
+    drives: tuple[Drive, ...]
+
+    @property
+    def bases(self) -> tuple[Base, ...]:
+        """Pivots of the sweeps so far [length]."""
+        return tuple(drive.base for drive in self.drives if isinstance(drive, Rotation))
 
     @property
     def rod(self) -> Rod:
@@ -138,20 +143,19 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
     cell = LoadCell.from_record(record) or LoadCell()
     unknown: dict[str, Any] = {n: float(samples[n].mean()) for n in ("force_noise", "moment_noise") if n in samples}
     cell = replace(cell, **unknown)
-    pairs = np.unique(np.column_stack([record.base_x.values, record.base_y.values]), axis=0)
     names = [str(name) for name in samples.data_vars if name not in unknown]
     columns = {name: samples[name].values.ravel() for name in names}
     if unknown:
         columns["noise_scale"] = np.ones(samples[next(iter(unknown))].size)
     nuisances = [name for name in json.loads(attrs.get("nuisances", "[]")) if not name.startswith("base_")]
-    bases = tuple((float(x), float(y)) for x, y in pairs)
-    empty, friction = empty_record([Rotation(base) for base in bases], COARSE, rod, cell), float(attrs["friction"])
+    drives = tuple(recorded_drives(record))
+    empty, friction = empty_record(drives, COARSE, rod, cell), float(attrs["friction"])
     experiment = Experiment(empty, attrs["family"], cell, rod=rod, friction=friction, nuisances=nuisances)
     every = np.stack([columns[name] for name in experiment.model.names], axis=1)
     if unknown:  # a constant scale would make the covariance singular
         every[:, experiment.model.names.index("noise_scale")] *= np.exp(0.05 * rng.standard_normal(len(every)))
     chosen = rng.choice(len(every), min(draws, len(every)), replace=False)
-    return Knowledge(experiment, every[chosen], _precision(every), bases)
+    return Knowledge(experiment, every[chosen], _precision(every), drives)
 
 
 def _refuse_shape_free(family: str) -> None:
