@@ -3,11 +3,13 @@
 import json
 from functools import partial
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from helpers import commands
 from tactile_bayes.paper_figures import caption
+from tactile_bayes.sweep import Motion, Translation
 
 QUICK = ["--only", "3", "--only", "7", "--distance", "0.5", "--drive-step", "5", "--rods", "3"]
 
@@ -61,6 +63,27 @@ def test_noise_is_said_in_the_caption(tmp_path):
     assert "measured with noise (seed 4)" in result.stdout
 
 
+def test_a_base_is_carried_along_a_line_or_poses(tmp_path):
+    poses = tmp_path / "poses.csv"
+    poses.write_text("x,y,drive_angle\n1.4,0,90\n-1.4,0,90\n")
+    quick = ["--out", tmp_path, *QUICK[:6], "--rods", 3, "--format", "png", "--travel-step", 0.1]
+    drives = {
+        "translation": ("--carry", "1.4,0,180,90,2.8", Translation((1.4, 0.0), np.pi, 0.5 * np.pi, 2.8)),
+        "motion": ("--poses", poses, Motion([1.4, -1.4], 0.0, 0.5 * np.pi)),
+    }
+    for name, (option, value, drive) in drives.items():
+        result = run(*quick, option, value)
+        assert result.exit_code == 0, result.output
+        assert result.stdout.splitlines() == [
+            line
+            for number in (3, 7)
+            for line in (
+                f"Figure {number}: {caption(number, distances=[0.5], drive=drive)}",
+                f"    {tmp_path / f'figure_{number:02d}_{name}.png'}",
+            )
+        ]
+
+
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
@@ -71,6 +94,11 @@ def test_noise_is_said_in_the_caption(tmp_path):
         (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
         (["--only", "3", "--drive-step", "90"], "drive_step is"),
         (["--only", "2", "--distance", "0.3"], "figure 2 shows tip contact"),
+        (["--only", "3", "--carry", "1.4,0,180", "--travel-step", 0.1], "5 numbers"),
+        (["--only", "3", "--carry", "1.4,0,180,90,2.8", "--carry", "1,0,180,90,2"], "figures show one drive"),
+        (["--only", "3", "--carry", "1.4,0,180,90,2.8", "--drive-step", "2"], "--drive-step is for rotations"),
+        (["--only", "3", "--travel-step", "0.1"], "--travel-step is for --carry"),
+        (["--only", "3", "--carry", "1.4,0,180,90,2.8", "--distance", "1.2"], "profile I at the distance q = 1.2"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):

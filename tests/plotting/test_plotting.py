@@ -22,7 +22,7 @@ from tactile_bayes.plotting import posteriors, touch_map
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.plotting.tightening import _fit_map, _panels
 from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
-from tactile_bayes.sweep import Rotation, Translation, scan
+from tactile_bayes.sweep import Motion, Rotation, Translation, scan
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 
 ROD = Rod(length=0.1, flexural_rigidity=1.2e-5)
@@ -685,3 +685,13 @@ def test_the_way_of_a_base_that_is_carried_is_drawn_to_the_end_of_contact():
     assert way.get_xdata()[1] == pytest.approx(carried.sweeps[0].snap_off.base_x)
     words = [text.get_text() for text in ax.get_legend().get_texts()]
     assert {"base from (0.8, 0) $L$", "base (0, 0) $L$"} <= set(words)
+
+
+def test_a_rod_that_is_carried_back_is_released_and_does_not_snap_off():
+    there_and_back = Motion([1.0, 0.3, 1.0], [-0.5, -0.2, -0.5], 1.5)
+    carried = scan(paper_profile("II", q=0.5), drive=there_and_back, drive_step=0.05)
+    (ax, *_) = plotting.observables(carried.record, events=carried.events)
+    assert "release" in labels(ax)
+    assert "snap-off" not in labels(ax)
+    (mark,) = (line for line in ax.lines if line.get_label() == "release")
+    assert mark.get_xdata()[0] == pytest.approx(carried.events["forward"].snap_off.travel)

@@ -2,18 +2,64 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.drive_options import DriveOptions
 from tactile_bayes.cli.rig_options import NoiseOptions
 from tactile_bayes.cli.task_bar import resumable_bar
 
+if TYPE_CHECKING:
+    from tactile_bayes.sweep import Carried
+
 __all__ = ["figures"]
+
+
+@dataclass(frozen=True)
+class _DriveOptions(DriveOptions):
+    """The drive of all figures, by default rotations."""
+
+    carry: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Carry the base along a line, the rod clamped, instead of turning it: X,Y,HEADING,DRIVE_ANGLE,TRAVEL, "
+            "where it begins [L], its direction and the slope of the rod [degrees], and how far it moves [L]."
+        ),
+    ] = None
+    poses: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Likewise along any path: a CSV file with columns x, y [L] and drive_angle [degrees], a line for each "
+            "pose.",
+            dir_okay=False,
+        ),
+    ] = None
+    drive_step: Annotated[float | None, typer.Option(help="Step of rotations [degrees]; by default 1.")] = None
+    travel_step: Annotated[
+        float | None,
+        typer.Option(help="Step along --carry or --poses [L]; by default 0.01, or the poses if they are more than 8."),
+    ] = None
+
+    @property
+    def drive(self) -> Carried | None:
+        """The drive that carries the base, if there is one.
+
+        Raises
+        ------
+        ParameterError
+            If there are several, or an option is no drive.
+        """
+        from tactile_bayes.errors import ParameterError
+
+        carried = self.carried
+        if len(carried) > 1:
+            raise ParameterError(f"figures show one drive, and there are {len(carried)}: give --carry or --poses once")
+        return carried[0] if carried else None
 
 
 @dataclass(frozen=True)
@@ -38,9 +84,9 @@ def figures(
     ] = None,
     distance: Annotated[
         list[float] | None,
-        typer.Option(help="Distance of the profile from the pivot, q [L]; may be repeated; default the figure's own."),
+        typer.Option(help="Height of the profile above the origin, q [L]; may be repeated; default the figure's own."),
     ] = None,
-    drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].")] = 1.0,
+    drive: _DriveOptions,
     rods: Annotated[int, typer.Option(help="Number of rods drawn of a sweep in figures 7 to 10.", min=1)] = 15,
     noise: _NoiseOptions,
     seed: Seed = 1,
@@ -52,13 +98,19 @@ def figures(
     ] = "print",
     output: Output,
 ) -> Answer:
-    """Draw Figures 2 to 11 of Merker et al. 2018 (doi 10.1155/2018/1613945) from our own computation."""
+    """Draw Figures 2 to 11 of Merker et al. 2018 (doi 10.1155/2018/1613945) from our own computation.
+
+    The drive turns the rod about the origin, as in the paper, or carries its base (--carry, --poses).
+    """
     from tactile_bayes.paper_figures import NUMBERS, caption, draw_all
     from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
+    from tactile_bayes.sweep import Rotation
 
+    carried = drive.drive
     options: dict[str, Any] = {
         "distances": distance or None,
-        "drive_step": math.radians(drive_step),
+        "drive": carried,
+        "drive_step": drive.step([carried or Rotation()]),
         "rods": rods,
         "load_cell": noise.load_cell,
         "seed": seed,

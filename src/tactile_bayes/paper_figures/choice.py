@@ -14,7 +14,7 @@ from tactile_bayes.errors import ContourError, ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.plotting.axes import AxesArray
 from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
-from tactile_bayes.sweep import Scan, scan
+from tactile_bayes.sweep import Carried, Scan, scan
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,9 +33,11 @@ class Choice:
     Attributes
     ----------
     distances : tuple of float
-        Distances of the vertex above the pivot, increasing [L].
-    drive_step : float
-        Step of the drive [rad].
+        Distances of the vertex above the origin, increasing [L].
+    drive : Carried or None
+        Drive that carries the base; None for rotations about the origin.
+    drive_step : float or None
+        Step of the drive [rad or L]; None for that of `scan`.
     rods : int
         Largest number of rods drawn in one sweep.
     load_cell : LoadCell or None
@@ -47,7 +49,8 @@ class Choice:
     """
 
     distances: tuple[float, ...]
-    drive_step: float
+    drive: Carried | None
+    drive_step: float | None
     rods: int
     load_cell: LoadCell | None
     seed: int
@@ -73,21 +76,29 @@ class Choice:
         return figure, figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False, subplot_kw=options)
 
     def scan(self, profile: Profile, distance: float, direction: Direction = "both") -> Scan:
-        """Return the scan of a profile of the paper at a distance.
+        """Return the scan of a profile of the paper at a distance; the direction is that of rotations.
 
         Raises
         ------
         ContourError
             If the profile is too near, or out of reach.
         """
+        way: dict[str, Any] = {"direction": direction} if self.drive is None else {"drive": self.drive}
         try:
-            return scan(paper_profile(profile, q=distance), direction=direction, drive_step=self.drive_step)
+            return scan(paper_profile(profile, q=distance), drive_step=self.drive_step, **way)
         except ContourError as error:
             raise type(error)(f"profile {profile} at the distance q = {distance:g}: {error}") from None
 
 
 def choice_of(
-    distances: Sequence[float], *, drive_step: float, rods: int, load_cell: LoadCell | None, seed: int, width: float
+    distances: Sequence[float],
+    *,
+    drive: Carried | None,
+    drive_step: float | None,
+    rods: int,
+    load_cell: LoadCell | None,
+    seed: int,
+    width: float,
 ) -> Choice:
     """Return the checked options of a figure.
 
@@ -103,4 +114,7 @@ def choice_of(
     inches = f"give inches from 3 to 12, like {COLUMN_WIDTH} or {PAGE_WIDTH}"
     width = check_number("width", width, inches, least=3.0, most=12.0)
     check_optional("load_cell", load_cell, LoadCell, "give a LoadCell")
-    return Choice(tuple(np.unique(q).tolist()), drive_step, rods, load_cell, seed, width)
+    check_optional("drive", drive, Carried, "the paper's rotations have none: give a Translation or a Motion")
+    if drive is not None and not np.ptp(drive.poses[:, :2], axis=0).any():
+        raise ParameterError("drive is a motion that does not move the base: give one that does, or no drive")
+    return Choice(tuple(np.unique(q).tolist()), drive, drive_step, rods, load_cell, seed, width)

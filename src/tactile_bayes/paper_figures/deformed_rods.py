@@ -11,6 +11,7 @@ from tactile_bayes.paper_figures.choice import Choice, Direction, Limits, Profil
 from tactile_bayes.plotting.legends import legend_entries, legend_in_rows
 from tactile_bayes.plotting.marks import PHASES
 from tactile_bayes.plotting.rod_map import rods
+from tactile_bayes.plotting.sweep_lines import ENDINGS
 from tactile_bayes.record import CHANNELS
 
 if TYPE_CHECKING:
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_deformed_rods"]
 
-_LEGEND = ([*PHASES.values(), "contour", "pivot"], ["first contact", "phase change", "snap-off"])
+_LEGEND = (
+    [*PHASES.values(), "contour", "pivot", "base path", "base at start"],
+    ["first contact", "phase change", "snap-off", *ENDINGS.values()],
+)
 
 _ROOM = 0.05
 """Margin around the rods [L]."""
@@ -40,7 +44,8 @@ def draw_deformed_rods(profile: Profile, direction: Direction, choice: Choice) -
         rods(made, sweep=number, count=choice.rods, ax=ax)
         found |= legend_entries(ax)
         ax.get_legend().remove()
-        ax.set_title(f"{made.sweeps[number].direction}, $q$ = {_distance(made):g} $L$")
+        way = made.sweeps[number].direction if choice.drive is None else "carried"
+        ax.set_title(f"{way}, $q$ = {_distance(made):g} $L$")
     for place, ax in enumerate(grid.ravel()):
         if place >= len(sweeps):
             ax.remove()
@@ -51,22 +56,27 @@ def draw_deformed_rods(profile: Profile, direction: Direction, choice: Choice) -
             ax.set_xlabel("")
         if not is_first:
             ax.set_ylabel("")
-    legend_in_rows(figure, found, _LEGEND, 2 if choice.is_column else 4)
+    legend_in_rows(figure, found, _LEGEND, 2 if choice.is_column else 5)
     return figure
 
 
 def _limits(sweeps: list[tuple[Scan, int]]) -> Limits:
-    """Return limits in x and y that hold all rods of all sweeps."""
+    """Return limits in x and y that hold all rods and bases of all sweeps."""
     corners = []
     for made, number in sweeps:
         record, events = made.record, made.sweeps[number]
-        chosen = (record["sweep"].values == number) & (record["truth_contact_phase"].values != "none")
-        wrench = [np.asarray(record[name].values[chosen]) for name in ("drive_angle", *CHANNELS)]
+        of_sweep = record["sweep"].values == number
+        chosen = of_sweep & (record["truth_contact_phase"].values != "none")
+        names = ("base_x", "base_y", "drive_angle", *CHANNELS)
         ends = [events.first_contact, *events.transitions, events.snap_off]
-        at_ends = [[getattr(event, name) for event in ends] for name in ("drive_angle", *CHANNELS)]
-        states = [np.append(a, b) for a, b in zip(wrench, at_ends, strict=True)]
-        x, y = rod_shape(*states, side=1 if events.direction == "forward" else -1)
-        corners.append([x.min(), x.max(), y.min(), y.max()])
+        at_ends = [[getattr(event, name) for event in ends] for name in names]
+        states = [np.append(record[name].values[chosen], at) for name, at in zip(names, at_ends, strict=True)]
+        shapes = rod_shape(*states[2:], side=1 if events.direction == "forward" else -1)
+        bounds = []
+        for name, base, shape in zip(names[:2], states[:2], shapes, strict=True):
+            values = np.append(base[:, None] + shape, record[name].values[of_sweep])
+            bounds += [values.min(), values.max()]
+        corners.append(bounds)
     (left, _, bottom, _), (_, right, _, top) = np.min(corners, axis=0), np.max(corners, axis=0)
     return (float(left) - _ROOM, float(right) + _ROOM), (float(bottom) - _ROOM, float(top) + _ROOM)
 

@@ -32,7 +32,8 @@ def draw_all(
 ) -> dict[int, dict[str, Path]]:
     """Write figures of the paper to a folder, and return their files.
 
-    Files are named figure_02.pdf and so on, and hold their caption. They are written whole: after an interrupt each
+    Files are named figure_02.pdf and so on, figure_02_translation.pdf or figure_02_motion.pdf with a drive of this
+    kind, and hold their caption. They are written whole: after an interrupt each
     file is the old or the new one, and the same call makes all of them anew. The same options give the same bytes.
 
     Parameters
@@ -74,13 +75,15 @@ def draw_all(
     if absent or not wanted:
         raise ParameterError(f"formats are {list(formats)!r}: choose from {', '.join(FORMATS)}")
     captions = {number: caption(number, **options) for number in numbers}  # refuses before anything is written
+    drive = options.get("drive")
+    kind = "" if drive is None else f"_{type(drive).__name__.lower()}"
     folder = Path(out)
     files: dict[int, dict[str, Path]] = {}
     with styled(style):
         for done, (number, text) in enumerate(captions.items(), start=1):
             made = figure(number, **options)
             folder.mkdir(parents=True, exist_ok=True)
-            files[number] = {name: folder / f"figure_{number:02d}.{name}" for name in wanted}
+            files[number] = {name: folder / f"figure_{number:02d}{kind}.{name}" for name in wanted}
             for name, path in files[number].items():
                 with write_atomically(path) as temporary:
                     _save(made, temporary, name, number, text)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "draw_gap",
     "draw_object",
+    "draw_path",
     "draw_pivot",
     "finish_map",
     "fit_height",
@@ -99,6 +100,11 @@ def draw_object(ax: Axes, contour: Contour, x: Floats, y: Floats, room: float) -
 def draw_pivot(ax: Axes, base: tuple[float, float], *, colour: str = "black", label: str = "pivot") -> None:
     style: dict[str, Any] = {"marker": "o", "markersize": 6.0, "markerfacecolor": "white", "markeredgewidth": 1.2}
     ax.plot(*base, linestyle="none", markeredgecolor=colour, zorder=5, label=label, **style)
+
+
+def draw_path(ax: Axes, x: Floats, y: Floats) -> None:
+    """Draw the path of a base that is carried."""
+    ax.plot(x, y, color="0.5", linestyle="-.", linewidth=0.8, zorder=1.5, label="base path")
 
 
 def draw_gap(ax: Axes, left: float, right: float, text: str, *, hatched: bool = True) -> Text:

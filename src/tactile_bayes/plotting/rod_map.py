@@ -12,8 +12,9 @@ from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.plotting.axes import single_axes
-from tactile_bayes.plotting.maps import draw_object, draw_pivot, finish_map
+from tactile_bayes.plotting.maps import draw_object, draw_path, draw_pivot, finish_map
 from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES
+from tactile_bayes.plotting.sweep_lines import ENDINGS
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
 
 if TYPE_CHECKING:
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
     from tactile_bayes.sweep import Event, Scan
 
 __all__ = ["rods"]
-
-_ENDINGS = {"release": "release", "never": "end of the drive"}
-"""Labels of the end of contact other than by a snap-off."""
 
 
 def rods(
@@ -109,7 +107,7 @@ def rods(
     marked: list[tuple[Event, str, str]] = [
         (events.first_contact, "first contact", ":"),
         *((event, "phase change", "-") for event in events.transitions),
-        (events.snap_off, _ENDINGS.get(events.snap_off.kind, "snap-off"), "--"),
+        (events.snap_off, ENDINGS.get(events.snap_off.kind, "snap-off"), "--"),
     ]
     extent = [x, y]
     for event, label, style in marked:
@@ -118,9 +116,10 @@ def rods(
         ax.plot(x, y, color=PALETTE["change"], linestyle=style, linewidth=1.4, zorder=2.5, label=label)
         ax.plot(event.contact_x, event.contact_y, "o", color=PALETTE["change"], markersize=4.0, zorder=3.5)
     path = np.stack([record[f"base_{axis}"].values[record["sweep"].values == number] for axis in "xy"])
-    if np.ptp(path, axis=1).any():
-        ax.plot(*path, color="0.5", linewidth=0.8, zorder=1.5, label="base path")
-    draw_pivot(ax, events.base, label="base at start" if np.ptp(path, axis=1).any() else "pivot")
+    is_carried = bool(np.ptp(path, axis=1).any())
+    if is_carried:
+        draw_path(ax, *path)
+    draw_pivot(ax, events.base, label="base at start" if is_carried else "pivot")
     draw_object(ax, scan.contour, extent[0], extent[1], room=0.05 * rod.length_unit)
     finish_map(ax, record["base_x"].attrs)
     return ax

@@ -17,7 +17,7 @@ from tactile_bayes.sweep import Event, SweepEvents
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["EVENT_MARKERS", "draw_events", "finish_channels", "phase_runs", "reading_style", "with_events"]
+__all__ = ["ENDINGS", "EVENT_MARKERS", "draw_events", "finish_channels", "phase_runs", "reading_style", "with_events"]
 
 Phases = NDArray[np.object_]
 
@@ -25,7 +25,10 @@ EVENT_MARKERS: Mapping[str, Mapping[str, Any]] = {
     "first contact": {"marker": "o", "markerfacecolor": "white", "markersize": 4.5},
     "phase change": {"marker": "D", "markersize": 4.0},
     "snap-off": {"marker": "X", "markersize": 7.0, "markeredgecolor": "white"},
+    "release": {"marker": "v", "markersize": 7.0, "markeredgecolor": "white"},
 }
+ENDINGS: Mapping[str, str] = {"release": "release", "never": "end of the drive"}
+"""Labels of the end of contact other than by a snap-off, by its kind."""
 
 
 def reading_style(direction: str, colour: str) -> dict[str, Any]:
@@ -44,14 +47,15 @@ def draw_events(
     travels: bool = False,
     **style: Any,
 ) -> None:
-    """Mark first contact, phase changes and snap-off, with markers of `size` times their usual size.
+    """Mark first contact, phase changes and snap-off or release, with markers of `size` times their usual size.
 
-    They are marked at drive angles [degrees], or at travels of the base. A drive that ends in contact has no snap-off.
+    They are marked at drive angles [degrees], or at travels of the base. A drive that ends in contact has neither.
     """
+    ending = ENDINGS.get(events.snap_off.kind, "snap-off")
     marked = {
         "first contact": (events.first_contact,),
         "phase change": events.transitions,
-        "snap-off": (events.snap_off,) if events.snap_off.kind != "never" else (),
+        ending: (events.snap_off,) if ending in EVENT_MARKERS else (),
     }
     for label, of_label in marked.items():
         if of_label:
