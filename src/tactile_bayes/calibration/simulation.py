@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -80,10 +81,10 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     rod = likelihood.rod
     measures = cell.dimensionless(rod)
     discrepancy = model.discrepancy(point, loads)
-    sensed = model.nuisances.sensed(loads, values, measures)
+    sensed = replace(model.nuisances, curve=measures.moment_curve).sensed(loads, values, measures)
     units = rod.load_units
     scale = model.noise_scale(point)
-    readings = measures.simulate(sensed, seed=rng, noise_scale=scale, discrepancy=discrepancy)[0] * units
+    readings = measures.straight.simulate(sensed, seed=rng, noise_scale=scale, discrepancy=discrepancy)[0] * units
     course = model.nuisances.elapsed[:, None]
     readings = readings + np.array(world.bias) + np.array(world.drift) * course
     template = experiment.assumed.record

@@ -72,6 +72,12 @@ class FlawOptions:
         str | None,
         typer.Option(help="Reference point of the moment, from the pivot, along the axes of the cell: X,Y."),
     ] = None
+    moment_curve: Annotated[
+        str | None,
+        typer.Option(
+            help="Curve of the moment, read as M + Q·M² + C·M³ before the gain: Q,C [1/(N m) and 1/(N m)², or in EI/L]."
+        ),
+    ] = None
     force_range: Annotated[float, typer.Option(help="Largest force that is read [N, or EI/L²].")] = math.inf
     moment_range: Annotated[float, typer.Option(help="Largest moment that is read [N m, or EI/L].")] = math.inf
     force_resolution: Annotated[float, typer.Option(help="Step of the forces [N, or EI/L²].", min=0.0)] = 0.0
@@ -101,6 +107,7 @@ class FlawOptions:
             "random_walk": ("moment", "force"),
             "ornstein_uhlenbeck": ("moment", "force", "time"),
             "lever": ("x", "y"),
+            "moment_curve": ("quadratic", "cubic"),
         }
         entries = {"frame": self.load_cell_frame, **_gains(self.gain or [])}
         for name, value in vars(self).items():

@@ -255,7 +255,16 @@ def _load_cell(table: Mapping[str, Any]) -> dict[str, Distribution]:
             LoadCell.from_entries(_at_share(distributions, share))
         except ParameterError as error:
             raise SpecificationError(f"load_cell: {error}") from error
-    signed = ("bias_holding", "bias_force", "gain_", "lever_", "correlation_", "drive_angle_o", "drive_angle_b")
+    signed = (
+        "bias_holding",
+        "bias_force",
+        "gain_",
+        "lever_",
+        "moment_curve_",
+        "correlation_",
+        "drive_angle_o",
+        "drive_angle_b",
+    )
     unsigned = {name: distribution for name, distribution in distributions.items() if not name.startswith(signed)}
     _refuse_negative(unsigned, "load_cell.", or_zero=set(unsigned))
     return distributions

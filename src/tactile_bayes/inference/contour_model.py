@@ -95,7 +95,7 @@ class ContourModel:
         self._jointly = [self.names.index(name) for name in nuisances.joint.priors] if nuisances.joint else []
         rubs = bool(nuisances.friction) or "friction" in nuisances.names
         self.likelihood = RecordLikelihood(
-            measured, noise.cell, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
+            measured, noise.cell.straight, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
         )
         if noise.of_discrepancy and self.likelihood.encoder.count > 1:
             raise ParameterError(

@@ -98,7 +98,8 @@ class Experiment:
     @cached_property
     def rig(self) -> Nuisances:
         """Nuisance parameters of the rig."""
-        return nuisances_of(self.record, self.nuisances, self.priors, self.noise.cell, self.friction, self.joint)
+        given = self.record, self.nuisances, self.priors, self.noise.cell, self.friction, self.joint
+        return nuisances_of(*given, gauge=self.gauge is not None)
 
     @property
     def shapes(self) -> Family:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.inference.nuisances import CURVE
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
@@ -86,11 +87,13 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
         return np.array([rig.get(f"{channel}_{kind}", default) for channel in _CHANNEL_NAMES])
 
     gain: Any = np.array(load_cell.gain) * by_channel("gain", 1.0) * rig.get("rigidity_scale", 1.0)
+    quadratic, cubic = (rig.get(name, v) for name, v in zip(CURVE, load_cell.moment_curve, strict=True))
     bias = np.array(load_cell.bias) + by_channel("bias", 0.0)
     cell = replace(
         load_cell,
         gain=gain,
         lever=(load_cell.lever[0] + rig.get("lever_x", 0.0), load_cell.lever[1] + rig.get("lever_y", 0.0)),
+        moment_curve=(quadratic, cubic),
         bias=tuple(bias.tolist()),
         drive_angle_offset=load_cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
         drive_angle_backlash=load_cell.drive_angle_backlash + rig.get("backlash", 0.0),

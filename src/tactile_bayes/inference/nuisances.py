@@ -18,15 +18,16 @@ from tactile_bayes.inference.discrepancy import DISCREPANCY, is_discrepancy
 from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.curve import curved
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
+from tactile_bayes.record import LOAD_CELL_UNITS, bases_of, carried_sweeps, present_channels, rod_of
 
 if TYPE_CHECKING:
     from tactile_bayes.inference.rig_prior import RigPrior
 
-__all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
+__all__ = ["BIAS", "BIASES", "CURVE", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
 
 STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
 """Default nuisance parameters, of which those that a record cannot identify are left out."""
@@ -41,16 +42,22 @@ _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"
 _GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "drift", "gain")}
 _GROUPS["lever"] = ("lever_x", "lever_y")
 
-BIASES = _GROUPS["bias"]
+_GROUPS["moment_curve"] = ("moment_curve_quadratic", "moment_curve_cubic")
+_GROUPS["gauge"] = ("gauge_x", "gauge_y")
+
+BIASES, CURVE = _GROUPS["bias"], _GROUPS["moment_curve"]
 
 BIAS = 0.1
 """Standard deviation of the prior of a bias, in EI/L and EI/L²."""
 
 _RIGIDITY, _OFFSET, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.02, 0.3, 0.05, 0.01
 _LEVER, _BACKLASH, _CURVATURE, _TAPER = 0.005, np.radians(0.2), 0.05, 0.05
-"""Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; L; 1/L; and of the
-diameter at the base."""
+_BENT = {"moment_curve_quadratic": 0.05, "moment_curve_cubic": 0.02}
+"""Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; L; 1/L; of the
+diameter at the base; and of the curve of the moment, in powers of L/EI."""
 
+
+_NO_GAUGE = "only the place of a gauge, whose contour is known, is one of the rig's parameters (infer_rig)"
 
 _BASE = re.compile(r"base_(\d+)_([xy])")
 """Shift of a pivot of the record, counted from 1, along an axis."""
@@ -77,7 +84,8 @@ _KINDS = {
     "taper": _Kind(0.0, STEEPEST_TAPER),
     **{name: _Kind(-np.inf, np.inf, power_of_moment=1) for name in (*_GROUPS["bias"], *_GROUPS["drift"])},
     **{name: _Kind(0.0, np.inf) for name in _GROUPS["gain"]},
-    **{name: _Kind(-np.inf, np.inf, power_of_length=1) for name in _GROUPS["lever"]},
+    **{name: _Kind(-np.inf, np.inf, power_of_length=1) for name in (*_GROUPS["lever"], *_GROUPS["gauge"])},
+    **{name: _Kind(-np.inf, np.inf, power_of_moment=-power) for power, name in enumerate(CURVE, start=1)},
 }
 _RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
 _RIG["backlash"] = "drive_angle_backlash"
@@ -102,6 +110,10 @@ class Nuisances:
         Position of each sample in the record, linear from the first (−½) to the last (½), for drift.
     joint : RigPrior, optional
         Joint prior of the parameters that a calibration of the rig has found; their `priors` are its marginals.
+    curve : (float, float)
+        Stated curve of the moment [L/EI, (L/EI)²], where it is not inferred.
+    pivots : int
+        Number of pivots of the record.
     """
 
     names: tuple[str, ...]
@@ -110,6 +122,8 @@ class Nuisances:
     friction: float
     elapsed: Floats = field(default_factory=lambda: np.zeros(1))
     joint: RigPrior | None = None
+    curve: tuple[float, float] = (0.0, 0.0)
+    pivots: int = 1
     units: Mapping[str, float] = field(init=False)
     """Unit of each parameter in dimensionless calculations, in the record's units."""
 
@@ -119,7 +133,8 @@ class Nuisances:
             n: (force if n.startswith("force") else moment) ** k.power_of_moment * length**k.power_of_length
             for n, k in _KINDS.items()
         }
-        units |= {n: 1.0 for n in self.names if _BASE.fullmatch(n)}  # shifts stay in the record's unit of length
+        shifts = (n for n in self.names if _BASE.fullmatch(n) or n in _GROUPS["gauge"])
+        units |= dict.fromkeys(shifts, 1.0)  # they stay in the record's unit of length
         object.__setattr__(self, "units", units)
 
     def bounds(self, name: str) -> tuple[float, float]:
@@ -131,8 +146,10 @@ class Nuisances:
         """Return the SI unit of a parameter, like "N m"."""
         if name in (*_GROUPS["bias"], *_GROUPS["drift"]):
             return "N m" if name.startswith("moment") else "N"
-        if _BASE.fullmatch(name) or name in _GROUPS["lever"]:
+        if _BASE.fullmatch(name) or name in (*_GROUPS["lever"], *_GROUPS["gauge"]):
             return "m"
+        if name in CURVE:
+            return LOAD_CELL_UNITS[name]
         units = {"drive_angle_offset": "rad", "backlash": "rad", "suspension_compliance": "rad/(N m)"}
         units["rest_curvature"] = "1/m"
         return units.get(name, "1")
@@ -152,26 +169,40 @@ class Nuisances:
         )
 
     def _base_shifts(self, values: Mapping[str, Floats]) -> Floats | None:
-        """Return the shifts of pivots, shape (n, pivots, 2), up to the last one that is inferred; None without any."""
+        """Return the shifts of pivots, shape (n, pivots, 2), up to the last one that is inferred; None without any.
+
+        A shift of the gauge is one of all pivots to the other side.
+        """
         shifted = [(name, _BASE.fullmatch(name)) for name in self.names]
         off = [(name, int(found[1]) - 1, "xy".index(found[2])) for name, found in shifted if found]
-        if not off:
+        gauge = [name for name in _GROUPS["gauge"] if name in self.names]
+        if not off and not gauge:
             return None
-        shifts = np.zeros((len(values[off[0][0]]), max(pivot for _, pivot, _ in off) + 1, 2))
+        last = self.pivots if gauge else max(pivot for _, pivot, _ in off) + 1
+        shifts = np.zeros((len(values[(gauge or [off[0][0]])[0]]), last, 2))
         for name, pivot, axis in off:
             shifts[:, pivot, axis] = values[name]
+        for name in gauge:
+            shifts[..., "xy".index(name[-1])] -= values[name][:, None]
         return shifts
 
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
-        """Apply inferred gains, levers and zeros to loads, shape (n, ..., 3) [EI/L, EI/L²], in place.
+        """Apply inferred gains, levers and zeros, and the curve, to loads, shape (n, ..., 3) [EI/L, EI/L²], in place.
 
-        Zeros are given as readings, and enter as the loads that the cell reads as such.
+        Zeros are given as readings, and enter as the loads that the cell reads as such if its own curve is left out.
         """
+        curve = [
+            values[name] / self.units[name] if name in self.names else stated
+            for name, stated in zip(CURVE, self.curve, strict=True)
+        ]
+        is_bent = any(np.any(v) for v in curve)
         gains = [values.get(name) for name in _GROUPS["gain"]]
         levers = [values[name] / self.units[name] if name in self.names else None for name in _GROUPS["lever"]]
         # Gains act on readings at the lever's end, to which the cell's own lever is applied later.
-        own = cell.lever if any(gain is not None for gain in gains) else (0.0, 0.0)
+        own = cell.lever if is_bent or any(gain is not None for gain in gains) else (0.0, 0.0)
         _take_at(loads, *(known if lever is None else known + lever for known, lever in zip(own, levers, strict=True)))
+        if is_bent:
+            loads[..., 0] = curved(loads[..., 0], *(np.reshape(v, (-1, *(1,) * (loads.ndim - 2))) for v in curve))
         for channel, gain in enumerate(gains):
             if gain is not None:
                 loads[..., channel] *= gain.reshape(-1, *(1,) * (loads.ndim - 2))
@@ -203,6 +234,7 @@ def nuisances_of(
     cell: LoadCell,
     friction: float | None,
     joint: RigPrior | None = None,
+    gauge: bool = False,
 ) -> Nuisances:
     """Return the nuisance parameters that are chosen by name or have a prior, with default priors.
 
@@ -225,6 +257,8 @@ def nuisances_of(
     joint : RigPrior, optional
         Joint prior from a calibration of the rig. Its parameters are inferred, and need not be identifiable from this
         record, except those that no measured channel shows, which are left out.
+    gauge : bool
+        Whether the contour is that of a gauge, whose place can be inferred.
 
     Raises
     ------
@@ -233,6 +267,8 @@ def nuisances_of(
     """
     chosen = [name for name in check_names("nuisances", chosen) if not is_discrepancy(name)]
     unidentifiable = _unidentifiable(measured)
+    if not gauge:
+        unidentifiable |= dict.fromkeys(("gauge", *_GROUPS["gauge"]), _NO_GAUGE)
     present = [_SHORT[name] for name in present_channels(measured)]
     every_gain = [f"{name}_gain" for name in present]
     if joint is not None:
@@ -283,11 +319,17 @@ def nuisances_of(
         )
     rod = rod_of(measured)
     elapsed = np.linspace(-0.5, 0.5, measured.sizes["sample"])
-    nuisances = Nuisances(tuple(names), {}, rod, friction, elapsed)
-    defaults = {name: _default_prior(name, rod.length if "base" in name else nuisances.units[name]) for name in names}
+    curve = cell.dimensionless(rod).moment_curve
+    nuisances = Nuisances(tuple(names), {}, rod, friction, elapsed, curve=curve, pivots=len(bases_of(measured)))
+    of_place = (*(name for name in names if _BASE.fullmatch(name)), *_GROUPS["gauge"])
+    scales = {name: rod.length if name in of_place else nuisances.units[name] for name in names}
+    defaults = {name: _default_prior(name, scale) for name, scale in scales.items()}
     if "rest_curvature" in defaults:
         deviation = rod.rest_curvature_deviation or _CURVATURE * rod.curvature_unit
         defaults["rest_curvature"] = stats.norm(rod.mean_rest_curvature, deviation)
+    for name in set(CURVE) & defaults.keys():
+        stated = cell.moment_curve[CURVE.index(name)]
+        defaults[name] = stats.norm(stated, _BENT[name] * nuisances.units[name])
     if "taper" in defaults:
         ends = ((end - rod.taper) / _TAPER for end in nuisances.bounds("taper"))
         defaults["taper"] = stats.truncnorm(*ends, loc=rod.taper, scale=_TAPER)
@@ -300,7 +342,8 @@ def _unidentifiable(measured: xr.Dataset) -> dict[str, str]:
     """Return the parameters that a record cannot identify, with the reasons."""
     reasons: dict[str, str] = {}
     if "holding_moment" not in present_channels(measured):
-        reasons |= dict.fromkeys(("lever", *_GROUPS["lever"]), "it shows in the moment, which was not measured")
+        names = ("lever", *_GROUPS["lever"], "moment_curve", *CURVE)
+        reasons |= dict.fromkeys(names, "it shows in the moment, which was not measured")
     turned = measured.direction.values[~np.isin(measured.sweep.values, carried_sweeps(measured))]
     if turned.size == 0:
         reasons["backlash"] = "the drive carries the base in every sweep, and turns no encoder to and fro"
@@ -320,7 +363,7 @@ def _is_measured(name: str, present: Sequence[str]) -> bool:
 
 def _is_shown(name: str, present: Sequence[str]) -> bool:
     """Return True if a measured channel depends on a parameter."""
-    return _is_measured(name, present) and (name not in _GROUPS["lever"] or "moment" in present)
+    return _is_measured(name, present) and (name not in (*_GROUPS["lever"], *CURVE) or "moment" in present)
 
 
 def _bases_off(name: str, measured: xr.Dataset) -> list[str]:
@@ -348,6 +391,8 @@ def _default_prior(name: str, unit: float) -> Prior:
             return stats.norm(0.0, _OFFSET)
         case "backlash":
             return stats.norm(0.0, _BACKLASH)
+        case "gauge_x" | "gauge_y":
+            return stats.norm(0.0, _SHIFT * unit)
         case "lever_x" | "lever_y":
             return stats.norm(0.0, _LEVER * unit)
         case "friction":

@@ -19,8 +19,9 @@ from tactile_bayes.inference.result import posterior_draws
 
 __all__ = ["RigPrior", "lasting", "refuse_other_rig", "rig_prior"]
 
-_PASSING = ("bias", "drift", "friction", "base")
-"""Parameters, by parts of their names, that belong to one record (zeros, pivots) or to rod and object (friction)."""
+_PASSING = ("bias", "drift", "friction", "base", "gauge")
+"""Parameters, by parts of their names, that belong to one record (zeros, pivots and gauge) or to rod and object
+(friction)."""
 
 _PROBABILITIES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 """Probabilities of the quantiles at which draws and density are compared."""
@@ -28,7 +29,15 @@ _PROBABILITIES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 _FARTHEST = 30.0
 """Largest normal score, beyond which densities vanish anyway."""
 
-_SENSES = ("rod_", "units", "load_cell_frame", "load_cell_gain", "load_cell_lever", "load_cell_drive_angle_")
+_SENSES = (
+    "rod_",
+    "units",
+    "load_cell_frame",
+    "load_cell_gain",
+    "load_cell_lever",
+    "load_cell_moment_curve",
+    "load_cell_drive_angle_",
+)
 """Beginnings of the attributes that must agree: the rig's parameters are deviations from what they state."""
 
 _NOISES = ("load_cell_drive_angle_noise", "load_cell_drive_angle_resolution")

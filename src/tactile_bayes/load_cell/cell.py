@@ -32,10 +32,11 @@ class LoadCell(DataSheet):
 
     With the loads h (holding moment and support reaction, zero out of contact) at the true drive angle φ, it reads
 
-        y = gain · lever(h) + bias + drift + ε, cut off at ± range, rounded to steps of the resolution,
+        y = gain · curve(lever(h)) + bias + drift + ε, cut off at ± range, rounded to steps of the resolution,
         drive_angle = φ + offset ± backlash/2 + noise, rounded in the same way,
 
-    where the lever changes the moment to m0 − x·force_y + y·force_x, and + holds for forward motion, − for backward.
+    where the lever changes the moment to m0 − x·force_y + y·force_x, the curve a moment M to M + a M² + b M³, and + is
+    that of forward motion, − of backward.
 
     The default is an ideal sensor; every entry adds one flaw. Quantities are in the units of the record with which the
     cell is used: N and N m, or EI/L² and EI/L (a rod of 0.1 m and 1e-5 N m² has EI/L² = 1 mN, EI/L = 0.1 mN m). Entries
@@ -72,6 +73,11 @@ class LoadCell(DataSheet):
         Position of the cell's reference point for moments relative to the pivot, along the axes of the cell [length]:
         beside the axle a force contributes to the moment. Typically 0.005 of the rod's length if not measured. The axes
         of a turning cell are those along the rod at the pivot and across it.
+    moment_curve : (float, float)
+        Curve (a, b) of the moment's reading before the gain [1/(N m), 1/(N m)²], or dimensionless: that of a sensor
+        whose reading is not in proportion to the moment, as a Hall sensor. Where the curve turns back, the sensor is
+        saturated, and reads the same from there on. With counts in the column of the moment the gain is in counts per
+        N m.
     force_range, moment_range : float
         Largest size of a reading, at which readings are cut off (with a resolution, at the last step in the range). A
         bridge is typically rated to twice the largest expected load.

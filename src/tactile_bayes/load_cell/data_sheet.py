@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import combinations, product
 from typing import Any, Self
 
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import as_number, check_choice, check_number, check_numbers, check_positive, refused
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell.curve import curved, slope_of, straightened
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
@@ -23,7 +24,7 @@ __all__ = ["CERTAIN", "DataSheet"]
 
 Triple = tuple[float, float, float]
 
-CERTAIN = ("bias", "gain", "lever", "drive_angle_offset", "drive_angle_backlash")
+CERTAIN = ("bias", "gain", "lever", "moment_curve", "drive_angle_offset", "drive_angle_backlash")
 """Deterministic entries: known errors, for which a record can be corrected."""
 
 _IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -48,6 +49,7 @@ _SEVERAL: dict[str, tuple[str, ...]] = {
     "bias_uncertainty": tuple(f"bias_uncertainty_{name}" for name in CHANNELS),
     "gain": tuple(f"gain_{to}_{of}" for to, of in product(CHANNELS, CHANNELS)),
     "lever": ("lever_x", "lever_y"),
+    "moment_curve": ("moment_curve_quadratic", "moment_curve_cubic"),
     "correlation": tuple(f"correlation_{one}_{other}" for one, other in _PAIRS),
 }
 """Names of the numbers of each entry with several numbers."""
@@ -58,6 +60,7 @@ _CORRECTIONS = {
     "bias_uncertainty": _OF_CHANNELS,
     "gain": "give three rows of three numbers, ((1, 0, 0), (0, 1, 0), (0, 0, 1)) being that of an ideal cell",
     "lever": "give two finite numbers (x, y)",
+    "moment_curve": "give two finite numbers (quadratic, cubic), (0, 0) for a reading in proportion to the moment",
     "correlation": f"give three finite numbers ({', '.join(' with '.join(pair) for pair in _PAIRS)})",
     **{
         f"{channel}_{name}": f"give {what}, zero or positive [{unit}, or dimensionless]"
@@ -84,6 +87,7 @@ class DataSheet:
     drift: Drift | None = None
     gain: tuple[Triple, Triple, Triple] = _IDENTITY
     lever: tuple[float, float] = (0.0, 0.0)
+    moment_curve: tuple[float, float] = (0.0, 0.0)
     force_range: float = math.inf
     moment_range: float = math.inf
     force_resolution: float = 0.0
@@ -194,17 +198,56 @@ class DataSheet:
             matrix[i, j] = matrix[j, i] = value
         return matrix
 
+    @property
+    def straight(self) -> Self:
+        """The same without the curve of the moment."""
+        return replace(self, moment_curve=(0.0, 0.0)) if any(self.moment_curve) else self
+
     def expected(self, loads: Floats) -> Floats:
-        """Readings of loads, shape (..., 3), without noise: lever, gain and bias.
+        """Readings of loads, shape (..., 3), without noise: lever, curve of the moment, gain and bias.
 
         A channel that was not measured is NaN throughout; it affects others only through cross-talk, or the moment
         through its lever.
         """
-        if self.gain == _IDENTITY and not any(self.lever):
+        if self.gain == _IDENTITY and not any((*self.lever, *self.moment_curve)):
             return loads + np.array(self.bias) if any(self.bias) else loads
-        gain = self.gain_matrix
+        if any(self.moment_curve):
+            loads = self._bent(loads)
+            gain = np.array(self.gain)
+        else:
+            gain = self.gain_matrix
         read = [sum(loads[..., j] * gain[i, j] for j in range(3) if gain[i, j]) for i in range(3)]
         return np.stack(np.broadcast_arrays(*read), axis=-1) + np.array(self.bias)
+
+    def _bent(self, loads: Floats) -> Floats:
+        """Return loads with the moment at the lever's end, as the curve changes it."""
+        x, y = self.lever
+        moment = loads[..., 0]
+        for arm, force in ((y, 1), (-x, 2)):
+            moment = moment + arm * loads[..., force] if arm else moment
+        return np.stack([curved(moment, *self.moment_curve), loads[..., 1], loads[..., 2]], axis=-1)
+
+    def loads_of(self, readings: Floats, present: slice | Index = slice(None)) -> Floats:
+        """Return the loads, shape (..., channels), of readings of the present channels without bias.
+
+        Where the curve of the moment turns back, readings beyond are taken for the last one before.
+        """
+        if not any(self.moment_curve) or 0 not in np.arange(len(CHANNELS))[present]:
+            return np.asarray(readings @ np.linalg.inv(self.gain_matrix[present][:, present]).T)
+        loads = np.asarray(readings @ np.linalg.inv(np.array(self.gain)[present][:, present]).T)
+        arms = replace(self.straight, gain=_IDENTITY).gain_matrix[present][:, present]
+        loads[..., 0] = straightened(loads[..., 0], *self.moment_curve)
+        return np.asarray(loads @ np.linalg.inv(arms).T)
+
+    def slopes(self, loads: Floats) -> Floats:
+        """Return the change of readings with loads, shape (..., 3, 3) or (3, 3) if it is the same for all."""
+        if not any(self.moment_curve):
+            return self.gain_matrix
+        at_end = replace(self.straight, gain=_IDENTITY)
+        moment = at_end.expected(loads)[..., 0] - self.bias[0]
+        bent = np.broadcast_to(np.eye(3), (*moment.shape, 3, 3)).copy()
+        bent[..., 0, 0] = slope_of(moment, *self.moment_curve)
+        return np.asarray(np.array(self.gain) @ bent @ at_end.gain_matrix)
 
     def deviation(self, loads: Floats) -> Floats:
         """Scale of the white noise on the readings of loads, shape (..., 3), or (3,) if it is the same for all."""
@@ -242,7 +285,9 @@ class DataSheet:
         >>> DataSheet(force_noise=0.5, moment_noise=0.25).dimensionless(Rod(0.5, 2.0)).noise
         array([0.0625, 0.0625, 0.0625])
         """
-        sizes = {"N": rod.force_unit, "N m": rod.moment_unit, "m": rod.length_unit, "1/m": 1.0 / rod.length_unit}
+        moment = rod.moment_unit
+        sizes = {"N": rod.force_unit, "N m": moment, "m": rod.length_unit, "1/m": 1.0 / rod.length_unit}
+        sizes |= {"1/N/m": 1.0 / moment, "1/N²/m²": 1.0 / moment**2}
         entries = dict(self._all_entries())
         for name, unit in LOAD_CELL_UNITS.items():
             if name in entries and unit in sizes:

@@ -19,7 +19,8 @@ __all__ = ["corrected", "measured", "stated_entries"]
 
 _PREFIX = "load_cell_"
 _TAKEN_OUT = tuple(
-    f"{_PREFIX}{name}" for name in ("bias_h", "bias_f", "gain_", "lever_", "drive_angle_offset", "drive_angle_backlash")
+    f"{_PREFIX}{name}"
+    for name in ("bias_h", "bias_f", "gain_", "lever_", "moment_curve_", "drive_angle_offset", "drive_angle_backlash")
 )
 
 
@@ -66,8 +67,8 @@ def corrected(sheet: DataSheet, record: xr.Dataset) -> xr.Dataset:
             "out; infer_contour works without"
         )
     loads = np.stack([corrected[CHANNELS[i]].values for i in present], axis=-1) - np.array(sheet.bias)[present]
-    if (sheet.gain, sheet.lever) != (ideal.gain, ideal.lever):
-        loads = loads @ np.linalg.inv(sheet.gain_matrix[np.ix_(present, present)]).T
+    if any(getattr(sheet, name) != getattr(ideal, name) for name in ("gain", "lever", "moment_curve")):
+        loads = sheet.loads_of(loads, np.array(present))
     for values, index in zip(loads.T, present, strict=True):
         corrected[CHANNELS[index]].values = values
     corrected["drive_angle"].values = corrected["drive_angle"].values - sheet.misread(corrected["direction"].values)

@@ -181,7 +181,7 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
         in_cell = np.einsum("nji,nj->ni", turn, loads)
     side = np.where(record.direction.values == "forward", 1.0, -1.0)
     signs = np.where(side[:, None] < 0.0, [-1.0, -1.0, 1.0], 1.0)
-    from_readings = signs[:, :, None] * turn @ np.linalg.inv(cell.gain_matrix)
+    from_readings = signs[:, :, None] * turn @ np.linalg.inv(cell.slopes(in_cell))
     slope = side * record.truth_slope_angle.values
     tip_angle = np.where(side < 0.0, np.pi - record.truth_tip_angle.values, record.truth_tip_angle.values)
     tip = record.truth_contact_phase.values == "tip"

@@ -99,11 +99,11 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         has_noise = bool(np.any(cell.unrest) or cell.relative_noise or cell.drive_angle_deviation)
         covariance = np.zeros((1, 3, 3))
         if has_noise:
-            inverse = np.linalg.inv(cell.gain_matrix)
             for_covariance = (
                 loads if cell.relative_noise or cell.drift is not None else loads[:1]
             )  # otherwise all are equal
-            covariance = inverse @ cell.covariance(for_covariance) @ inverse.T
+            inverse = np.linalg.inv(cell.slopes(loads))
+            covariance = inverse @ cell.covariance(for_covariance) @ np.swapaxes(inverse, -1, -2)
         leaning = np.zeros(loads.shape)
         if frame_of(measured) == "turning":
             loads[:, 1], loads[:, 2] = turned(loads[:, 1], loads[:, 2], -angle)

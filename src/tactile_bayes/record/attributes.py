@@ -30,7 +30,7 @@ _SHAPE = ("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviati
 _POINTS, _SAME = 101, 1e-9
 """Points at which properties along rods are compared, and the difference over the largest value that counts as zero."""
 
-_SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_lever_", "_offset", "_backlash")
+_SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_lever_", "_curve_", "_offset", "_backlash")
 
 __all__ = [
     "checked_attributes",

@@ -145,6 +145,8 @@ LOAD_CELL_UNITS: Mapping[str, str] = MappingProxyType(
         },
         "lever_x": "m",
         "lever_y": "m",
+        "moment_curve_quadratic": "1/N/m",
+        "moment_curve_cubic": "1/N²/m²",
         "force_range": "N",
         "moment_range": "N m",
         "force_resolution": "N",
