@@ -23,6 +23,8 @@ NORMAL = {
     "white": CELL,
     "gain and bias": cell(gain=GAIN, bias=(0.1, -0.2, 0.3)),
     "lever": cell(gain=GAIN, lever=(0.1, -0.2), relative_noise=0.2),
+    "curve": cell(gain=GAIN, lever=(0.1, -0.2), moment_curve=(0.3, 0.1), bias=(0.1, -0.2, 0.3)),
+    "curve, relative": cell(moment_curve=(-0.2, 0.05), relative_noise=0.2),
     "relative noise": cell(relative_noise=0.2, gain=GAIN, bias=(0.1, -0.2, 0.3)),
     "random walk": cell(drift=WALK),
     "drift of the forces": cell(drift=RandomWalk(force=0.03)),
@@ -46,7 +48,9 @@ def moments(sheet: LoadCell, loads, noise_scale=(1.0, 1.0, 1.0)):
     """Mean, shape (3n,), and covariance of readings of loads (n, 3), sample by sample, written out."""
     n = len(loads)
     x, y = sheet.lever
+    quadratic, cubic = sheet.moment_curve
     at_lever = [(moment - x * force_y + y * force_x, force_x, force_y) for moment, force_x, force_y in loads]
+    at_lever = [(m + quadratic * m**2 + cubic * m**3, force_x, force_y) for m, force_x, force_y in at_lever]
     weighed = np.array([np.array(sheet.gain) @ load for load in at_lever])
     white = np.array([sheet.moment_noise, sheet.force_noise, sheet.force_noise])
     white = np.sqrt(white**2 + (sheet.relative_noise * weighed) ** 2) * np.asarray(noise_scale)
@@ -107,6 +111,7 @@ def load_cells(draw, frames=(None, "fixed", "turning")) -> LoadCell:
         drift=draw(_drifts),
         gain=np.eye(3) + np.reshape(cross, (3, 3)),
         lever=draw(st.one_of(st.just((0.0, 0.0)), st.tuples(_signed, _signed))),
+        moment_curve=draw(st.one_of(st.just((0.0, 0.0)), st.tuples(_signed, _signed))),
         force_range=draw(st.one_of(st.just(np.inf), st.floats(1.0, 3.0))),
         moment_range=draw(st.one_of(st.just(np.inf), st.floats(1.0, 3.0))),
         force_resolution=draw(_sizes),

@@ -314,7 +314,7 @@ def test_the_taper_is_inferred_about_the_stated_one():
 
 @pytest.mark.parametrize("rod", [Rod(), SI], ids=["dimensionless", "SI"])
 def test_gains_biases_drifts_and_rigidity_change_what_is_sensed_as_they_say(rod):
-    names = ["rigidity_scale", "moment_gain", "force_y_gain", "lever", "bias", "force_y_drift"]
+    names = ["rigidity_scale", "moment_gain", "moment_curve", "force_y_gain", "lever", "bias", "force_y_drift"]
     length = rod.length
     gain = ((1.02, 0.0, 0.003 * length), (0.0, 0.97, 0.01), (0.0, 0.0, 1.0))
     noise = {"force_noise": 0.05 * rod.force_unit, "moment_noise": 0.02 * rod.moment_unit}
@@ -324,6 +324,7 @@ def test_gains_biases_drifts_and_rigidity_change_what_is_sensed_as_they_say(rod)
     units = rod.load_units
     values = {"rigidity_scale": 1.1, "moment_gain": 0.9, "force_y_gain": 1.2, "force_y_drift": 0.05 * rod.force_unit}
     values |= {"lever_x": 0.03 * length, "lever_y": -0.05 * length}
+    values |= {"moment_curve_quadratic": 0.03 / rod.moment_unit, "moment_curve_cubic": -0.005 / rod.moment_unit**2}
     values |= dict(
         zip(("moment_bias", "force_x_bias", "force_y_bias"), np.array([0.01, -0.02, 0.03]) * units, strict=True)
     )
@@ -332,7 +333,10 @@ def test_gains_biases_drifts_and_rigidity_change_what_is_sensed_as_they_say(rod)
     found = model.likelihood.load_cell.expected(loads)[0] * units
     plain, _ = model.likelihood.predict(model.contours(point))
     plain[0, :, 0] += -0.04 * plain[0, :, 2] - 0.03 * plain[0, :, 1]
-    true = 1.1 * plain[0] * np.array([0.9, 1.0, 1.2]) * units
+    true = 1.1 * plain[0]
+    assert np.abs(true[:, 0]).max() < 6.0  # where the cubic turns back
+    true[:, 0] += 0.03 * true[:, 0] ** 2 - 0.005 * true[:, 0] ** 3
+    true *= np.array([0.9, 1.0, 1.2]) * units
     expected = true @ np.array(gain).T + np.array([0.01, -0.02, 0.03]) * units
     expected[:, 2] += np.linspace(-0.5, 0.5, len(expected)) * 0.05 * rod.force_unit
     np.testing.assert_allclose(found / units, expected / units, rtol=0.0, atol=1e-12)
@@ -479,7 +483,7 @@ def test_biases_that_the_cell_is_not_sure_of_are_integrated_out_and_not_inferred
     [
         (["lever_x", "lever_z"], ["'lever_z'"]),
         (["base_x"], ["base_x", "pivot", "object"]),
-        (["EI"], ["'EI'", "bias, drift, gain, lever, rigidity_scale"]),
+        (["EI"], ["'EI'", "bias, drift, gain, lever, moment_curve, rigidity_scale"]),
         ("bias", ["nuisances", "'bias'"]),
         (["rigidity_scale", "gain"], ["rigidity_scale", "moment_gain, force_x_gain, force_y_gain"]),
     ],

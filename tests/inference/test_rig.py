@@ -17,8 +17,10 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import infer_contour, infer_rig
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.inference.nuisances import CURVE
 from tactile_bayes.inference.rig_prior import RigPrior, rig_prior
 from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.uncertainty.band import contour_band
 
 PIN, OBJECT = Circle(r=0.2, q=0.5), Parabola(0.7, 0.45)
@@ -261,3 +263,33 @@ def found_nothing():
     tree = drawn()
     del tree.attrs["gauge"]
     return tree
+
+
+def test_a_sensor_in_counts_is_calibrated_on_a_gauge_whose_place_is_uncertain():
+    """From the moment alone, whose reading is a curve; the object is then inferred with it."""
+    true = {"moment_gain": 1.1, "moment_curve_quadratic": 0.06, "moment_curve_cubic": 0.03}
+    true |= {"gauge_x": 0.01, "gauge_y": -0.006}
+    stated = LoadCell(moment_noise=5.0, gain=counts(900.0))
+    real = LoadCell(moment_noise=5.0, gain=counts(900.0 * 1.1), moment_curve=(0.06, 0.03))
+
+    def read_by(sensor, contour, seed):
+        record = sensor.measure(swept(contour, step=0.05), seed=seed)
+        record.attrs = {name: v for name, v in record.attrs.items() if not name.startswith("load_cell_")}
+        return record.assign({name: np.nan * record[name] for name in ("force_x", "force_y")})
+
+    known = {"load_cell": stated, "seed": 1, "settings": SOUND}
+    wide = {"moment_gain": stats.lognorm(s=0.3)}
+    place = Circle(r=0.2, q=0.5 - 0.006, x_c=0.01)
+    calibrated = infer_rig(
+        read_by(real, place, 1), contour=PIN, nuisances=("gauge", "moment_curve", "moment_bias"), priors=wide, **known
+    )
+    assert_near(calibrated, true)
+    assert set(rig_prior(calibrated).priors) == {"moment_gain", *CURVE}
+    posterior = infer_contour(read_by(real, OBJECT, 2), nuisances=("moment_bias",), rig=calibrated, **known)
+    assert_near(posterior, {"a": 0.7, "q": 0.45, **{name: true[name] for name in ("moment_gain", *CURVE)}})
+    with refused(ParameterError, "gauge"):
+        infer_contour(read_by(real, OBJECT, 2), nuisances=("gauge_x",), **known)
+
+
+def counts(gain):
+    return ((gain, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -236,6 +236,7 @@ def test_step_2_of_a_record_with_known_errors_is_that_of_the_ideal_one(frame, ro
     gain = np.array(GAIN) * [[1.0, length, length], [1 / length, 1.0, 1.0], [1 / length, 1.0, 1.0]]
     bias = np.array([0.1, -0.2, 0.3]) * [unit[0], unit[1], unit[1]]
     further = {"lever": (0.03 * length, -0.02 * length), "drive_angle_offset": 0.02, "drive_angle_backlash": 0.01}
+    further["moment_curve"] = (0.05 / unit[0], 0.02 / unit[0] ** 2)
     sheet = LoadCell(bias=bias, gain=gain, **further, frame=frame)
     clean = reconstruct(record)
     measured = sheet.measure(record, seed=1)

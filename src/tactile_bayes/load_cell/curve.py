@@ -32,7 +32,7 @@ def unsaturated(quadratic: Any, cubic: Any) -> tuple[Floats, Floats]:
     a, b = np.asarray(quadratic, dtype=float), np.asarray(cubic, dtype=float)
     root = np.sqrt(np.maximum(a**2 - 3.0 * b, 0.0))
     turns = a**2 > 3.0 * b
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         low = np.where(turns & (root + a > 0.0), -1.0 / (root + a), -np.inf)
         high = np.where(turns & (root - a > 0.0), 1.0 / (root - a), np.inf)
     return low, high

@@ -285,9 +285,7 @@ class DataSheet:
         >>> DataSheet(force_noise=0.5, moment_noise=0.25).dimensionless(Rod(0.5, 2.0)).noise
         array([0.0625, 0.0625, 0.0625])
         """
-        moment = rod.moment_unit
-        sizes = {"N": rod.force_unit, "N m": moment, "m": rod.length_unit, "1/m": 1.0 / rod.length_unit}
-        sizes |= {"1/N/m": 1.0 / moment, "1/N²/m²": 1.0 / moment**2}
+        sizes = rod.unit_sizes
         entries = dict(self._all_entries())
         for name, unit in LOAD_CELL_UNITS.items():
             if name in entries and unit in sizes:

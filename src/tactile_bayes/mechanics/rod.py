@@ -357,6 +357,19 @@ class Rod:
         return 1.0 / self.length
 
     @property
+    def unit_sizes(self) -> dict[str, float]:
+        """Sizes of the units of a dimensionless record, by the SI units in whose place they are.
+
+        Examples
+        --------
+        >>> Rod(0.5, 2.0).unit_sizes["N m"]
+        4.0
+        """
+        moment, length = self.moment_unit, self.length_unit
+        sizes = {"N": self.force_unit, "N m": moment, "m": length, "1/m": self.curvature_unit}
+        return sizes | {"1/N/m": 1.0 / moment, "1/N²/m²": 1.0 / moment**2}
+
+    @property
     def load_units(self) -> Floats:
         """Units of the loads (holding_moment, force_x, force_y): EI/L [N m] and twice EI/L² [N]."""
         return np.array([self.moment_unit, self.force_unit, self.force_unit])

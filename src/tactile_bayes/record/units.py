@@ -160,8 +160,7 @@ def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
             with np.errstate(over="ignore"):  # refused below, with the sample that it happened in
                 variable.values = convert(variable.values, getattr(rod, column.scale))
             variable.attrs["units"] = column.unit_in(units)
-    length = rod.length_unit
-    scales = {"N": rod.force_unit, "N m": rod.moment_unit, "m": length, "1/m": rod.curvature_unit}
+    scales = rod.unit_sizes
     for entry, unit in LOAD_CELL_UNITS.items():
         name = f"load_cell_{entry}"
         if name in converted.attrs and unit in scales:
