@@ -99,8 +99,9 @@ def infer_contour(
         one), "drive_angle_offset" (encoder offset [rad]), "bias" (of all channels, or "moment_bias", "force_x_bias",
         "force_y_bias"), "lever" (the point of the moment's reference, from the pivot along the axes of the cell
         [length], or "lever_x", "lever_y"), "backlash" (reading of the encoder in forward motion less that in backward
-        motion [rad]), "drift" (of all channels, or "moment_drift" and so on: linear change of a zero from the first
-        sample to the last; the bias is the zero in the middle), "gain" (likewise), "friction" (Coulomb's coefficient),
+        motion [rad]), "moment_curve" (curve of the moment's reading, as of `LoadCell`, or "moment_curve_quadratic",
+        "moment_curve_cubic"), "drift" (of all channels, or "moment_drift" and so on: linear change of a zero from first
+        to last sample; the bias is the zero in the middle), "gain" (likewise), "friction" (Coulomb's coefficient),
         "suspension_compliance" (turn of the pivot per holding moment), "rest_curvature" (mean curvature of the unloaded
         rod; how it varies along the rod stays as stated), "taper". By default the first five and friction, except
         those that are not identifiable (the lever without the moment, the backlash in a single direction) and a given
@@ -128,11 +129,11 @@ def infer_contour(
         the prior), so that it can be stored before they can fail.
     rig : xr.DataTree, optional
         Result of `infer_rig` for the same rig, whose posterior is the prior of the parameters that last: stiffness,
-        encoder offset, backlash, lever, gains, compliance, and the rod's curvature and taper. They are inferred without
-        being named, with their correlations. Zeros, drifts, noise and shifts of pivots belong to a record, and friction
-        to the surfaces of rod and object: they keep their own priors. The attribute `rig_density_error` of the result
-        is the largest difference between quantiles of the rig's draws and of the density fitted to them, along each
-        parameter and principal axis, in standard deviations.
+        encoder offset, backlash, lever, gains, curve of the moment, compliance, and the rod's curvature and taper. They
+        are inferred without being named, with their correlations. Zeros, drifts, noise and shifts of pivots belong to a
+        record, and friction to the surfaces of rod and object: they keep their own priors. The attribute
+        `rig_density_error` of the result is the largest difference between quantiles of the rig's draws and of the
+        density fitted to them, along each parameter and principal axis, in standard deviations.
 
     Returns
     -------
@@ -172,7 +173,8 @@ def infer_contour(
     1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Of the
     nuisances: rigidity_scale log-normal around 1 with 5 %, drive_angle_offset normal with 1°, biases and drifts normal
     with 0.1 EI/L and EI/L² (a bias of which the load cell states a bias_uncertainty is integrated out instead), lever_x
-    and lever_y normal with 0.5 % of L, backlash normal with 0.2°, gains normal around 1 with 2 %, friction half-normal
+    and lever_y normal with 0.5 % of L, the curve of the moment normal around the stated one with 0.05 L/EI and
+    0.02 (L/EI)², backlash normal with 0.2°, gains normal around 1 with 2 %, friction half-normal
     with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, rest_curvature normal around the stated
     mean with the rod's rest_curvature_deviation, or 0.05/L if it has none, taper normal around the stated one with
     0.05, pivots normal with 1 % of L; discrepancy_scale log-normal around 0.005, standard deviation 1 of the logarithm,
@@ -234,10 +236,13 @@ def infer_rig(
     records : xr.Dataset
         A record of the gauge, with any number of sweeps, pivots and drives.
     contour : Contour
-        Contour of the gauge in the coordinates and the unit of length of the record, one of a family. Its shape and
-        its position from the pivot are taken as exact.
-    load_cell, priors, seed, rod, friction, nuisances, events, settings, checkpoint, progress, keep
+        Contour of the gauge in the coordinates and the unit of length of the record, one of a family. Its shape is
+        taken as exact, and its position unless "gauge" is among the nuisances.
+    load_cell, priors, seed, rod, friction, events, settings, checkpoint, progress, keep
         As in `infer_contour`.
+    nuisances : sequence of str
+        As in `infer_contour`; and "gauge", the shifts "gauge_x" and "gauge_y" of the gauge from where `contour` is
+        [length], normal with 1 % of L by default.
     rig : xr.DataTree, optional
         Result of `infer_rig` for another record of the same rig, of this gauge or of another one: its posterior is the
         prior, as in `infer_contour`, so that the result rests on both records. Each has its own zeros, drifts, noise,

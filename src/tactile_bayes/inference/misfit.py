@@ -57,7 +57,8 @@ def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, f
     It may be the family or the rig. Try another family (--family shape-free, or compare), or infer more of the rig \
 (--nuisance gain, suspension_compliance, rest_curvature, taper).
     """
-    left = [name for name in _SUSPECTS if not is_inferred(name, nuisances)]
+    suspects = (*_SUSPECTS, GAUGE) if GAUGE in families else _SUSPECTS
+    left = [name for name in suspects if not is_inferred(name, nuisances)]
     if friction and "friction" in left:
         left.remove("friction")
     instead = " in place of rigidity_scale"  # which measures the same as all gains

@@ -289,8 +289,8 @@ def nuisances_of(
             names += _bases_off(name, measured)
             continue
         if name not in _KINDS and name not in _GROUPS:
-            known = [n for n in (_STANDARD, *_GROUPS, *_KINDS, DISCREPANCY) if gauge or not n.startswith("gauge")]
-            raise ParameterError(f"there is no nuisance parameter {name!r}: choose from {', '.join(known)}, or base")
+            offered = [n for n in (_STANDARD, *_GROUPS, *_KINDS, DISCREPANCY) if gauge or not n.startswith("gauge")]
+            raise ParameterError(f"there is no nuisance parameter {name!r}: choose from {', '.join(offered)}, or base")
         if name in unidentifiable and name not in found:
             raise ParameterError(f"{name} cannot be inferred: {unidentifiable[name]}")
         members = [n for n in _GROUPS[name] if _is_measured(n, present)] if name in _GROUPS else [name]
