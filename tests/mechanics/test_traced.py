@@ -182,3 +182,39 @@ def test_curvature_does_not_follow_the_scatter():
         rng = np.random.default_rng(seed)
         found = traced_rod(x + rng.normal(0.0, 1e-4, s.size), y + rng.normal(0.0, 1e-4, s.size))
         assert np.abs(found.rest_curvature(at) - 0.1 * (2.0 + 4.0 * at)).max() < 0.4
+
+
+@pytest.mark.parametrize("name", CURVATURES)
+@pytest.mark.parametrize("given", [False, True])
+def test_a_rod_may_go_on_beyond_its_points(name, given):
+    """Its trend goes on, with errors that are as large as stated; the points tell no less of the rest."""
+    rng = np.random.default_rng(12)
+    s, count, scatter = np.linspace(0.0, 0.9, 60), 30, 0.05
+    x, y = points_of(CURVATURES[name], s)
+    at = np.array([0.2, 0.6, 0.95, 1.0])
+    errors, short = [], []
+    for _ in range(count):
+        noise = rng.normal(0.0, scatter, (2, s.size))
+        points = x + noise[0], y + noise[1]
+        rod = traced_rod(*points, scatter=scatter if given else None, length=80.0)
+        assert rod.length == 80.0
+        errors.append((rod.rest_curvature(at) - CURVATURES[name](at)) / rod.deviation(at))
+        short.append(rod.scatter / traced_rod(*points).scatter - 1.0)
+    squares = np.mean(np.square(errors), axis=0)
+    assert (squares < chi2.isf(1e-6, count) / count).all()
+    deviations = traced_rod(x, y, scatter=scatter, length=80.0).deviation(at)
+    assert deviations[3] > deviations[2] > 1.5 * deviations[1]
+    assert given or np.abs(short).max() < 0.02
+
+
+def test_exact_points_of_a_part_give_the_whole():
+    x, y = points_of(CURVATURES["spiral"], np.linspace(0.0, 0.8, 30))
+    rod = traced_rod(x, y, length=80.0)
+    np.testing.assert_allclose(rod.rest_curvature(S), 5.0 * S, atol=1e-6)
+
+
+@pytest.mark.parametrize("length", [70.0, 130.0, np.nan])
+def test_a_length_that_is_none_is_refused(length):
+    x, y = points_of(CURVATURES["arc"], S)
+    with refused(ParameterError, "length"):
+        traced_rod(x, y, length=length)

@@ -71,8 +71,8 @@ class RodOptions:
     rod_shape: Annotated[
         Path | None,
         typer.Option(
-            help="CSV file with columns x and y [m], points traced along the unloaded rod from its base: its length "
-            "and rest curvature, in place of --length and --rest-curvature."
+            help="CSV file with columns x and y [m], points traced along the unloaded rod from its base: its rest "
+            "curvature, in place of --rest-curvature, and its length unless --length gives a larger one, beyond them."
         ),
     ] = None
 
@@ -89,10 +89,12 @@ class RodOptions:
         from tactile_bayes.mechanics.rod import Rod
 
         if self.rod_shape is not None:
-            if self.length is not None or self.rest_curvature:
-                raise ParameterError("--rod-shape gives length and rest curvature: leave out the options of these")
+            if self.rest_curvature:
+                raise ParameterError("--rod-shape gives the rest curvature: leave out --rest-curvature")
             x, y = columns_in(self.rod_shape, ("x", "y"))
-            return Rod.from_shape(x, y, self.flexural_rigidity, diameter=self.diameter, taper=self.taper)
+            return Rod.from_shape(
+                x, y, self.flexural_rigidity, length=self.length, diameter=self.diameter, taper=self.taper
+            )
         if (self.length is None) != (self.flexural_rigidity is None):
             raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
         if self.diameter and self.length is None:

@@ -200,6 +200,7 @@ class Rod:
         flexural_rigidity: float | None = None,
         *,
         scatter: float | None = None,
+        length: float | None = None,
         diameter: float = 0.0,
         taper: float = 0.0,
         rigidity_profile: Any = None,
@@ -218,6 +219,10 @@ class Rod:
             EI at the base [N m²]. By default the rod is dimensionless, and the points are in any unit of length.
         scatter : float, optional
             Standard deviation of each coordinate, in the unit of the points; estimated from them by default.
+        length : float, optional
+            Length of the rod from the first point on, in the unit of the points, if it goes on beyond the last one, as
+            a whisker does whose tip is not to be touched. The rest curvature there goes on with its trend. By default
+            the last point is the tip.
         diameter : float
             As in `Rod`, in the unit of the points.
         taper, rigidity_profile
@@ -243,16 +248,16 @@ class Rod:
         """
         from tactile_bayes.mechanics.traced import traced_rod
 
-        traced = traced_rod(x, y, scatter=scatter)
-        length, rigidity = (1.0, 1.0) if flexural_rigidity is None else (traced.length, flexural_rigidity)
+        traced = traced_rod(x, y, scatter=scatter, length=length)
+        whole, rigidity = (1.0, 1.0) if flexural_rigidity is None else (traced.length, flexural_rigidity)
         return cls(
-            length,
+            whole,
             rigidity,
-            diameter * length / traced.length,
-            rest_curvature=lambda s: traced.rest_curvature(s / length) / length,
+            diameter * whole / traced.length,
+            rest_curvature=lambda s: traced.rest_curvature(s / whole) / whole,
             taper=taper,
             rigidity_profile=rigidity_profile,
-            rest_curvature_deviation=traced.deviation_of_mean / length,
+            rest_curvature_deviation=traced.deviation_of_mean / whole,
         )
 
     def mirrored(self, side: ArrayLike) -> Rods:

@@ -49,6 +49,9 @@ _GROUPS = 10
 _THICKEST = 0.05
 """Largest scatter of the points, as a share of the length."""
 
+_MOST_BEYOND = 1.5
+"""Largest length of a rod over that of its points."""
+
 _BACKWARD = 6.0
 """Standard deviations by which a point may lie behind one before it: noise does so once in 1e5 times."""
 
@@ -96,7 +99,7 @@ class TracedRod:
         return float(np.sqrt(mean @ self.covariance @ mean))
 
 
-def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None) -> TracedRod:
+def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None, length: float | None = None) -> TracedRod:
     """Return the rest curvature of a rod from points traced along it, base first.
 
     Parameters
@@ -105,6 +108,9 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None) -> T
         Points of the unloaded rod in order, from the base to the tip, at least 8 [any unit of length].
     scatter : float, optional
         Standard deviation of each coordinate, in that unit; estimated from the points by default.
+    length : float, optional
+        Length of the rod from the first point on, in that unit, if it goes on beyond the last one. The curvature there
+        follows from the prior: it goes on with its trend, and with a deviation that grows.
 
     Returns
     -------
@@ -113,7 +119,8 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None) -> T
     Raises
     ------
     ParameterError
-        If the points are too few, not ordered, fold back, or scatter by more than a twentieth of the length.
+        If the points are too few, not ordered, fold back, or scatter by more than a twentieth of the length; if the
+        length is shorter than the points are far along the rod, or longer by more than a half.
 
     Examples
     --------
@@ -131,7 +138,12 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None) -> T
         scatter = check_positive("scatter", scatter, "give a positive number, in the unit of x and y, or None")
     points = np.stack(columns, axis=1)
     _refuse_turns(points)
+    if length is not None:
+        length = check_positive("length", length, "give a positive number, in the unit of x and y, or None")
     fit = _fitted(points, None)
+    if length is not None:
+        _refuse_length(length, fit)
+        fit = _fitted(points, None, length)
     found = fit.length * fit.posterior.scatter
     if not found <= _THICKEST * fit.length:
         raise ParameterError(
@@ -144,16 +156,27 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None) -> T
                 f"the points are off a smooth rod by {found:.3g} (root mean square), and their scatter is given as "
                 f"{scatter:.3g}: give a larger one, or None to estimate it"
             )
-        fit = _fitted(points, scatter)
+        fit = _fitted(points, scatter, length)
     used = fit.posterior.scatter if scatter is None else scatter / fit.length
     _refuse_backward(fit.feet, used)
-    # The ends are known to the scatter along the rod.
+    # The ends, unless the length is given, are known to the scatter along the rod.
     nodes = chebyshev.nodes(fit.curvature.size)
     value = chebyshev.evaluate(fit.curvature, nodes)
     rate = chebyshev.evaluate(chebyshev.derivative(fit.curvature), nodes)
     ends = chebyshev.coefficients(np.array([(1.0 - nodes) * rate - value, nodes * rate + value]))
+    if length is not None:
+        ends = ends[:, :1]
     covariance = fit.covariance + used**2 * (ends @ ends.T)
     return TracedRod(fit.length, fit.length * used if scatter is None else scatter, fit.curvature, covariance)
+
+
+def _refuse_length(length: float, fit: _Fit) -> None:
+    traced, scatter = fit.length, fit.length * fit.posterior.scatter
+    if not traced - _BACKWARD * scatter - _SETTLED * traced <= length <= _MOST_BEYOND * traced:
+        raise ParameterError(
+            f"length is {length:.6g}, and the points are {traced:.6g} long: give the length of the whole rod from the "
+            f"first point on, at most {_MOST_BEYOND:g} times as long as the points, or None if they end at its tip"
+        )
 
 
 def _refuse_turns(points: Floats) -> None:
@@ -269,13 +292,18 @@ class _Fit(NamedTuple):
     posterior: _Posterior
 
 
-def _fitted(given: Floats, scatter: float | None) -> _Fit:
-    """Gauss–Newton steps for the offset of the base from the first point, its direction, and the curvature."""
+def _fitted(given: Floats, scatter: float | None, whole: float | None = None) -> _Fit:
+    """Gauss–Newton steps for the offset of the base from the first point, its direction, and the curvature.
+
+    Without the length of the whole rod it ends at the last point.
+    """
     start = _start_of(given)
-    length, feet = start.length, start.feet
+    length = start.length if whole is None else whole
+    traced = start.length / length
+    feet = traced * start.feet
     terms = min(_TERMS, given.shape[0] - _FREE) if scatter is None else _TERMS
     smooth, nodes = _smooth(terms), chebyshev.nodes(terms)
-    guess = Chebyshev.fit(np.linspace(0.0, 1.0, start.slopes.size), start.slopes, _FREE, domain=[0.0, 1.0])
+    guess = Chebyshev.fit(np.linspace(0.0, traced, start.slopes.size), start.slopes, _FREE, domain=[0.0, 1.0])
     offset, base, curvature = 0.0, float(guess(0.0)), np.zeros(terms)
     curvature[:_FREE] = guess.deriv().coef
     turns = chebyshev.integral(smooth)
@@ -302,7 +330,7 @@ def _fitted(given: Floats, scatter: float | None) -> _Fit:
         step[2:], feet = smooth @ step[2:], np.clip(feet + ahead, -0.5, 1.5)
         settled = bool(max(np.abs(step).max(), np.abs(ahead).max()) < _SETTLED)
         # From lengths of the last guess to those of this one.
-        share = float(feet[-1])
+        share = float(feet[-1]) if whole is None else 1.0
         feet, length, offset, base = feet / share, length * share, (offset + step[0]) / share, base + step[1]
         curvature = share * chebyshev.coefficients(chebyshev.evaluate(curvature + step[2:], share * nodes))
         if settled:
