@@ -1,0 +1,146 @@
+"""Prints what a real whisker tells of real cylinders: calibrated on points, then swept past them.
+
+The data are those of `../shared/data/whisker-sweeps`, or of the folder that TACTILE_BAYES_MEASURED names; the README
+there describes them. A thin probe touches a bent nitinol whisker at known points, and a stage moves cylinders past it.
+A Hall sensor under the clamp counts. Taken from that README are the direction of the whisker, the transformation of the
+stage's coordinates, and 4.1 mm between the hinge of the sensor and the first traced point. From that point the rod is
+51 mm long: there it lets go of the smaller cylinder. Its rigidity is that of a wire of 0.24 mm, and scales the gain.
+
+    python -m benchmarks.whisker_sweeps FOLDER [SWEEP ...]
+
+keeps the rig and every posterior in FOLDER, and goes on from there. SWEEP is like cylinder_may25/trial0.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import xarray as xr
+from scipy import stats
+
+import tactile_bayes as tb
+from tactile_bayes.arrays import Floats
+
+MEASURED = Path(os.environ.get("TACTILE_BAYES_MEASURED", "../shared/data")) / "whisker-sweeps"
+NAMES = ("index", "x", "y", "z", "sensor_x", "sensor_y", "sensor_z")
+ORIGIN = np.array([64.3045, 98.0687])
+"""Place of the sensor in the coordinates of the stage [mm]."""
+
+DRIVE_ANGLE = np.radians(180.0 - 115.3)
+"""Direction of the whisker at the clamp. The object rests and the sensor moves, in a frame that is turned by half."""
+
+HINGE, LENGTH, DIAMETER, RIGIDITY = 4.1, 51.0, 0.24e-3, 1e-5
+COUNTS = 5e6
+"""Roughly, counts to N m; the calibration finds them."""
+
+RINGS = range(3, 9)
+"""Distances of the probe from the clamp: closer points do not fit any rod, and the outermost is at the tip."""
+
+BEFORE = np.radians(-108.0)
+"""Bearing from which the probe arrives, on the other side of the whisker."""
+
+SWEEPS = tuple(f"cylinder_may25/trial{k}" for k in range(5)) + tuple(f"cylinder_may03/trial{k}" for k in range(1, 5))
+ENOUGH = tb.SamplerSettings(min_ess=400, max_r_hat=1.03, max_seconds=300)
+
+
+def whisker() -> tb.Rod:
+    """Return the rod, from the hinge to the tip, whose first piece is straight."""
+    traced = _table("shape_y.csv")
+    x, y = traced["x"], traced["y"]
+    before = np.array([x[0] - x[3], y[0] - y[3]])
+    before *= HINGE / np.hypot(*before)
+    x, y = np.append(x[0] + before[0] * np.array([1.0, 0.5]), x), np.append(y[0] + before[1] * np.array([1.0, 0.5]), y)
+    return tb.Rod.from_shape(1e-3 * x, 1e-3 * y, RIGIDITY, length=1e-3 * (HINGE + LENGTH), diameter=DIAMETER)
+
+
+def points(rod: tb.Rod) -> xr.Dataset:
+    """Return the record of the probe, along five rays away from the clamp: each a sweep that begins beside the whisker.
+
+    Readings there and back are averaged.
+    """
+    found = np.genfromtxt(MEASURED / "calibration_in_plane.csv", delimiter=",", names=True)
+    rows = []
+    for ray in range(5):
+        twice = found[np.isin(found["series"], (4 - ray, 5 + ray))]
+        rings = [twice[twice["position"] == ring] for ring in RINGS]
+        places = [[each[name].mean() for name in ("x_mm", "y_mm", "sy_counts")] for each in rings]
+        near = 0.4 * np.hypot(*places[0][:2])
+        rows += [[ray, near * np.cos(BEFORE), near * np.sin(BEFORE), 0.0], *([ray, *place] for place in places)]
+    sweep, x, y, counts = np.array(rows).T
+    return _record(rod, sweep.astype(int), x, y, counts)
+
+
+def sweep_of(name: str, rod: tb.Rod) -> xr.Dataset:
+    """Return the record of a cylinder, up to where the reading has fallen to 60 % of its peak."""
+    table = _table(f"{name}.csv")
+    counts = table["sensor_y"]
+    released = (np.arange(counts.size) > counts.argmax()) & (counts < 0.6 * counts.max())
+    x, y = table["x"] - ORIGIN[0], table["y"] - table["y"][0]
+    return _record(rod, np.zeros(counts.size, dtype=int), x, y, counts).isel(sample=~released)
+
+
+def _record(rod: tb.Rod, sweep: Floats, x: Floats, y: Floats, counts: Floats) -> xr.Dataset:
+    columns = {"sweep": sweep, "direction": "forward", "base_x": 1e-3 * x, "base_y": 1e-3 * y}
+    columns |= {"drive_angle": np.full(len(x), DRIVE_ANGLE), "holding_moment": counts}
+    return tb.make_record(columns, rod=rod, missing=("force_x", "force_y"))
+
+
+def _table(name: str) -> Floats:
+    return np.genfromtxt(MEASURED / name, delimiter=",", names=NAMES, skip_header=1)
+
+
+def calibrated(folder: Path, rod: tb.Rod, cell: tb.LoadCell) -> xr.DataTree:
+    """Return the rig, from the probe, whose place is uncertain by some millimetres."""
+    path = folder / "rig.nc"
+    if not path.exists():
+        unit = rod.moment_unit
+        priors = {
+            "moment_gain": stats.lognorm(s=0.5),
+            "moment_curve_quadratic": stats.norm(0.0, 0.2 / unit),
+            "moment_curve_cubic": stats.norm(0.0, 0.1 / unit**2),
+            "suspension_compliance": stats.halfnorm(scale=0.3 / unit),
+            **dict.fromkeys(("gauge_x", "gauge_y"), stats.norm(0.0, 3e-3)),
+        }
+        known = {"nuisances": ("drive_angle_offset", "friction"), "priors": priors, "seed": 1}
+        probe = tb.contours.Circle(r=1e-5, q=-1e-5)
+        tb.write_result(tb.infer_rig(points(rod), contour=probe, load_cell=cell, **known), path)
+    return tb.read_result(path)
+
+
+def main() -> None:
+    folder, names = Path(sys.argv[1]), sys.argv[2:] or SWEEPS
+    folder.mkdir(parents=True, exist_ok=True)
+    rod, began = whisker(), perf_counter()
+    cell = tb.LoadCell(moment_noise=3.0, gain=((COUNTS, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    rig = calibrated(folder, rod, cell)
+    print(f"rig: {rig.attrs['message']} ({perf_counter() - began:.0f} s)")
+    for name, draws in rig["posterior"].mean().items():
+        print(f"  {name:24s} {float(draws):12.5g} ± {float(rig['posterior'][name].std()):.2g}")
+    unknown = ("moment_bias", "friction", "discrepancy")
+    for name in names:
+        path, began = folder / f"{name.replace('/', '-')}.nc", perf_counter()
+        if not path.exists():
+            record = sweep_of(name, rod)
+            found = tb.infer_contour(
+                record, family="circle", load_cell=cell, nuisances=unknown, rig=rig, seed=1, settings=ENOUGH
+            )
+            tb.write_result(found, path)
+        found = tb.read_result(path)
+        r, friction = (found["posterior"][one].values.ravel() for one in ("r", "friction"))
+        predicted = found["posterior_predictive"].holding_moment.mean(("chain", "draw"))
+        off = found["observed_data"].holding_moment - predicted
+        low, high = 1e3 * np.quantile(r, [0.025, 0.975])
+        print(
+            f"{name}: radius {1e3 * r.mean():.2f} mm ({low:.2f} to {high:.2f}), friction {friction.mean():.2f} ± "
+            f"{friction.std():.2f}, residuals {float(np.sqrt((off**2).mean())):.1f} counts, "
+            f"{perf_counter() - began:.0f} s; {found.attrs['message']}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
