@@ -292,7 +292,7 @@ def cases(tmp_path):
         **dict.fromkeys([name for name in sheet if name.endswith(("noise", "resolution"))], AT_LEAST_0),
         **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), number(TINY, or_infinite=True)),
         **dict.fromkeys(("drive_angle_offset", "drive_angle_backlash"), number()),
-        "lever": pair,
+        **dict.fromkeys(("lever", "moment_curve"), pair),
         "drift": nothing,
         "frame": nothing,
     }
