@@ -25,7 +25,8 @@ from scipy import stats
 import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 
-MEASURED = Path(os.environ.get("TACTILE_BAYES_MEASURED", "../shared/data")) / "whisker-sweeps"
+ROOT = Path(__file__).resolve().parents[1]
+MEASURED = Path(os.environ.get("TACTILE_BAYES_MEASURED", ROOT.parent / "shared" / "data")) / "whisker-sweeps"
 NAMES = ("index", "x", "y", "z", "sensor_x", "sensor_y", "sensor_z")
 ORIGIN = np.array([64.3045, 98.0687])
 """Place of the sensor in the coordinates of the stage [mm]."""
