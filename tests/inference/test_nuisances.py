@@ -526,3 +526,17 @@ def test_friction_is_either_known_or_inferred():
         assert result.attrs["friction"] == known
     with refused(ParameterError, "friction", 0.2):
         infer_contour(CELL.measure(coarse(), seed=1), nuisances=["friction"], friction=0.2, seed=1)
+
+
+def test_zeros_and_noises_are_expected_in_the_unit_of_the_readings():
+    """A cell that counts has zeros and noises of counts."""
+    record = make_record(
+        {"sweep": 0, "direction": "forward", "drive_angle": [1.0, 1.1, 1.2], "holding_moment": [0.0, 1.0, 2.0]},
+        missing=("force_x", "force_y"),
+    )
+    gain = ((-900.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    names = ["moment_bias", "moment_drift"]
+    priors = default_priors(record, "parabola", LoadCell(gain=gain), names)
+    ideal = default_priors(record, "parabola", LoadCell(), names)
+    for name in (*names, "moment_noise"):
+        np.testing.assert_allclose(priors[name].interval(0.5), 900.0 * np.array(ideal[name].interval(0.5)))

@@ -171,12 +171,13 @@ def infer_contour(
     covariance, ν = 5/2); z_1, z_2 …, standard normal, in the directions that make 99 % of its variance at the shortest
     length scale. They are smooth: a sharper corner, or a radius that jumps, is smoothed. noise_scale: log-normal around
     1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Of the
-    nuisances: rigidity_scale log-normal around 1 with 5 %, drive_angle_offset normal with 1°, biases and drifts normal
-    with 0.1 EI/L and EI/L² (a bias of which the load cell states a bias_uncertainty is integrated out instead), lever_x
-    and lever_y normal with 0.5 % of L, the curve of the moment normal around the stated one with 0.05 L/EI and
-    0.02 (L/EI)², backlash normal with 0.2°, gains normal around 1 with 2 %, friction half-normal
-    with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, rest_curvature normal around the stated
-    mean with the rod's rest_curvature_deviation, or 0.05/L if it has none, taper normal around the stated one with
+    nuisances: rigidity_scale log-normal around 1 with 5 %, drive_angle_offset normal with 1°, biases and drifts
+    normal with the reading of 0.1 EI/L and EI/L² (a bias of which the load cell states a bias_uncertainty is
+    integrated out instead), lever_x and lever_y normal with 0.5 % of L, the curve of the moment normal around the
+    stated one with 0.05 L/EI and 0.02 (L/EI)², backlash normal with 0.2°, gains normal around 1 with 2 %, friction
+    half-normal with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, rest_curvature normal
+    around the stated mean with the rod's rest_curvature_deviation, or 0.05/L if it has none, taper normal around
+    the stated one with
     0.05, pivots normal with 1 % of L; discrepancy_scale log-normal around 0.005, standard deviation 1 of the logarithm,
     discrepancy_length log-normal around 0.3 rad, standard deviation 0.5 of the logarithm. In addition, contours out of
     reach are excluded, those that the rod would still cut after snap-off, and those that a rod curved toward the object

@@ -74,8 +74,9 @@ def noise_of(measured: xr.Dataset, load_cell: LoadCell | None, discrepancy: Mapp
         return Noise(cell, ("noise_scale", *smooth), (CHANNELS,), {"noise_scale": stats.lognorm(s=0.5), **smooth})
     if cell is not None and cell.relative_noise:
         raise ParameterError("the load cell states only relative_noise: state its force_noise and moment_noise as well")
-    rod = rod_of(measured)
-    sources = {"moment_noise": (("holding_moment",), rod.moment_unit), "force_noise": (CHANNELS[1:], rod.force_unit)}
+    gains = (cell or LoadCell()).own_gains
+    moment, force = gains[:2] * rod_of(measured).load_units[:2]
+    sources = {"moment_noise": (("holding_moment",), moment), "force_noise": (CHANNELS[1:], force)}
     sources = {name: source for name, source in sources.items() if set(source[0]) & set(present)}
     return Noise(
         replace(cell or LoadCell(), force_noise=1.0, moment_noise=1.0),

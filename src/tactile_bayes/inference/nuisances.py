@@ -321,7 +321,10 @@ def nuisances_of(
     nuisances = Nuisances(tuple(names), {}, rod, friction, elapsed, curve=curve, pivots=len(bases_of(measured)))
     of_place = (*(name for name in names if _BASE.fullmatch(name)), *_GROUPS["gauge"])
     scales = {name: rod.length if name in of_place else nuisances.units[name] for name in names}
-    defaults = {name: _default_prior(name, scale) for name, scale in scales.items()}
+    for what in ("bias", "drift"):  # as readings
+        for name, gain in zip(_GROUPS[what], cell.own_gains.tolist(), strict=True):
+            scales[name] = gain * nuisances.units[name]
+    defaults = {name: _default_prior(name, scales[name]) for name in names}
     if "rest_curvature" in defaults:
         deviation = rod.rest_curvature_deviation or _CURVATURE * rod.curvature_unit
         defaults["rest_curvature"] = stats.norm(rod.mean_rest_curvature, deviation)

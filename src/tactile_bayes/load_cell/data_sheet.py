@@ -191,6 +191,12 @@ class DataSheet:
         return np.array(self.gain) @ [[1.0, y, -x], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
     @property
+    def own_gains(self) -> Floats:
+        """Reading of each channel for a unit of its own load, without sign, shape (3,); 1 for one that has none."""
+        gains = np.abs(np.diag(self.gain))
+        return np.where(gains > 0.0, gains, 1.0)
+
+    @property
     def correlation_matrix(self) -> Floats:
         """Correlation matrix of the white noise of the channels, shape (3, 3)."""
         matrix = np.eye(3)
