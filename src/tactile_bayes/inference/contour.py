@@ -177,11 +177,10 @@ def infer_contour(
     stated one with 0.05 L/EI and 0.02 (L/EI)², backlash normal with 0.2°, gains normal around 1 with 2 %, friction
     half-normal with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, rest_curvature normal
     around the stated mean with the rod's rest_curvature_deviation, or 0.05/L if it has none, taper normal around
-    the stated one with
-    0.05, pivots normal with 1 % of L; discrepancy_scale log-normal around 0.005, standard deviation 1 of the logarithm,
-    discrepancy_length log-normal around 0.3 rad, standard deviation 0.5 of the logarithm. In addition, contours out of
-    reach are excluded, those that the rod would still cut after snap-off, and those that a rod curved toward the object
-    would touch twice.
+    the stated one with 0.05, pivots normal with 1 % of L; discrepancy_scale log-normal around 0.005, standard
+    deviation 1 of the logarithm, discrepancy_length log-normal around 0.3 rad, standard deviation 0.5 of the
+    logarithm. In addition, contours out of reach are excluded, those that the rod would still cut after snap-off,
+    and those that a rod curved toward the object would touch twice.
 
     The discrepancy is a Gaussian process over the drive angle, or over the travel in rod lengths where the drive
     carries the base, independent in each channel and each sweep segment, with Matérn's covariance, ν = 3/2. Its
