@@ -28,7 +28,7 @@ from tactile_bayes.inference.ensembles.proposal import effective
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
-from tactile_bayes.inference.result import provenance
+from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.stream_state import StreamState, read_state, write_state
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
@@ -231,7 +231,7 @@ class Stream:
             groups["prior"] = prior_draws(model, random)
         tree = xr.DataTree.from_dict(groups)
         about = provenance(draws, seed=self._seed, settings=SamplerSettings(), **state.experiment.about)
-        tree.attrs = {**about, "sampler": "sequential Monte Carlo", "settings": f'{{"particles": {len(picked)}}}'}
+        tree.attrs = {**about, "sampler": STREAMED, "settings": f'{{"particles": {len(picked)}}}'}
         return tree
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -3,23 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.found_rig import found_rig
 from tactile_bayes.record import bases_of, carried_sweeps
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
-from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.wording import Shown, percent, shown_as, spread
 
-__all__ = ["ContourFigure", "contour_figure", "gap_ends"]
+__all__ = ["ContourFigure", "ContourFindings", "contour_figure", "gap_ends"]
 
 _DETAIL_HEIGHT = 230.0
 
 _TABLED = 21
+
+
+class ContourFindings(Protocol):
+    """What the figures show; `Findings` describes it."""
+
+    @property
+    def posterior(self) -> xr.DataTree: ...
+
+    @property
+    def record(self) -> xr.Dataset: ...
+
+    @property
+    def contacts(self) -> xr.Dataset | None: ...
+
+    @property
+    def band(self) -> xr.Dataset: ...
+
+    @property
+    def edges(self) -> xr.Dataset | None: ...
+
+    @property
+    def probability(self) -> float: ...
 
 
 class ContourFigure(NamedTuple):
@@ -35,7 +57,7 @@ class ContourFigure(NamedTuple):
     unit: Shown
 
 
-def gap_ends(findings: Findings) -> tuple[float, float] | None:
+def gap_ends(findings: ContourFindings) -> tuple[float, float] | None:
     """Return x of the gap's ends, in the record's unit of length, if there is a gap."""
     if findings.edges is None:
         return None
@@ -43,7 +65,7 @@ def gap_ends(findings: Findings) -> tuple[float, float] | None:
     return (left, right) if left < right else None
 
 
-def contour_figure(findings: Findings) -> ContourFigure:
+def contour_figure(findings: ContourFindings) -> ContourFigure:
     """Draw the inferred contour."""
     band, attrs = findings.band, findings.band["lower"].attrs
     x, lower, median, upper = (band[name].values for name in ("x", "lower", "median", "upper"))
@@ -106,7 +128,7 @@ def contour_figure(findings: Findings) -> ContourFigure:
     )
 
 
-def _put_contacts(overview: Plot, findings: Findings, x: Floats) -> list[tuple[str, str]]:
+def _put_contacts(overview: Plot, findings: ContourFindings, x: Floats) -> list[tuple[str, str]]:
     contacts = findings.contacts
     if contacts is None:
         return []
