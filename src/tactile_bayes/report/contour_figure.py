@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -22,26 +23,32 @@ _DETAIL_HEIGHT = 230.0
 _TABLED = 21
 
 
-class ContourFindings(Protocol):
-    """What the figures show; `Findings` describes it."""
+@dataclass(frozen=True)
+class ContourFindings:
+    """Content of the figures.
 
-    @property
-    def posterior(self) -> xr.DataTree: ...
+    Attributes
+    ----------
+    posterior : xr.DataTree
+        The posterior as stored.
+    record : xr.Dataset
+        The record in it.
+    contacts : xr.Dataset or None
+        Contact points; None if a load channel is missing.
+    band : xr.Dataset
+        Band of the contour.
+    edges : xr.Dataset or None
+        The gap; None if there are sweeps in one direction only.
+    probability : float
+        Probability of bands and intervals.
+    """
 
-    @property
-    def record(self) -> xr.Dataset: ...
-
-    @property
-    def contacts(self) -> xr.Dataset | None: ...
-
-    @property
-    def band(self) -> xr.Dataset: ...
-
-    @property
-    def edges(self) -> xr.Dataset | None: ...
-
-    @property
-    def probability(self) -> float: ...
+    posterior: xr.DataTree
+    record: xr.Dataset
+    contacts: xr.Dataset | None
+    band: xr.Dataset
+    edges: xr.Dataset | None
+    probability: float
 
 
 class ContourFigure(NamedTuple):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import xarray as xr
@@ -12,7 +11,7 @@ import xarray as xr
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import record_of
-from tactile_bayes.report.contour_figure import contour_figure
+from tactile_bayes.report.contour_figure import ContourFindings, contour_figure
 from tactile_bayes.report.meanings import is_direction
 from tactile_bayes.report.page import parameter_cells
 from tactile_bayes.report.wording import Table, percent
@@ -21,18 +20,6 @@ from tactile_bayes.tasks import write_atomically
 from tactile_bayes.uncertainty.summary import gap_if_any
 
 __all__ = ["write_watch_page"]
-
-
-@dataclass(frozen=True)
-class _SoFar:
-    """What the figures show."""
-
-    posterior: xr.DataTree
-    record: xr.Dataset
-    contacts: xr.Dataset | None
-    band: xr.Dataset
-    edges: xr.Dataset | None
-    probability: float
 
 
 def write_watch_page(
@@ -73,7 +60,7 @@ def write_watch_page(
             contacts = contact_points(record, None, posterior)
         with suppress(TactileBayesError):
             edges = gap_if_any(posterior, probability)
-        contour = contour_figure(_SoFar(posterior, record, contacts, band, edges, probability))
+        contour = contour_figure(ContourFindings(posterior, record, contacts, band, edges, probability))
     names = [name for name in numbers["quantity"].values if not is_direction(name)]
     rows = [parameter_cells(numbers.sel(quantity=name), family) for name in names]
     heads = ["quantity", "meaning", "unit", "estimate", f"{percent(probability)} from", "to"]
