@@ -202,7 +202,7 @@ def test_control_c_ends_it_with_the_answer(path, lines, monkeypatch):
     path.unlink()
     result = commands.call("watch", path, "--out", path.parent / "other", *FEW)
     assert result.exit_code == 130
-    assert "interrupted before the first sample" in result.stderr
+    assert "interrupted before the first answer" in result.stderr
 
 
 def test_quiet_prints_the_answer_alone(path, lines, follow):

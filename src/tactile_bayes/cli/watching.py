@@ -236,7 +236,7 @@ def _answer(ctx: typer.Context, follower: _Follower, reason: str) -> Answer:
         if follower.refusal is not None:
             raise follower.refusal
         if "Ctrl-C" in reason:
-            raise KeyboardInterrupt("interrupted before the first sample")
+            raise KeyboardInterrupt("interrupted before the first answer")
         raise InferenceError(f"{follower.path}: {reason}, and there is no sample in it")
     run = follower.watched.finish(follower.load_cell)
     said = f"Ended after {last.samples:,} samples: {reason}"
