@@ -47,7 +47,7 @@ def watch(
     ] = 1000,
     between: Annotated[
         str | None,
-        typer.Option(help="Ends X,X of the band [m, or L]; by default those of the stretch touched so far."),
+        typer.Option(help="Ends X,X of the band [m, or L]; by default those of what its sweeps touch if they go on."),
     ] = None,
     until_width: Annotated[
         float | None,
@@ -180,7 +180,11 @@ class _Follower:
         if update.restarted:
             self.tell(f"samples before have changed or do not go on in order: all {update.samples:,} taken anew")
         words = [f"{sentence(_band(update))}.", f"The answer is {behind:.1f} s behind its newest sample."]
-        self.write_page(_counted(update, self.is_late), [*words, *self.messages], is_well=not self.messages)
+        self.write_page(
+            _counted(update, self.is_late),
+            [*words, *(f"{message}." for message in self.messages)],
+            is_well=not self.messages,
+        )
         if self.output.json:
             print_object(self._numbers(update, now, behind), in_a_line=True)
         elif not self.output.quiet:

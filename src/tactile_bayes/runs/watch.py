@@ -48,7 +48,7 @@ class WatchUpdate(NamedTuple):
     summary: xr.Dataset
     """Parameters with intervals."""
     band: xr.Dataset | None
-    """Band between the ends that were given, or of the stretch touched so far; None if nothing was touched."""
+    """Band between the ends that were given, or of what the sweeps touch if they go on; None if they touch nothing."""
     width: float
     """Largest width of the band [length]; NaN without one."""
     may_stop: bool
@@ -82,7 +82,8 @@ class Watch:
     probability : float
         Probability of the band and of intervals, in (0, 1).
     between : pair of float, optional
-        Ends of the band in x, in the record's unit of length; by default those of the stretch touched so far.
+        Ends of the band in x, in the record's unit of length; by default those of what its
+        sweeps touch if they go on.
     until_width : float, optional
         Width below which the band has to be everywhere between these ends for measuring to stop [length].
     record_file : path-like
