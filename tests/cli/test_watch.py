@@ -223,6 +223,7 @@ def test_quiet_prints_the_answer_alone(path, lines, follow):
         (["--column", "force_x=Fx"], "Fx"),
         (["--length", 0.1], "--length and --flexural-rigidity go together"),
         (["--missing", "torque"], "torque"),
+        (["--rig", "none.nc"], "there is no file none.nc"),
         (["--force-noise", 0.1], "give --moment-noise as well"),
     ],
 )

@@ -16,7 +16,7 @@ from tactile_bayes.cli.command import Out, Output, Seed
 from tactile_bayes.cli.interrupts import acknowledge_interrupt
 from tactile_bayes.cli.numbers import numbers_asked
 from tactile_bayes.cli.record_options import RecordOptions
-from tactile_bayes.cli.rig_options import UnknownOptions
+from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,6 +41,7 @@ def watch(
     family: Family = "parabola",
     reading: RecordOptions,
     unknown: UnknownOptions,
+    rig: KnownRig = None,
     probability: Annotated[float, typer.Option(help="Probability of band and intervals.", min=0.0, max=1.0)] = 0.95,
     particles: Annotated[
         int, typer.Option(help="Number of particles: four times as many are twice as exact, and take as long.", min=100)
@@ -85,6 +86,7 @@ def watch(
         nuisances=unknown.nuisances,
         seed=seed,
         particles=particles,
+        rig=rig_in(rig),
     ) as watched:
         follower = _Follower(record, growing, watched, reading, output, poll, idle)
         try:

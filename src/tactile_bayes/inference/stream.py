@@ -29,6 +29,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import STREAMED, provenance
+from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
 from tactile_bayes.inference.stream_state import StreamState, read_state, write_state
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
@@ -79,11 +80,15 @@ class Stream:
     stop : callable, optional
         Rule that tells whether measuring may stop. It is called with the result of each update, and what it returns
         becomes the result's `may_stop`.
+    rig : xr.DataTree, optional
+        Result of `infer_rig` for the same rig, as in `infer_contour`.
 
     Raises
     ------
     ParameterError
         If an argument is not valid. What depends on the record is checked at the first update.
+    InferenceError
+        If the rig is no result of `infer_rig`, or has not converged.
 
     Notes
     -----
@@ -117,11 +122,13 @@ class Stream:
         particles: int = 1000,
         x: ArrayLike | None = None,
         stop: Callable[[xr.Dataset], object] | None = None,
+        rig: xr.DataTree | None = None,
     ) -> None:
         check_whole_number("particles", particles, 100, "give a whole number of at least 100", most=10**7)
         check_function("stop", stop)
         self._x = None if x is None else check_numbers("x", x, "give a list of finite numbers", shape=(None,))
         self._arguments = (family, load_cell, {} if priors is None else priors, rod, friction, nuisances)
+        self._rig, self._joint = rig, None if rig is None else rig_prior(rig)
         self._seed, self._entropy = seed, seed_sequence(seed)
         self._particles, self._stop = particles, stop
         self._state: StreamState | None = None
@@ -159,7 +166,7 @@ class Stream:
         began = perf_counter()
         old = self._state
         record = validate(samples) if old is None else _continued(old.record, samples)
-        experiment = Experiment(record, *self._arguments)
+        experiment = self._experiment(record)
         updates = 0 if old is None else old.updates + 1
         random = self._random(0, updates)
         with threadpool_limits(1):
@@ -299,7 +306,7 @@ class Stream:
         own = stored.record
         if record is not None:
             own = validate(record).isel(sample=slice(0, own.sizes["sample"]))
-        experiment = Experiment(own, *stream._arguments)
+        experiment = stream._experiment(own)
         state = stored.state(own, experiment)
         differing = changes(stored.identity, stream._identity(experiment))
         if not differing:
@@ -314,6 +321,12 @@ class Stream:
             )
         stream._state = state
         return stream
+
+    def _experiment(self, record: xr.Dataset) -> Experiment:
+        experiment = Experiment(record, *self._arguments, joint=self._joint)
+        if self._rig is not None:
+            refuse_other_rig(self._rig.attrs, experiment.about)
+        return experiment
 
     def _identity(self, experiment: Experiment) -> dict[str, str]:
         """Return all that the numbers of a stream depend on, as text."""
@@ -512,7 +525,7 @@ def _weighted_quantiles(values: Floats, weights: Floats) -> Floats:
 
 def _share_within_reach(model: ContourModel, random: np.random.Generator) -> float:
     """Return the share of the prior's contours that are within reach, at least 1/count."""
-    points = np.stack([model.priors[name].rvs(_PRIOR_DRAWS, random_state=random) for name in model.names], axis=1)
+    points = model.prior_points(random, _PRIOR_DRAWS)
     points = points[np.isfinite(model.log_prior(points))]
     usable = int(model.likelihood.usable(model.contours(points), model.rig(points)).sum()) if len(points) else 0
     return max(usable, 1) / _PRIOR_DRAWS
