@@ -18,7 +18,7 @@ from tactile_bayes.inference.stream import Stream
 from tactile_bayes.record import read_record
 from tactile_bayes.runs import contour as contour_run
 
-FEW = ("--as-stated", "--particles", 100)
+FEW = ("--as-stated", "--particles", 120)
 
 
 @pytest.fixture(scope="module")
@@ -156,7 +156,7 @@ def test_the_same_command_goes_on_with_the_same_numbers(path, lines, follow):
     assert (resumed["samples"], resumed["new"]) == (30, 0)
     assert resumed["quantities"] == objects(first)[0]["quantities"]
     measured = read_record(path)
-    stream = Stream(nuisances=[], seed=1, particles=100)
+    stream = Stream(nuisances=[], seed=1, particles=120)
     stream.update(measured.isel(sample=slice(0, 30)))
     stream.update(measured.isel(sample=slice(30, None)))
     expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
@@ -205,9 +205,13 @@ def test_control_c_ends_it_with_the_answer(path, lines, monkeypatch):
     assert "interrupted before the first answer" in result.stderr
 
 
-def test_quiet_prints_the_answer_alone(path, lines, follow):
+def test_quiet_prints_the_answer_alone_and_warns_of_few_particles(path, lines, follow):
     write(path, lines[0], lines[1][:10])
-    assert follow("--quiet").stdout.startswith("Ended after ")
+    result = follow("--quiet", "--particles", 100)
+    assert result.stdout.startswith("Ended after ")
+    assert (
+        "100 particles are few for 4 parameters, so that intervals may be wrong: give --particles 120" in result.stderr
+    )
 
 
 @pytest.mark.parametrize(

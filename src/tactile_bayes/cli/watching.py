@@ -30,6 +30,9 @@ _STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl
 
 _PAGE = "watch.html"
 
+_PER_PARAMETER = 30
+"""Number of particles for each parameter below which quantiles can be off by several standard deviations."""
+
 
 def watch(
     *,
@@ -114,6 +117,7 @@ class _Follower:
     messages: list[str] = field(default_factory=list)
     has_begun: bool = False
     is_late: bool = False
+    parameters: int = 0
 
     def follow(self) -> str:
         """Take what comes, until the end; return its reason."""
@@ -179,6 +183,13 @@ class _Follower:
         self.last = update
         now = time.time()
         behind = max(0.0, now - growth.written_at)
+        count, parameters = update.posterior["posterior"].sizes["draw"], update.summary.sizes["quantity"]
+        if self.parameters < parameters and count < _PER_PARAMETER * parameters:
+            self.tell(
+                f"{count} particles are few for {parameters} parameters, so that intervals may be wrong: give "
+                f"--particles {_PER_PARAMETER * parameters} or more"
+            )
+        self.parameters = parameters
         if update.restarted:
             self.tell(f"samples before have changed or do not go on in order: all {update.samples:,} taken anew")
         words = [f"{sentence(_band(update))}.", f"The answer is {behind:.1f} s behind its newest sample."]

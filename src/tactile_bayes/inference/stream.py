@@ -74,7 +74,7 @@ class Stream:
     seed : int or numpy.random.SeedSequence
         Seed of all random numbers: the same seed and blocks give the same results.
     particles : int
-        Number of particles, from 100 up.
+        Number of particles, from 100 up; see Notes.
     x : array_like, optional
         Positions at which every update states quantiles of the contour's height [length].
     stop : callable, optional
@@ -95,6 +95,10 @@ class Stream:
     Each update computes the likelihood of the whole record so far again: exact for drifts, correlated noise and
     integrated biases, but an update costs more the longer the record. With 1,000 particles of four parameters, updates
     by 28 samples, up to 330 of a double sweep, took 0.5 to 6 s on one core. The result states its `seconds`.
+
+    Too few particles lose the posterior without a sign. With 13 parameters and 332 samples at once, medians were up to
+    nine standard deviations off with 200 particles, 0.5 with 400 and 0.1 with 650: take 30 for each parameter at least,
+    better 50.
 
     Examples
     --------
