@@ -35,7 +35,15 @@ class ReachError(ContourError):
 
 
 class RecordError(TactileBayesError, ValueError):
-    """A table cannot be a record of a sweep."""
+    """A table cannot be a record of a sweep.
+
+    Attributes
+    ----------
+    lines : tuple of int
+        Lines of a file with rows that no record can have; empty if something else is wrong.
+    """
+
+    lines: tuple[int, ...] = ()
 
 
 class InferenceError(TactileBayesError, RuntimeError):

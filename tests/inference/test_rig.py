@@ -20,6 +20,7 @@ from tactile_bayes.inference.gauge import Gauge
 from tactile_bayes.inference.nuisances import CURVE
 from tactile_bayes.inference.rig_prior import RigPrior, rig_prior
 from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.inference.stream import Stream
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.uncertainty.band import contour_band
 
@@ -293,3 +294,23 @@ def test_a_sensor_in_counts_is_calibrated_on_a_gauge_whose_place_is_uncertain():
 
 def counts(gain):
     return ((gain, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def test_a_stream_takes_it_as_prior(tmp_path):
+    """Its posterior is that of the whole record, within their Monte-Carlo errors: a quarter of a deviation."""
+    record, known = read(OBJECT, 2), {"load_cell": CELL, "nuisances": [], "seed": 1, "rig": rig()}
+    stream = Stream(**known, particles=500)
+    for block in np.array_split(np.arange(record.sizes["sample"]), 3):
+        stream.update(record.isel(sample=block))
+    found = stream.posterior()
+    whole = infer_contour(record, **known, settings=QUICK)
+    assert found.attrs["rig_density_error"] == whole.attrs["rig_density_error"]
+    assert list(found["posterior"].data_vars) == list(whole["posterior"].data_vars)
+    for name, draws in whole["posterior"].data_vars.items():
+        assert abs(float(found["posterior"][name].median() - draws.median())) < 0.5 * float(draws.std()), name
+    stream.save(tmp_path / "stream.nc")
+    Stream.resume(tmp_path / "stream.nc", **known, particles=500)
+    with refused(InferenceError, "rig_parameters"):
+        Stream.resume(tmp_path / "stream.nc", **{**known, "rig": None}, particles=500)
+    with refused(ParameterError, "inferred from this very record"):
+        Stream(**known).update(read_from(0))

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 import tactile_bayes as tb
+from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import contour_evidence
@@ -144,3 +146,81 @@ def test_the_backlash_enters_with_the_second_direction(measured):
     now = stream.update(measured.isel(sample=slice(turns, turns + 20)))
     assert "backlash" not in before.parameter.values
     assert "backlash" in now.parameter.values
+
+
+# --- The file of a stream -------------------------------------------------------------------------------------------
+
+SAVED = {"load_cell": CELL, "nuisances": [], "seed": 1, "particles": 100}
+
+
+@pytest.fixture(scope="module")
+def saved(measured, tmp_path_factory):
+    """A file after two blocks, and the result of a third one, of the stream that wrote the file."""
+    path, stream = tmp_path_factory.mktemp("stream") / "stream.nc", tb.Stream(**SAVED)
+    fed(stream, measured.isel(sample=slice(0, 30)), 2)
+    stream.save(path)
+    return path, stream.update(measured.isel(sample=slice(30, 45))), stream.posterior()
+
+
+@pytest.mark.parametrize("with_record", [False, True])
+def test_a_stream_that_goes_on_has_the_numbers_of_one_that_was_not_stopped(measured, saved, with_record):
+    path, expected, posterior = saved
+    stream = tb.Stream.resume(path, measured if with_record else None, **SAVED)
+    now = stream.update(measured.isel(sample=slice(30, 45)))
+    xr.testing.assert_identical(now.drop_vars("seconds"), expected.drop_vars("seconds"))
+    for group in ("posterior", "events", "posterior_predictive"):
+        xr.testing.assert_equal(stream.posterior()[group].to_dataset(), posterior[group].to_dataset())
+    assert stream.posterior().attrs["data_sha256"] == posterior.attrs["data_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"seed": 2}, "seed (was '1, pool of 4', now '2, pool of 4')"),
+        ({"family": "circle"}, "family (was 'parabola', now 'circle')"),
+        ({"particles": 200}, "particles (was '100', now '200')"),
+        ({"nuisances": ["friction"]}, "nuisances"),
+        ({"load_cell": tb.LoadCell(force_noise=0.06, moment_noise=0.02)}, "load_cell_force_noise"),
+        ({"priors": {"q": stats.norm(0.5, 0.1)}}, "priors"),
+        ({"record": "shorter"}, "samples (was '30', now '20')"),
+        ({"record": "another"}, "record (its SHA-256)"),
+    ],
+)
+def test_the_file_of_another_stream_is_refused_with_what_differs(measured, saved, change, words):
+    records = {"shorter": measured.isel(sample=slice(0, 20)), "another": measured.assign(force_x=-measured.force_x)}
+    change = {**change, "record": records.get(change.get("record"))}
+    with refused(InferenceError, words):
+        tb.Stream.resume(saved[0], **(SAVED | change))
+
+
+def test_a_prior_that_differs_in_no_printed_digit_is_refused(measured, tmp_path):
+    priors = [{"q": stats.norm(centre, 0.05)} for centre in (0.5, 0.5000004)]
+    stream = tb.Stream(**SAVED, priors=priors[0])
+    stream.update(measured.isel(sample=slice(0, 20)))
+    stream.save(tmp_path / "stream.nc")
+    with refused(InferenceError, "log-density of the particles"):
+        tb.Stream.resume(tmp_path / "stream.nc", **SAVED, priors=priors[1])
+
+
+def test_a_file_that_is_damaged_or_no_state_is_refused(measured, saved, tmp_path):
+    path = tmp_path / "stream.nc"
+    path.write_bytes(saved[0].read_bytes()[:-3000])
+    for where, words in ((path, "is damaged"), (tmp_path / "none.nc", "there is no file")):
+        with refused(InferenceError, words):
+            tb.Stream.resume(where, **SAVED)
+    tb.write_record(measured, path)
+    with refused(InferenceError, "holds no state of a stream"):
+        tb.Stream.resume(path, **SAVED)
+    with refused(InferenceError, "no samples yet"):
+        tb.Stream(**SAVED).save(path)
+
+
+def test_columns_of_the_users_own_survive_the_file(measured, tmp_path):
+    more = measured.assign(note=("sample", ["", "å"] * 10 + [""] * (measured.sizes["sample"] - 20)))
+    more = tb.make_record(dict(more.data_vars), attrs=more.attrs)
+    stream = tb.Stream(**SAVED)
+    stream.update(more.isel(sample=slice(0, 12)))
+    stream.save(tmp_path / "stream.nc")
+    resumed = tb.Stream.resume(tmp_path / "stream.nc", **SAVED)
+    xr.testing.assert_equal(resumed.record, stream.record)
+    assert resumed.update(more.isel(sample=slice(12, 14))).samples == 14

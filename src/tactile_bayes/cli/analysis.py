@@ -24,7 +24,15 @@ if TYPE_CHECKING:
 
     from tactile_bayes.runs.contour import ContourRun
 
-__all__ = ["demo", "infer", "quantities"]
+__all__ = ["Family", "answer_of", "decimals", "demo", "infer", "quantities"]
+
+Family = Annotated[
+    str,
+    typer.Option(
+        help="Shape: parabola, circle, ellipse, power-law, one for each flank: parabola/power-law; or shape-free, any "
+        "smooth one."
+    ),
+]
 
 _STOPPING = "stopping; the draws made so far are checked, plotted and written now (Ctrl-C again discards them)"
 
@@ -34,13 +42,7 @@ def infer(
     ctx: typer.Context,
     record: Record,
     out: Out,
-    family: Annotated[
-        str,
-        typer.Option(
-            help="Shape: parabola, circle, ellipse, power-law, one for each flank: parabola/power-law; or shape-free, "
-            "any smooth one."
-        ),
-    ] = "parabola",
+    family: Family = "parabola",
     reading: RecordOptions,
     unknown: UnknownOptions,
     rig: KnownRig = None,
@@ -89,7 +91,7 @@ def infer(
     go_on = "with --checkpoint FOLDER the same command can resume an interrupted run"
     if checkpoint is not None:
         go_on = f"the same command resumes from the steps in {checkpoint}"
-    return _answer(ctx, run, run.files, {}, go_on)
+    return answer_of(ctx, run, run.files, {}, go_on)
 
 
 def demo(
@@ -126,10 +128,10 @@ def demo(
             command=ctx.meta["words"],
             progress=progress,
         )
-    return _answer(ctx, run, {"record": path, **run.files}, TRUTH, "the same command starts again")
+    return answer_of(ctx, run, {"record": path, **run.files}, TRUTH, "the same command starts again")
 
 
-def _answer(
+def answer_of(
     ctx: typer.Context, run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float], go_on: str
 ) -> Answer:
     """Return the answer; verdicts name what is left out, and with --debug its traceback goes to stderr."""
@@ -210,7 +212,7 @@ def _rows(numbers: xr.Dataset, truth: Mapping[str, float]) -> Iterable[list[str]
         if name.startswith("z_"):  # a weight of a random function, which has no meaning by itself
             continue
         row: Any = numbers.sel(quantity=name)
-        digits = _digits(float(row["upper"] - row["lower"]))
+        digits = decimals(float(row["upper"] - row["lower"]))
         shown = [f"{float(row[column]):.{digits}f}" for column in ("median", "lower", "upper")]
         true = [f"{truth[name]:.{digits}f}" if name in truth else ""] if truth else []
         ess = min(float(row["ess_bulk"]), float(row["ess_tail"]))
@@ -219,6 +221,6 @@ def _rows(numbers: xr.Dataset, truth: Mapping[str, float]) -> Iterable[list[str]
         yield [str(name), *true, *shown, "" if unit == "1" else unit, *checks]
 
 
-def _digits(width: float) -> int:
+def decimals(width: float) -> int:
     """Return the number of decimals that show an interval of this width to two digits."""
     return max(0, min(12, 1 - math.floor(math.log10(width)))) if width > 0.0 else 6

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-__all__ = ["Answer", "columns_of", "print_answer", "table_of"]
+__all__ = ["Answer", "columns_of", "print_answer", "print_object", "table_of"]
 
 
 @dataclass(frozen=True)
@@ -35,20 +35,27 @@ class Answer:
     parts: Iterable[str | Table | Mapping[str, Path]]
     numbers: Callable[[], Mapping[str, Any]]
     interrupted: str = ""
+    in_a_line: bool = False
+    """Whether the object for programs is one line."""
 
 
 def print_answer(answer: Answer, as_json: bool) -> None:
     """Print an answer as text, or as one JSON object in which null stands for numbers that are not finite."""
     if as_json:
-        import json
-
-        typer.echo(json.dumps(_plain(answer.numbers()), ensure_ascii=False, indent=2, allow_nan=False))
+        print_object(answer.numbers(), in_a_line=answer.in_a_line)
     else:
         for part in answer.parts:
             _print_part(part)
     if answer.interrupted:
         typer.echo(f"tactile-bayes: {answer.interrupted}", err=True)
         raise typer.Exit(130)
+
+
+def print_object(numbers: Mapping[str, Any], *, in_a_line: bool = False) -> None:
+    """Print an object for programs, in which null stands for numbers that are not finite."""
+    import json
+
+    typer.echo(json.dumps(_plain(numbers), ensure_ascii=False, indent=None if in_a_line else 2, allow_nan=False))
 
 
 def _print_part(part: str | Table | Mapping[str, Path]) -> None:

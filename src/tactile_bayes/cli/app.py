@@ -24,6 +24,7 @@ from tactile_bayes.cli.rig_calibration import calibrate_rig
 from tactile_bayes.cli.scanning import scan
 from tactile_bayes.cli.sensitivity import sensitivity
 from tactile_bayes.cli.trust import trust
+from tactile_bayes.cli.watching import watch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -125,6 +126,7 @@ _EXAMPLES: dict[Callable[..., Answer], str] = {
     calibrate: "calibrate --family parabola --replicates 200 --out calibration/",
     sensitivity: "sensitivity --profile II --distance 0.5 --out sensitivity/",
     design: "design run/ --base 0.05,0 --base 0.1,0 --out design/",
+    watch: "watch record.csv --family parabola --idle 60 --out run/",
     figures: "figures --only 3 --distance 0.4 --format pdf --out figures/",
     trust: "trust run/",
     calibrate_rig: "calibrate-rig gauge.csv --family circle --parameter r=0.01 --parameter q=0.05 --out rig/",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -67,29 +67,57 @@ class RecordOptions(RodOptions):
         RecordError
             If the file holds no record.
         """
-        from tactile_bayes.record import read_record, rod_of
-        from tactile_bayes.record.units import with_rod
+        from tactile_bayes.record import read_record
 
-        # A shape without a length belongs to the rod that the file states.
-        completes = bool(self.shape) and self.length is None and self.rod_shape is None
-        record = read_record(
-            path,
-            columns=self.origins,
-            split_sweeps=self.split_sweeps,
-            rod=None if completes else self.rod,
-            missing=self.missing or (),
-            load_cell_frame=self.load_cell_frame,
-        )
-        if completes:
+        record, cell = self.completed(read_record(path, **self.arguments))
+        self.report_units(record)
+        return record, cell
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of `read_record`.
+
+        Raises
+        ------
+        ParameterError
+            If options contradict each other.
+        """
+        return {
+            "columns": self.origins,
+            "split_sweeps": self.split_sweeps,
+            "rod": None if self._completes_rod else self.rod,
+            "missing": self.missing or (),
+            "load_cell_frame": self.load_cell_frame,
+        }
+
+    @property
+    def _completes_rod(self) -> bool:
+        """True for a shape without a length, which belongs to the rod that the file states."""
+        return bool(self.shape) and self.length is None and self.rod_shape is None
+
+    def completed(self, record: xr.Dataset) -> tuple[xr.Dataset, LoadCell | None]:
+        """Return a record as it was read, with the rod and the load cell that the options state.
+
+        Raises
+        ------
+        ParameterError
+            If options contradict the record.
+        """
+        from tactile_bayes.record import rod_of, with_rod
+
+        if self._completes_rod:
             record = with_rod(record, replace(rod_of(record), **self.shape))
-        cell = self._load_cell(record)
+        return record, self._load_cell(record)
+
+    @staticmethod
+    def report_units(record: xr.Dataset) -> None:
+        """Report assumed units on stderr."""
         if record.attrs.get("units_source") == "assumed":
             typer.echo(
                 "The record states no units: its numbers are taken as dimensionless, in units of the rod (L, EI/L, "
                 "EI/L²). If they are SI, give --length and --flexural-rigidity.",
                 err=True,
             )
-        return record, cell
 
     @property
     def origins(self) -> dict[str, str]:

@@ -18,7 +18,7 @@ from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.discrepancy import PARAMETERS
 from tactile_bayes.inference.misfit import CHECK_RIG, GAUGE, is_inferred, what_to_try
-from tactile_bayes.inference.result import posterior_draws, record_of
+from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps
@@ -126,10 +126,9 @@ def verdicts(
     if check is not None and check.attrs["suggestion"]:
         against.append(check.attrs["suggestion"])
     if not against:
+        drawn = "particles have lost their places" if is_streamed(posterior.attrs) else "ensembles agree"
         p_value = math.nan if check is None else float(check.overall_p_value)
-        against.append(
-            f"All is well: the ensembles agree, and the record agrees with their predictions (p = {p_value:.2g})."
-        )
+        against.append(f"All is well: the {drawn}, and the record agrees with their predictions (p = {p_value:.2g}).")
     doubts = [] if trust is None or trust.attrs["conclusion"] in (_NOT, _HOLDS) else [str(trust.attrs["summary"])]
     return (*against, *doubts, *_prior_dominated(posterior, known=beyond))
 

@@ -238,6 +238,13 @@ class ContourModel:
             values[inside[block]] += self.log_likelihood(points[inside[block]])
         return values
 
+    def prior_points(self, rng: np.random.Generator, count: int) -> Floats:
+        """Draw from the prior of all contours, within reach or not; shape (count, d)."""
+        points = np.stack([self.priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
+        if self.nuisances.joint is not None:
+            points[:, self._jointly] = self.nuisances.joint.draw(rng, count)
+        return points
+
     def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:
         """Draw from the prior of contours within reach.
 
@@ -264,9 +271,7 @@ class ContourModel:
         while (had := sum(map(len, found))) < count and drawn < most:
             if had and deadline.has_passed:
                 break
-            points = np.stack([self.priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
-            if self.nuisances.joint is not None:
-                points[:, self._jointly] = self.nuisances.joint.draw(rng, count)
+            points = self.prior_points(rng, count)
             drawn += count
             points = points[np.isfinite(self.log_prior(points))]
             if len(points):

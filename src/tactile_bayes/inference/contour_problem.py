@@ -17,7 +17,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.likelihood import without_errors
 from tactile_bayes.reconstruction import OTHER_SIDE, doubtful_sweeps, loaded_samples, side_of, with_sides
 
-__all__ = ["ContourProblem", "contour_problem"]
+__all__ = ["ContourProblem", "contour_problem", "identity_of"]
 
 
 _MOST_DOUBTFUL = 2
@@ -44,10 +44,7 @@ class ContourProblem(NamedTuple):
     @property
     def identity(self) -> dict[str, str]:
         """Entries that a resumed run must have in common with the interrupted one."""
-        labels = {"data_sha256": "record (its SHA-256)"}
-        return {labels.get(name, name): str(value) for name, value in self.about.items()} | {
-            "version of tactile-bayes": version("tactile-bayes")
-        }
+        return identity_of(self.about)
 
     def without(self, samples: Flags) -> ContourModel:
         """Return the model of the record without some samples, a mask of shape (samples,)."""
@@ -55,6 +52,14 @@ class ContourProblem(NamedTuple):
         rig = replace(model.nuisances, elapsed=model.nuisances.elapsed[kept])
         measured = model.measured.isel(sample=np.flatnonzero(kept))
         return ContourModel(measured, model.family, rig, model.noise, model.priors)
+
+
+def identity_of(about: Mapping[str, Any]) -> dict[str, str]:
+    """Return the attributes of a posterior, and the version, as the identity of a computation that can be resumed."""
+    labels = {"data_sha256": "record (its SHA-256)"}
+    return {labels.get(name, name): str(value) for name, value in about.items()} | {
+        "version of tactile-bayes": version("tactile-bayes")
+    }
 
 
 def contour_problem(experiment: Experiment) -> ContourProblem:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
 from importlib.metadata import version
@@ -22,9 +22,11 @@ from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
 from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
 
 __all__ = [
+    "STREAMED",
     "contact_draws",
     "contour_draws",
     "contour_events",
+    "is_streamed",
     "posterior_draws",
     "provenance",
     "read_result",
@@ -34,6 +36,9 @@ __all__ = [
     "to_arviz",
     "write_result",
 ]
+
+STREAMED = "sequential Monte Carlo"
+"""Sampler of a stream, as the attribute of its posterior states it."""
 
 _SOFTWARE = ("tactile-bayes", "numpy", "scipy", "emcee", "numba", "xarray", "arviz-stats", "h5netcdf")
 """Libraries by which a posterior is computed and stored, besides Python."""
@@ -83,6 +88,11 @@ def provenance(draws: Draws, *, seed: Seed, settings: SamplerSettings, data_sha2
         "message": draws.message,
         **more,
     }
+
+
+def is_streamed(attrs: Mapping[Any, Any]) -> bool:
+    """Return whether the posterior with these attributes is that of a stream."""
+    return bool(attrs.get("sampler") == STREAMED)
 
 
 @cache

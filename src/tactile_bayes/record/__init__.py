@@ -3,6 +3,7 @@
 from tactile_bayes.record.construction import make_record
 from tactile_bayes.record.files import read_record, write_record
 from tactile_bayes.record.frame import frame_of, in_frame, turned
+from tactile_bayes.record.growing import GrowingRecord, Growth
 from tactile_bayes.record.identity import record_hash
 from tactile_bayes.record.schema import (
     CHANNELS,
@@ -29,6 +30,8 @@ __all__ = [
     "REQUIRED",
     "Column",
     "Frame",
+    "GrowingRecord",
+    "Growth",
     "base_of_sample",
     "bases_of",
     "carried_sweeps",

@@ -31,7 +31,7 @@ from tactile_bayes.record.schema import MEASURED, Kind
 from tactile_bayes.record.table import Source, Table
 from tactile_bayes.tasks import write_atomically
 
-__all__ = ["read_csv", "write_csv"]
+__all__ = ["read_csv", "read_csv_content", "write_csv"]
 
 _ROWS = 20_000
 """Number of samples that are written at once."""
@@ -79,30 +79,34 @@ def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
 
     Empty columns without a name are left out: a separator at the end of every line makes one.
     """
-    source = Source(str(path))
     with open(path, "rb") as file:
-        refuse_other_kinds(file.peek(8), source)
-        text = in_utf8(_with_usual_line_ends(file))
-        header = read_header(text, source)
-        source = Source(str(path), heads=header.heads)
-        names = [name for name in header.names if name]
-        _refuse_title(text, header, names, columns, source)
-        origins = origins_of(columns, names, source)
-        meant = meant_kinds(origins, names)
-        units, last = _units_below(text, header, meant, source), header.line
-        if units:
-            last += 1
-            source = Source(str(path), heads={**header.heads, **dict.fromkeys(units, last)})
-        described = {
-            name: cast(Kind, header.descriptions[name]["kind"]) for name in names if name in header.descriptions
-        }
-        # Columns without a name are called by their position until they are left out; no name begins with a blank.
-        places = [name or f" (column {place})" for place, name in enumerate(header.names, start=1)]
-        unnamed = {name: place for place, name in enumerate(places, start=1) if name not in names}
-        for name in unnamed:
-            described[name] = "text"
-        layout = Layout(places, header.delimiter, last, meant, described)
-        values, lines = read_rows(text, layout, Source(str(path)))
+        return read_csv_content(file, str(path), columns)
+
+
+def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) -> Table:
+    """Read a table from an open file, which is called so in messages."""
+    source = Source(called)
+    refuse_other_kinds(file.read(8), source)
+    file.seek(0)
+    text = in_utf8(_with_usual_line_ends(file))
+    header = read_header(text, source)
+    source = Source(called, heads=header.heads)
+    names = [name for name in header.names if name]
+    _refuse_title(text, header, names, columns, source)
+    origins = origins_of(columns, names, source)
+    meant = meant_kinds(origins, names)
+    units, last = _units_below(text, header, meant, source), header.line
+    if units:
+        last += 1
+        source = Source(called, heads={**header.heads, **dict.fromkeys(units, last)})
+    described = {name: cast(Kind, header.descriptions[name]["kind"]) for name in names if name in header.descriptions}
+    # Columns without a name are called by their position until they are left out; no name begins with a blank.
+    places = [name or f" (column {place})" for place, name in enumerate(header.names, start=1)]
+    unnamed = {name: place for place, name in enumerate(places, start=1) if name not in names}
+    for name in unnamed:
+        described[name] = "text"
+    layout = Layout(places, header.delimiter, last, meant, described)
+    values, lines = read_rows(text, layout, Source(called))
     for name, place in unnamed.items():
         _refuse_content(values.pop(name), place, lines, header.line, source)
     attrs = {
@@ -113,7 +117,7 @@ def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
     return Table(
         {name: (array, attrs[name]) for name, array in values.items()},
         header.attrs,
-        Source(str(path), lines, source.heads, names=names, stated=header.stated),
+        Source(called, lines, source.heads, names=names, stated=header.stated),
     )
 
 

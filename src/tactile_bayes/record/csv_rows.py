@@ -250,7 +250,7 @@ def _read_carefully(
     try:
         for row in reader:
             if row and len(row) != len(layout.names):
-                raise source.line_error(
+                raise source.row_error(
                     begin,
                     f"there are {len(row)} cells in {len(layout.names)} columns "
                     f"({', '.join(map(str.strip, layout.names))}): write one per column, with a point in decimals"
@@ -263,7 +263,7 @@ def _read_carefully(
             if reader.line_num == len(lines):
                 break
     except csv.Error as error:
-        raise source.line_error(
+        raise source.row_error(
             begin,
             f"the line cannot be read ({error}): correct it; a quotation mark that is not closed takes in what follows",
         ) from error
@@ -279,10 +279,10 @@ def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:
         text = chunk.decode("utf-8")
     except UnicodeDecodeError as error:
         line = above + 1 + chunk.count(b"\n", 0, error.start)
-        raise source.line_error(line, not_utf8(error)) from error
+        raise source.row_error(line, not_utf8(error)) from error
     if "\0" in text:
         line = above + 1 + text.count("\n", 0, text.index("\0"))
-        raise source.line_error(line, WITH_NUL)
+        raise source.row_error(line, WITH_NUL)
     return io.StringIO(text, newline="").readlines()
 
 
@@ -302,7 +302,7 @@ def _column_values(name: str, texts: list[str], layout: Layout, source: Source) 
             kind = layout.guessed[name] = looks
     parsed = [integer_in(text) if kind == "integer" else _number_in(text, layout) for text in texts]
     if None in parsed:
-        _refuse_cell(name, kind, texts, parsed.index(None), layout, source)
+        _refuse_cell(name, kind, texts, [i for i, value in enumerate(parsed) if value is None], layout, source)
     return np.array(parsed, dtype=np.int64 if kind == "integer" else np.float64)
 
 
@@ -329,8 +329,9 @@ def _kind_of(texts: list[str], layout: Layout) -> Kind:
 
 
 def _refuse_cell(
-    name: str, kind: Kind | None, texts: list[str], sample: int, layout: Layout, source: Source
+    name: str, kind: Kind | None, texts: list[str], samples: list[int], layout: Layout, source: Source
 ) -> NoReturn:
+    sample = samples[0]
     if name in layout.described:
         what = f"is no {kind}, as the header says the column is: correct one"
     else:
@@ -340,4 +341,4 @@ def _refuse_cell(
                 what += "; where decimals have commas, write ; between columns"
         elif layout.decimal and ("," if layout.decimal == "." else ".") in texts[sample]:
             what += f"; decimals are separated by {layout.decimal!r} in this file, and thousands by nothing"
-    raise source.cell_error(sample, name, f"{texts[sample]!r} {what}")
+    raise source.cell_error(np.array(samples), name, f"{texts[sample]!r} {what}")

@@ -19,10 +19,11 @@ from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
 from tactile_bayes.record.origin import renamed
 from tactile_bayes.record.schema import FRAMES, Frame
 from tactile_bayes.record.sweep_segments import split_at_turns
+from tactile_bayes.record.table import Table
 from tactile_bayes.record.units import in_units_of_record
 from tactile_bayes.record.validation import validate
 
-__all__ = ["read_record", "write_record"]
+__all__ = ["read_record", "record_in", "write_record"]
 
 _READERS = {".csv": read_csv, ".nc": read_netcdf_table}
 _WRITERS = {".csv": write_csv, ".nc": write_netcdf_record}
@@ -134,6 +135,18 @@ def read_record(
         raise RecordError(f"{path} is a folder: give the record itself, a .csv or a .nc file")
     columns = columns or {}
     table = _READERS[_suffix(path)](path, columns)
+    return record_in(table, columns, split_sweeps, rod, missing, load_cell_frame)
+
+
+def record_in(
+    table: Table,
+    columns: Mapping[str, str],
+    split_sweeps: bool,
+    rod: Rod | None,
+    missing: Collection[str],
+    load_cell_frame: Frame | None,
+) -> xr.Dataset:
+    """Return the record in a table as it was read; arguments are those of `read_record`."""
     if "drive_angle" in table.attrs and "drive_angle" not in {*columns, *table.columns}:
         columns = {**columns, "drive_angle": str(table.attrs["drive_angle"])}
         attrs = {name: value for name, value in table.attrs.items() if name != "drive_angle"}

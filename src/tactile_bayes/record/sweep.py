@@ -30,7 +30,9 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
     if impossible.any():
         sample = int(np.argmax(impossible))
         raise source.cell_error(
-            sample, "direction", f"{str(direction[sample])!r} is no direction: write 'forward' or 'backward'"
+            np.flatnonzero(impossible),
+            "direction",
+            f"{str(direction[sample])!r} is no direction: write 'forward' or 'backward'",
         )
     beyond = (angle > 2 * math.pi) | (angle < -2 * math.pi)
     if beyond.any():
@@ -45,7 +47,7 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
                 f", or state its unit, as in columns={{'drive_angle': {origin!r}}} of read_record, on the command line "
                 f"--column {shlex.quote(f'drive_angle={origin}')}"
             )
-        raise source.cell_error(sample, "drive_angle", what)
+        raise source.cell_error(np.flatnonzero(beyond), "drive_angle", what)
     for rows in _sweeps(values["sweep"]):
         first, last = _ends(rows)
         sweep = int(values["sweep"][first])

@@ -93,7 +93,9 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
     if bad.any():
         sample = int(np.argmax(bad))
         raise source.cell_error(
-            sample, "drive_angle", f"the value is {float(angle[sample])!r}: give a finite number, or remove the row"
+            np.flatnonzero(bad),
+            "drive_angle",
+            f"the value is {float(angle[sample])!r}: give a finite number, or remove the row",
         )
     base = np.zeros((angle.size, 2))
     for column, name in enumerate(("base_x", "base_y")):

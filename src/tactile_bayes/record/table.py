@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Index
 from tactile_bayes.errors import RecordError
 
 __all__ = ["Cells", "Source", "Table", "table_of"]
@@ -66,9 +67,27 @@ class Source:
         """Make an error with a line of the file."""
         return self.error(f"line {line}: {what}")
 
-    def cell_error(self, sample: int, column: str, what: str) -> RecordError:
-        """Make an error with a cell."""
-        return self.error(f"{self.row(sample)}, {self.column(column)}: {what}")
+    def row_error(self, line: int, what: str) -> RecordError:
+        """Make an error with a row of the file."""
+        error = self.line_error(line, what)
+        error.lines = (line,)
+        return error
+
+    def cell_error(self, samples: int | Index, column: str, what: str) -> RecordError:
+        """Make an error with a cell, the first of those in which the same is wrong."""
+        every = np.atleast_1d(samples)
+        error = self.error(f"{self.row(int(every[0]))}, {self.column(column)}: {what}")
+        return self._with_lines(error, every)
+
+    def rows_error(self, what: str) -> RecordError:
+        """Make an error with all rows."""
+        return self._with_lines(self.error(what), None)
+
+    def _with_lines(self, error: RecordError, samples: Index | None) -> RecordError:
+        if self.lines is not None:
+            lines = np.asarray(self.lines)
+            error.lines = tuple((lines if samples is None else lines[samples]).tolist())
+        return error
 
     def column_error(self, column: str, what: str) -> RecordError:
         """Make an error with the description of a column."""

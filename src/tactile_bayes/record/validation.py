@@ -167,7 +167,7 @@ def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
 def _refuse_gaps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
     missing = [name for name in CHANNELS if np.isnan(values[name]).all()]
     if len(missing) == len(CHANNELS):
-        raise source.error(
+        raise source.rows_error(
             f"every load channel is empty: a record needs measurements of at least one of {', '.join(CHANNELS)}"
         )
     for name in MEASURED:
@@ -178,6 +178,4 @@ def _refuse_gaps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
             way_out = ", or empty the whole column if the channel is missing" if name in CHANNELS else ""
             content = float(values[name][bad[0]])
             what = "is missing (nan)" if math.isnan(content) else f"is {content!r}"
-            raise source.cell_error(
-                int(bad[0]), name, f"the value {what}: give a finite number, remove the row{way_out}"
-            )
+            raise source.cell_error(bad, name, f"the value {what}: give a finite number, remove the row{way_out}")

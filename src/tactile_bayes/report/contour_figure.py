@@ -3,23 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.found_rig import found_rig
 from tactile_bayes.record import bases_of, carried_sweeps
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
-from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.wording import Shown, percent, shown_as, spread
 
-__all__ = ["ContourFigure", "contour_figure", "gap_ends"]
+__all__ = ["ContourFigure", "ContourFindings", "contour_figure", "gap_ends"]
 
 _DETAIL_HEIGHT = 230.0
 
 _TABLED = 21
+
+
+@dataclass(frozen=True)
+class ContourFindings:
+    """Content of the figures.
+
+    Attributes
+    ----------
+    posterior : xr.DataTree
+        The posterior as stored.
+    record : xr.Dataset
+        The record in it.
+    contacts : xr.Dataset or None
+        Contact points; None if a load channel is missing.
+    band : xr.Dataset
+        Band of the contour.
+    edges : xr.Dataset or None
+        The gap; None if there are sweeps in one direction only.
+    probability : float
+        Probability of bands and intervals.
+    """
+
+    posterior: xr.DataTree
+    record: xr.Dataset
+    contacts: xr.Dataset | None
+    band: xr.Dataset
+    edges: xr.Dataset | None
+    probability: float
 
 
 class ContourFigure(NamedTuple):
@@ -35,7 +64,7 @@ class ContourFigure(NamedTuple):
     unit: Shown
 
 
-def gap_ends(findings: Findings) -> tuple[float, float] | None:
+def gap_ends(findings: ContourFindings) -> tuple[float, float] | None:
     """Return x of the gap's ends, in the record's unit of length, if there is a gap."""
     if findings.edges is None:
         return None
@@ -43,7 +72,7 @@ def gap_ends(findings: Findings) -> tuple[float, float] | None:
     return (left, right) if left < right else None
 
 
-def contour_figure(findings: Findings) -> ContourFigure:
+def contour_figure(findings: ContourFindings) -> ContourFigure:
     """Draw the inferred contour."""
     band, attrs = findings.band, findings.band["lower"].attrs
     x, lower, median, upper = (band[name].values for name in ("x", "lower", "median", "upper"))
@@ -106,7 +135,7 @@ def contour_figure(findings: Findings) -> ContourFigure:
     )
 
 
-def _put_contacts(overview: Plot, findings: Findings, x: Floats) -> list[tuple[str, str]]:
+def _put_contacts(overview: Plot, findings: ContourFindings, x: Floats) -> list[tuple[str, str]]:
     contacts = findings.contacts
     if contacts is None:
         return []

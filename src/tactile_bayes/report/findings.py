@@ -19,6 +19,7 @@ from tactile_bayes.inference.result import read_result, record_of
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.record import record_hash
 from tactile_bayes.record.netcdf import read_netcdf
+from tactile_bayes.report.contour_figure import ContourFindings
 from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
@@ -39,21 +40,13 @@ _USUAL = 0.95
 
 
 @dataclass(frozen=True)
-class Findings:
-    """Content of a report.
+class Findings(ContourFindings):
+    """Content of a report, besides that of the figures of the contour.
 
     Attributes
     ----------
-    posterior : xr.DataTree
-        The posterior as stored.
-    record : xr.Dataset
-        The record in it.
-    contacts : xr.Dataset or None
-        Contact points; None if a load channel is missing.
-    band, interval : xr.Dataset
-        Band of the contour, and posterior predictive intervals of the readings.
-    edges : xr.Dataset or None
-        The gap; None if there are sweeps in one direction only.
+    interval : xr.Dataset
+        Posterior predictive intervals of the readings.
     numbers : xr.Dataset
         Parameters, from `tactile_bayes.uncertainty.summary.summary`.
     verdicts : tuple of str
@@ -68,16 +61,9 @@ class Findings:
         Result of `tactile-bayes trust`.
     posterior_sha256, record_sha256 : str
         Digests of the file, and of the record in it (`record_hash`).
-    probability : float
-        Probability of bands and intervals.
     """
 
-    posterior: xr.DataTree
-    record: xr.Dataset
-    contacts: xr.Dataset | None
-    band: xr.Dataset
     interval: xr.Dataset
-    edges: xr.Dataset | None
     numbers: xr.Dataset
     verdicts: tuple[str, ...]
     check: xr.Dataset | None
@@ -86,7 +72,6 @@ class Findings:
     trust: xr.Dataset | None
     posterior_sha256: str
     record_sha256: str
-    probability: float
 
     @property
     def is_rejected(self) -> bool:

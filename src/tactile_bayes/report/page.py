@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.record import carried_sweeps, present_channels
 from tactile_bayes.report.background import background_of
 from tactile_bayes.report.contour_figure import contour_figure, gap_ends
@@ -18,7 +19,7 @@ from tactile_bayes.report.reproduction import command_of, hindrances, python_lin
 from tactile_bayes.report.trust import check_messages, check_table, contacts_messages, convergence, trust_tables
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as, spread
 
-__all__ = ["page_of"]
+__all__ = ["page_of", "parameter_cells"]
 
 _WELL = "All is well"
 """Beginning of the first verdict if nothing is wrong."""
@@ -55,6 +56,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "trust": [] if findings.trust is None else str(findings.trust.attrs["words"]).splitlines(),
         "trust_summary": "" if findings.trust is None else str(findings.trust.attrs["summary"]),
         "trust_tables": trust_tables(findings),
+        "convergence_head": f"Have the {'particles moved enough' if is_streamed(attrs) else 'ensembles converged'}?",
         "convergence": convergence(findings),
         "check_messages": check_messages(findings),
         "check": check_table(findings),
@@ -176,13 +178,17 @@ def _parameters(findings: Findings, *, mute: bool) -> Table:
         if mute and is_direction(name):
             continue
         row = findings.numbers.sel(quantity=name)
-        values = [float(row[column]) for column in ("median", "lower", "upper")]
-        unit = str(row["unit"].values)
-        cells = [str(name), meaning_of(str(name), family), "" if unit == "1" else unit]
-        cells += spread(values, values[2] - values[1])
+        cells = parameter_cells(row, family)
         cells += [fixed(float(row["r_hat"]), ".3f"), *(fixed(float(row[c]), ".0f") for c in ("ess_bulk", "ess_tail"))]
         rows.append(cells)
     share = percent(findings.probability)
     heads = ["quantity", "meaning", "unit", "estimate", f"{share} from", "to", "R̂", "ESS bulk", "ESS tails"]
     caption = "Estimates are medians, intervals central" if mute else "All parameters, and the gap"
     return Table(caption, heads, rows, 3)
+
+
+def parameter_cells(row: xr.Dataset, family: str) -> list[str]:
+    """Return name, meaning, unit, median and interval of a row of a summary."""
+    name, unit = str(row["quantity"].values), str(row["unit"].values)
+    values = [float(row[column]) for column in ("median", "lower", "upper")]
+    return [name, meaning_of(name, family), "" if unit == "1" else unit, *spread(values, values[2] - values[1])]

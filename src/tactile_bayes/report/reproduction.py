@@ -10,6 +10,7 @@ from typing import Any
 import xarray as xr
 
 from tactile_bayes.inference.experiment import default_priors, prior_in_words
+from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.load_cell import LoadCell
 
 __all__ = ["command_of", "hindrances", "python_lines"]
@@ -49,6 +50,7 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
     print(again["posterior"].equals(stored["posterior"]))
     """
     seed, settings = str(attrs["seed"]), json.loads(attrs["settings"])
+    streamed = is_streamed(attrs)
     options = [
         f"family={json.dumps(str(attrs['family']))}",
         f"friction={float(attrs['friction'])!r}",
@@ -56,9 +58,9 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
         *(["events=False"] if not attrs.get("events", 1) else []),
         *(['rig=tb.read_result("rig.nc")'] if _RIG in attrs else []),
         f"seed={_seed(seed)}",
-        "settings=tb.SamplerSettings(",
-        *(f"    {name}={value!r}," for name, value in settings.items()),
-        ")",
+        *([] if streamed else ["settings=tb.SamplerSettings("]),
+        *(f"{'' if streamed else '    '}{name}={value!r}," for name, value in settings.items()),
+        *([] if streamed else [")"]),
     ]
     lines = [
         *(["import numpy as np"] if not seed.isdigit() else []),
@@ -68,10 +70,10 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
         'stored = tb.read_result("posterior.nc")',
         'columns = [stored[group].to_dataset() for group in ("constant_data", "observed_data")]',
         "record = xr.merge(columns).assign_attrs(stored.attrs)",
-        "again = tb.infer_contour(",
-        "    record,",
+        *(["stream = tb.Stream("] if streamed else ["again = tb.infer_contour(", "    record,"]),
         *(f"    {option}" if option.endswith(("(", ",")) else f"    {option}," for option in options),
         ")",
+        *(["stream.update(record)", "again = stream.posterior()"] if streamed else []),
         'print(again["posterior"].equals(stored["posterior"]))',
     ]
     return "\n".join(lines)
@@ -82,6 +84,8 @@ def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
     attrs = posterior.attrs
     settings = json.loads(attrs["settings"])
     found = []
+    if is_streamed(attrs):
+        found.append("The samples came in blocks: taken at once, they give other draws of the same posterior.")
     if settings.get("max_seconds") is not None:
         found.append("The run could end by the clock, after max_seconds: then the number of its steps is not repeated.")
     if "interrupted" in attrs["message"]:

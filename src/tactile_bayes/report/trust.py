@@ -9,6 +9,7 @@ import numpy as np
 
 from tactile_bayes.calibration.summary import CLAIMS
 from tactile_bayes.diagnostics.record_check import DISCREPANCIES
+from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels
 from tactile_bayes.report.findings import Findings
@@ -22,6 +23,8 @@ def convergence(findings: Findings) -> list[str]:
     """Return sentences on the end of the run and on its ensembles."""
     attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].to_dataset()
     said = [sentence(f"{attrs['message']}.")]
+    if is_streamed(attrs):
+        return said
     draws = stats.sizes["chain"] * stats.sizes["draw"]
     said.append(
         f"{stats.sizes['chain']} independent ensembles of {int(stats.attrs['walkers'])} walkers made {draws} draws; "

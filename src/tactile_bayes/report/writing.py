@@ -11,11 +11,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup
+
 from tactile_bayes.report.findings import FINDING_STEPS, findings_of
 from tactile_bayes.report.page import page_of
 from tactile_bayes.tasks import write_atomically
 
-__all__ = ["write_report"]
+__all__ = ["rendered", "write_report"]
 
 _ESCAPES = {code: f"\\u{code:04x}" for code in (ord("<"), ord(">"), ord("&"), 0x2028, 0x2029)}
 
@@ -70,10 +72,14 @@ def write_report(
 
 
 def _rendered(page: dict[str, Any]) -> str:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
+    values = {name: value for name, value in page.items() if name != "data"}
+    return rendered("template.html.jinja", _resource("report.js"), data=Markup(_as_json(page["data"])), **values)
 
-    style, script = (_resource(name) for name in ("report.css", "report.js"))
+
+def rendered(template: str, script: str = "", **values: Any) -> str:
+    """Return a page from a template, with the style of the report and a policy that loads nothing."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     environment = Environment(
         loader=PackageLoader("tactile_bayes", "report"),
         autoescape=True,
@@ -81,13 +87,9 @@ def _rendered(page: dict[str, Any]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    template = environment.get_template("template.html.jinja")
-    return template.render(
-        **{name: value for name, value in page.items() if name != "data"},
-        style=Markup(style),
-        script=Markup(script),
-        policy=_policy(style, script),
-        data=Markup(_as_json(page["data"])),
+    style = _resource("report.css")
+    return environment.get_template(template).render(
+        **values, style=Markup(style), script=Markup(script), policy=_policy(style, script)
     )
 
 

@@ -35,7 +35,7 @@ from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
-__all__ = ["ContourRun", "analyse"]
+__all__ = ["ContourRun", "RunFolder", "analyse", "complete", "file_of", "origin_of"]
 
 _OF_FORMER = (
     "report.html",
@@ -81,7 +81,7 @@ class ContourRun:
     left_out: Mapping[str, Exception]
 
 
-class _Folder(Folder):
+class RunFolder(Folder):
     """A folder of results from which parts that fail are left out."""
 
     def __init__(self, out: str | os.PathLike[str]) -> None:
@@ -96,6 +96,13 @@ class _Folder(Folder):
         except Exception as error:
             self.left_out[what] = error
             (self.path / name).unlink(missing_ok=True)
+
+    def write_posterior(self, posterior: xr.DataTree) -> None:
+        """Write the posterior, and remove what belongs to a former one."""
+        for name in _OF_FORMER:  # first, so that they are never beside another posterior
+            (self.path / name).unlink(missing_ok=True)
+        self.files["posterior"] = self.path / "posterior.nc"
+        write_result(posterior, self.files["posterior"])
 
     @property
     def messages(self) -> tuple[str, ...]:
@@ -156,15 +163,14 @@ def analyse(
     """
     check_probability("probability", probability)
     measured = with_rod(validate(measured), rod)
-    origin = _origin(measured, probability, record_file, command)
-    folder, drawn = _Folder(out), list[xr.DataTree]()
+    origin = origin_of(measured, probability, command)
+    if record_file is not None:
+        origin |= file_of(record_file, hashlib.sha256(Path(record_file).read_bytes()).hexdigest())
+    folder, drawn = RunFolder(out), list[xr.DataTree]()
 
     def keep(posterior: xr.DataTree) -> None:
         posterior.attrs |= origin
-        for name in _OF_FORMER:  # first, so that they are never beside another posterior
-            (folder.path / name).unlink(missing_ok=True)
-        folder.files["posterior"] = folder.path / "posterior.nc"
-        write_result(posterior, folder.files["posterior"])
+        folder.write_posterior(posterior)
         drawn.append(posterior)
 
     try:
@@ -175,8 +181,32 @@ def analyse(
         if not drawn:
             raise
         folder.left_out["predictions"] = error
-    result = drawn[-1]
+    return _completed(folder, measured, load_cell, drawn[-1], probability, truth)
 
+
+def complete(
+    posterior: xr.DataTree,
+    measured: xr.Dataset,
+    out: str | os.PathLike[str],
+    *,
+    load_cell: LoadCell | None = None,
+    probability: float = 0.95,
+) -> ContourRun:
+    """Write a posterior, and what `analyse` writes beside it, to a folder; arguments and result are as there."""
+    folder = RunFolder(out)
+    folder.write_posterior(posterior)
+    return _completed(folder, measured, load_cell, posterior, probability, None)
+
+
+def _completed(
+    folder: RunFolder,
+    measured: xr.Dataset,
+    load_cell: LoadCell | None,
+    result: xr.DataTree,
+    probability: float,
+    truth: Contour | None,
+) -> ContourRun:
+    """Write what follows from the posterior in a folder."""
     contacts, band, edges, found = None, None, None, tuple[str, ...]()
     with folder.attempt("contacts", "contacts.csv"):
         contacts = contact_points(measured, load_cell, result)
@@ -205,9 +235,7 @@ def analyse(
     return ContourRun(result, contacts, band, numbers, (*found, *folder.messages), folder.files, folder.left_out)
 
 
-def _origin(
-    measured: xr.Dataset, probability: float, record_file: str | os.PathLike[str] | None, command: Sequence[str]
-) -> dict[str, Any]:
+def origin_of(measured: xr.Dataset, probability: float, command: Sequence[str]) -> dict[str, Any]:
     """Return attributes that state the record of a run, and the command that started it."""
     said = {
         str(name): value.item() if isinstance(value, np.generic) else value
@@ -217,13 +245,15 @@ def _origin(
     origin: dict[str, Any] = {"probability": probability, "record_attributes": json.dumps(said, default=str)}
     if command:
         origin["command"] = json.dumps(list(command))
-    if record_file is not None:
-        path = Path(record_file)
-        origin |= {"record_file": path.name, "record_file_sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
     return origin
 
 
-def _draw(figures: _Figures, folder: _Folder) -> None:
+def file_of(path: str | os.PathLike[str], sha256: str) -> dict[str, Any]:
+    """Return attributes that state the file of a record."""
+    return {"record_file": Path(path).name, "record_file_sha256": sha256}
+
+
+def _draw(figures: _Figures, folder: RunFolder) -> None:
     for name in ("observables", "predictive", "rods", "contour", "gap", "trace", "pairs"):
         if name != "gap" or figures.edges is not None:
             with folder.attempt(f"figure {name}", f"{name}.png"):

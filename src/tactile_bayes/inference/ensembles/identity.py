@@ -14,7 +14,7 @@ from tactile_bayes.inference.ensembles.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.walkers import Seed, seed_sequence
 
-__all__ = ["changes", "identity_of_run"]
+__all__ = ["changes", "identity_of_run", "seed_as_text"]
 
 
 _START, _COORDINATES = _CONSEQUENCES = ("starting points", "coordinates of the walkers")
@@ -46,7 +46,7 @@ def identity_of_run(
         "number of ensembles": str(chains),
         "walkers of an ensemble": str(walkers),
         "block_steps": str(settings.block_steps),
-        "seed of the ensembles": _seed_as_text(seed),
+        "seed of the ensembles": seed_as_text(seed),
         _START: hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
         _COORDINATES: coordinates.digest,
         "version of emcee": version("emcee"),
@@ -59,7 +59,8 @@ def identity_of_run(
     return {**entries, **rest}
 
 
-def _seed_as_text(seed: Seed) -> str:
+def seed_as_text(seed: Seed) -> str:
+    """Return all of a seed that determines random numbers, as text."""
     sequence = seed_sequence(seed)
     spawned = f", spawn key {sequence.spawn_key}" if sequence.spawn_key else ""
     return f"{sequence.entropy}{spawned}, pool of {sequence.pool_size}"

@@ -1,0 +1,306 @@
+"""The command `watch`: a contour while its record grows."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tactile_bayes.cli.analysis import Family, answer_of, decimals
+from tactile_bayes.cli.answer import Answer, columns_of, print_object
+from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.interrupts import acknowledge_interrupt
+from tactile_bayes.cli.numbers import numbers_asked
+from tactile_bayes.cli.record_options import RecordOptions
+from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tactile_bayes.record import GrowingRecord, Growth
+    from tactile_bayes.runs.watch import Watch, WatchUpdate
+
+__all__ = ["watch"]
+
+_STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl-C again leaves that out)"
+
+_PAGE = "watch.html"
+
+_PER_PARAMETER = 30
+"""Number of particles for each parameter below which quantiles can be off by several standard deviations."""
+
+
+def watch(
+    *,
+    ctx: typer.Context,
+    record: Annotated[
+        Path, typer.Argument(help="Record, .csv, to which another program appends rows; it may not be there yet.")
+    ],
+    out: Out,
+    family: Family = "parabola",
+    reading: RecordOptions,
+    unknown: UnknownOptions,
+    rig: KnownRig = None,
+    probability: Annotated[float, typer.Option(help="Probability of band and intervals.", min=0.0, max=1.0)] = 0.95,
+    particles: Annotated[
+        int, typer.Option(help="Number of particles: four times as many are twice as exact, and take as long.", min=100)
+    ] = 1000,
+    between: Annotated[
+        str | None,
+        typer.Option(help="Ends X,X of the band [m, or L]; by default those of what its sweeps touch if they go on."),
+    ] = None,
+    until_width: Annotated[
+        float | None,
+        typer.Option(help="End when the band is nowhere wider than this [m, or L] between the ends of --between."),
+    ] = None,
+    poll: Annotated[float, typer.Option(help="Time from one look at the file to the next [s].", min=0.01)] = 0.5,
+    idle: Annotated[
+        float | None, typer.Option(help="End when no row has come for so long [s]; by default Ctrl-C ends it.", min=0.0)
+    ] = None,
+    seed: Seed = 1,
+    output: Output,
+) -> Answer:
+    """Infer the contour while its record is measured, with every block of new rows, until Ctrl-C.
+
+    The folder has the stream, from which the same command goes on, the posterior, and watch.html, a page that loads
+    itself again; at the end, which is no error, all that infer writes. With --json there is one object in each line:
+    of each update, and of the end.
+    """
+    from tactile_bayes.errors import ParameterError
+    from tactile_bayes.record import GrowingRecord
+    from tactile_bayes.runs.watch import open_watch
+
+    if until_width is not None and between is None:
+        raise ParameterError("--until-width is for a stretch of the contour: give its ends, like --between -0.02,0.02")
+    growing = GrowingRecord(record, **reading.arguments)
+    with open_watch(
+        out,
+        probability=probability,
+        between=None if between is None else numbers_asked(between, "--between", 2),
+        until_width=until_width,
+        record_file=record,
+        command=ctx.meta["words"],
+        family=family,
+        friction=unknown.friction,
+        nuisances=unknown.nuisances,
+        seed=seed,
+        particles=particles,
+        rig=rig_in(rig),
+    ) as watched:
+        follower = _Follower(record, growing, watched, reading, output, poll, idle)
+        try:
+            with acknowledge_interrupt(_STOPPING):
+                reason = follower.follow()
+        except KeyboardInterrupt:
+            reason = "stopped by Ctrl-C"
+        return _answer(ctx, follower, reason)
+
+
+@dataclass
+class _Follower:
+    """A file, what is inferred from it, and what is printed of it."""
+
+    path: Path
+    growing: GrowingRecord
+    watched: Watch
+    reading: RecordOptions
+    output: Output
+    poll: float
+    idle: float | None
+    load_cell: Any = None
+    last: WatchUpdate | None = None
+    refusal: Exception | None = None
+    messages: list[str] = field(default_factory=list)
+    has_begun: bool = False
+    is_late: bool = False
+    parameters: int = 0
+
+    def follow(self) -> str:
+        """Take what comes, until the end; return its reason."""
+        news = time.monotonic()
+        while True:
+            began = time.monotonic()
+            growth = self.growing.poll()
+            if growth is not None:
+                self._take(growth)
+                news = time.monotonic()
+                if self.last is not None and self.last.may_stop:
+                    return "the band is narrow enough"
+            elif self.idle is not None and began - news >= self.idle:
+                return f"no new rows for {self.idle:g} s"
+            took = time.monotonic() - began
+            self.is_late = took > self.poll
+            time.sleep(max(0.0, self.poll - took))
+
+    def tell(self, message: str) -> None:
+        """Print a message on stderr, and keep it for the next line of numbers."""
+        self.messages.append(message)
+        typer.echo(f"tactile-bayes: warning: {message}", err=True)
+
+    def _take(self, growth: Growth) -> None:
+        from tactile_bayes.errors import ParameterError, TactileBayesError
+
+        for message in growth.messages:
+            self.tell(message)
+        if growth.is_other:
+            self.watched.forget()
+        if growth.error is not None and not (self.has_begun or growth.error.lines or self.reading.split_sweeps):
+            raise growth.error
+        if growth.record is None:
+            self._refuse(growth.error)
+            return
+        record, self.load_cell = self.reading.completed(growth.record)
+        if not self.has_begun:
+            self.reading.report_units(record)
+            self._show(self.watched.resume(record, self.load_cell, growth.sha256), growth)
+            self.has_begun = True
+        try:
+            update = self.watched.take(record, self.load_cell, growth.sha256)
+        except TactileBayesError as error:
+            if self.last is None and isinstance(error, ParameterError):  # of an option, which no sample will change
+                raise
+            self._refuse(error)
+            return
+        self.refusal = None
+        self._show(update, growth)
+
+    def _refuse(self, error: Exception | None) -> None:
+        """Report why samples are not taken into account, once."""
+        if error is not None and str(error) != str(self.refusal):
+            self.tell(f"{error} (waiting for more rows)")
+        self.refusal = error
+
+    def _show(self, update: WatchUpdate | None, growth: Growth) -> None:
+        """Write the page, and print an answer."""
+        from tactile_bayes.report.wording import sentence
+
+        if update is None:
+            return
+        self.last = update
+        now = time.time()
+        behind = max(0.0, now - growth.written_at)
+        count, parameters = update.posterior["posterior"].sizes["draw"], update.summary.sizes["quantity"]
+        if self.parameters < parameters and count < _PER_PARAMETER * parameters:
+            self.tell(
+                f"{count} particles are few for {parameters} parameters, so that intervals may be wrong: give "
+                f"--particles {_PER_PARAMETER * parameters} or more"
+            )
+        self.parameters = parameters
+        if update.restarted:
+            self.tell(f"samples before have changed or do not go on in order: all {update.samples:,} taken anew")
+        words = [f"{sentence(_band(update))}.", f"The answer is {behind:.1f} s behind its newest sample."]
+        self.write_page(
+            _counted(update, self.is_late),
+            [*words, *(f"{message}." for message in self.messages)],
+            is_well=not self.messages,
+        )
+        if self.output.json:
+            print_object(self._numbers(update, now, behind), in_a_line=True)
+        elif not self.output.quiet:
+            typer.echo(f"{_counted(update, self.is_late)}; {_band(update)}; {behind:.1f} s behind")
+            typer.echo(f"    {_parameters(update)}")
+        self.messages.clear()
+
+    def write_page(self, headline: str, sentences: Sequence[str], *, is_well: bool, is_last: bool = False) -> None:
+        """Write the page of the last answer."""
+        from tactile_bayes.report.watch_page import write_watch_page
+
+        assert self.last is not None
+        write_watch_page(
+            self.last.posterior,
+            self.last.summary,
+            self.last.band,
+            self.watched.folder.path / _PAGE,
+            headline=headline,
+            sentences=sentences,
+            is_well=is_well and bool(self.last.posterior.attrs["converged"]),
+            refresh=None if is_last else max(1, math.ceil(self.poll)),
+        )
+
+    def _numbers(self, update: WatchUpdate, now: float, behind: float) -> dict[str, Any]:
+        from datetime import datetime
+
+        return {
+            "event": "update",
+            "time": datetime.fromtimestamp(now).astimezone().isoformat(timespec="milliseconds"),
+            "samples": update.samples,
+            "new": update.new,
+            "taken_together": self.is_late,
+            "restarted": update.restarted,
+            "seconds": update.seconds,
+            "seconds_behind": behind,
+            "probability": update.summary.attrs["probability"],
+            "quantities": columns_of(update.summary, "quantity"),
+            "band_width": update.width,
+            "may_stop": update.may_stop,
+            "converged": bool(update.posterior.attrs["converged"]),
+            "message": update.posterior.attrs["message"],
+            "warnings": list(self.messages),
+        }
+
+
+def _answer(ctx: typer.Context, follower: _Follower, reason: str) -> Answer:
+    """Return the last answer, with the files of a run."""
+    from tactile_bayes.errors import InferenceError
+    from tactile_bayes.report.wording import sentence
+
+    last = follower.last
+    if last is None:
+        if follower.refusal is not None:
+            raise follower.refusal
+        if "Ctrl-C" in reason:
+            raise KeyboardInterrupt("interrupted before the first answer")
+        raise InferenceError(f"{follower.path}: {reason}, and there is no sample in it")
+    run = follower.watched.finish(follower.load_cell)
+    said = f"Ended after {last.samples:,} samples: {reason}"
+    words = [*run.verdicts, f"{sentence(_band(last))}."]
+    follower.write_page(said, words, is_well=run.verdicts[0].startswith("All is well"), is_last=True)
+    folder = follower.watched.folder.path
+    files = {**run.files, "stream": follower.watched.state, "page": folder / _PAGE}
+    answer = answer_of(ctx, run, files, {}, "")
+    return replace(
+        answer,
+        parts=[f"{said}.", "", *answer.parts],
+        numbers=lambda: {"event": "end", "reason": reason, "samples_taken": last.samples, **answer.numbers()},
+        in_a_line=True,
+    )
+
+
+def _counted(update: WatchUpdate, is_late: bool) -> str:
+    """Return text like "84 samples, 28 new"."""
+    if not update.new:
+        return f"{update.samples:,} samples, resumed"
+    together = " taken together, since the update before took longer than --poll" if is_late else ""
+    return f"{update.samples:,} samples, {update.new:,} new{together}"
+
+
+def _band(update: WatchUpdate) -> str:
+    from tactile_bayes.report.wording import percent, shown_as
+
+    if not math.isfinite(update.width) or update.band is None:
+        return "no band yet"
+    attrs = update.band["lower"].attrs
+    ends = update.band["x"].values[[0, -1]]
+    unit, fine = shown_as("contact_x", attrs, ends), shown_as("contact_x", attrs, [update.width])
+    share = percent(float(update.summary.attrs["probability"]))
+    between = f"from x = {unit.text(ends[0], 2)} to {unit.full(ends[1], 2)}"
+    return f"band up to {fine.full(update.width, 2)} wide ({share}) {between}"
+
+
+def _parameters(update: WatchUpdate) -> str:
+    """Return the parameters of the contour with their intervals."""
+    from tactile_bayes.contours.families import family_named
+
+    shape = family_named(str(update.posterior.attrs["family"]))
+    parts = []
+    for name in [name for name in shape.parameters if name not in shape.roughness]:
+        row: Any = update.summary.sel(quantity=name)
+        digits = decimals(float(row["upper"] - row["lower"]))
+        middle, low, high = (f"{float(row[column]):.{digits}f}" for column in ("median", "lower", "upper"))
+        unit = str(row["unit"].values)
+        parts.append(f"{name} {middle} ({low} to {high}){'' if unit == '1' else f' {unit}'}")
+    return ", ".join(parts)

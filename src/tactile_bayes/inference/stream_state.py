@@ -1,0 +1,113 @@
+"""The state of a stream, and the file from which a stream goes on after it was killed at any moment."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.errors import InferenceError, RecordError
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.record import validate
+from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
+
+__all__ = ["StoredState", "StreamState", "read_state", "write_state"]
+
+_KIND = "stream of tactile-bayes"
+
+_FORMAT = 1
+
+_HOW = "begin a new stream, or put a copy of the file back"
+
+
+@dataclass(frozen=True, eq=False)
+class StreamState:
+    """A stream after an update."""
+
+    record: xr.Dataset
+    experiment: Experiment
+    points: Floats
+    """Particles, shape (n, parameters of the model)."""
+    values: Floats
+    """Logarithm of prior times likelihood of the particles, shape (n,)."""
+    log_weights: Floats
+    """Shape (n,), normalised."""
+    log_integral: float
+    """Logarithm of the integral of prior times likelihood."""
+    share: float
+    """Share of the prior within reach."""
+    correlation: float
+    """Of the last steps of any update; NaN if there were none."""
+    updates: int
+    evaluations: int
+    seconds: float
+
+
+_ARRAYS = {"points": ("particle", "parameter"), "values": ("particle",), "log_weights": ("particle",)}
+_NUMBERS = tuple(field.name for field in fields(StreamState))[5:]
+
+
+class StoredState(NamedTuple):
+    """A state as read from its file, before an experiment is known."""
+
+    record: xr.Dataset
+    identity: Mapping[str, str]
+    particles: xr.Dataset
+
+    def state(self, record: xr.Dataset, experiment: Experiment) -> StreamState:
+        """Return the state of a stream for this experiment."""
+        known: dict[str, Any] = {name: self.particles[name].values for name in _ARRAYS}
+        known |= {name: self.particles[name].item() for name in _NUMBERS}
+        return StreamState(record, experiment, **known)
+
+
+def write_state(state: StreamState, identity: Mapping[str, str], path: Path) -> None:
+    """Write a state with its record and its identity to a NetCDF file, whole or not at all."""
+    arrays = {name: (dims, getattr(state, name)) for name, dims in _ARRAYS.items()}
+    particles = xr.Dataset({**arrays, **{name: getattr(state, name) for name in _NUMBERS}})
+    tree = xr.DataTree.from_dict({"record": state.record, "particles": particles})
+    tree.attrs = {"kind": _KIND, "format": _FORMAT, "identity": json.dumps(dict(identity))}
+    write_netcdf(tree, path)
+
+
+def read_state(path: Path) -> StoredState:
+    """Read a state.
+
+    Raises
+    ------
+    InferenceError
+        If there is no such file, or it is damaged, of another kind, or of a later format.
+    """
+    if not path.is_file():
+        raise InferenceError(f"there is no file {path}: give the state that a stream has saved")
+    tree = read_netcdf(
+        path,
+        xr.open_datatree,
+        lambda what: InferenceError(f"{path} {what}: {_HOW}"),
+        decode_times=False,
+        decode_timedelta=False,
+    )
+    if tree.attrs.get("kind") != _KIND:
+        raise InferenceError(f"{path} holds no state of a stream: give a file that Stream.save has written")
+    if tree.attrs["format"] != _FORMAT:
+        raise InferenceError(
+            f"{path} has format {tree.attrs['format']}, and this version reads format {_FORMAT}: go on with the "
+            "version that wrote it, or begin a new stream"
+        )
+    try:
+        record = validate(tree["record"].to_dataset())
+        identity = {name: str(value) for name, value in json.loads(tree.attrs["identity"]).items()}
+        particles = tree["particles"].to_dataset()
+        if any(particles[name].dims != dims for name, dims in _ARRAYS.items()) or not set(_NUMBERS) <= set(particles):
+            raise ValueError("its particles have other columns")
+    except (KeyError, ValueError, AttributeError, RecordError) as error:
+        raise InferenceError(f"{path} holds no whole state of a stream ({error}): {_HOW}") from error
+    if not np.isfinite(particles["points"]).all():
+        raise InferenceError(f"{path} holds particles that are not finite: {_HOW}")
+    return StoredState(record, identity, particles)

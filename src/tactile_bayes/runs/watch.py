@@ -1,0 +1,240 @@
+"""A contour that is inferred while its record grows, in one folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_numbers, check_positive, check_probability
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.errors import InferenceError, ParameterError, RecordError
+from tactile_bayes.inference.stream import Stream
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import record_hash
+from tactile_bayes.runs.contour import ContourRun, RunFolder, complete, file_of, origin_of
+from tactile_bayes.tasks import alone_in
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.summary import reach, summary
+
+__all__ = ["STATE", "Watch", "WatchUpdate", "open_watch"]
+
+STATE = "stream.nc"
+"""File of the stream in a folder, from which a watch goes on."""
+
+_POINTS = 201
+"""Number of grid points of the band."""
+
+
+class WatchUpdate(NamedTuple):
+    """The answer after some samples."""
+
+    samples: int
+    """Number of samples so far."""
+    new: int
+    """Number of those that came with this update."""
+    seconds: float
+    """Time that the update took, with its files [s]."""
+    restarted: bool
+    """True if all samples were taken anew, since they do not go on from those before."""
+    posterior: xr.DataTree
+    summary: xr.Dataset
+    """Parameters with intervals."""
+    band: xr.Dataset | None
+    """Band between the ends that were given, or of what the sweeps touch if they go on; None if they touch nothing."""
+    width: float
+    """Largest width of the band [length]; NaN without one."""
+    may_stop: bool
+    """True if the band is narrow enough, and the particles have lost their places in the last moves."""
+
+
+@contextmanager
+def open_watch(out: str | os.PathLike[str], **options: Any) -> Iterator[Watch]:
+    """Open a folder for a `Watch`, and lock it.
+
+    Raises
+    ------
+    ParameterError
+        As in `Watch`.
+    InferenceError
+        If another run is at work there.
+    """
+    watch = Watch(out, **options)
+    with alone_in(watch.folder.path, InferenceError):
+        yield watch
+
+
+class Watch:
+    """The stream behind a record that grows, with its folder.
+
+    Parameters
+    ----------
+    out : path-like
+        Folder for stream.nc and posterior.nc after each update, and at the end for the files of a run; created if
+        missing.
+    probability : float
+        Probability of the band and of intervals, in (0, 1).
+    between : pair of float, optional
+        Ends of the band in x, in the record's unit of length; by default those of what its
+        sweeps touch if they go on.
+    until_width : float, optional
+        Width below which the band has to be everywhere between these ends for measuring to stop [length].
+    record_file : path-like
+        File that is followed; the posterior states it.
+    command : sequence of str
+        Words of the command; the posterior states them.
+    **options
+        Arguments of `Stream`, without the load cell.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not valid, or a width is given without ends.
+    """
+
+    def __init__(
+        self,
+        out: str | os.PathLike[str],
+        *,
+        probability: float = 0.95,
+        between: Sequence[float] | None = None,
+        until_width: float | None = None,
+        record_file: str | os.PathLike[str],
+        command: Sequence[str] = (),
+        **options: Any,
+    ) -> None:
+        self._probability = check_probability("probability", probability)
+        self._x: Floats | None = None
+        if between is not None:
+            left, right = check_numbers("between", between, "give two numbers", shape=(2,)).tolist()
+            if not left < right:
+                raise ParameterError(f"between is {left:g}, {right:g}: give the smaller one first")
+            self._x = np.linspace(left, right, _POINTS)
+        if until_width is not None:
+            check_positive("until_width", until_width)
+            if between is None:
+                raise ParameterError("until_width is for a stretch of the contour: give its ends in x with between")
+        self._until_width = until_width
+        self._file, self._command, self._options = record_file, command, options
+        family_named(options.get("family", "parabola"))
+        Stream(**options)  # both refuse what they can before the first sample
+        self.folder = RunFolder(out)
+        self._stream: Stream | None = None
+        self._answer: tuple[xr.DataTree, xr.Dataset] | None = None
+
+    @property
+    def state(self) -> Path:
+        """File of the stream."""
+        return self.folder.path / STATE
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of the stream."""
+        record = None if self._stream is None else self._stream.record
+        return 0 if record is None else record.sizes["sample"]
+
+    def resume(self, record: xr.Dataset, load_cell: LoadCell | None, sha256: str) -> WatchUpdate | None:
+        """Go on from the stream in the folder; arguments are those of `take`. Return its answer, None if there is none.
+
+        Raises
+        ------
+        InferenceError
+            As in `Stream.resume`.
+        """
+        began = perf_counter()
+        if not self.state.is_file():
+            return None
+        self._stream = Stream.resume(self.state, record, **self._options, load_cell=load_cell)
+        return self._update(self._stream, self.samples, began, sha256)
+
+    def forget(self) -> None:
+        """Begin again with the next samples."""
+        self._stream = None
+
+    def take(self, record: xr.Dataset, load_cell: LoadCell | None, sha256: str) -> WatchUpdate | None:
+        """Take the samples that are new into account, and write the stream and its posterior.
+
+        Parameters
+        ----------
+        record : xr.Dataset
+            All samples so far. If they do not begin with those before, or not go on from them in order, all are taken
+            anew.
+        load_cell : LoadCell or None
+            As in `infer_contour`.
+        sha256 : str
+            Digest of the file.
+
+        Returns
+        -------
+        WatchUpdate or None
+            None if there are no new samples.
+
+        Raises
+        ------
+        RecordError, ParameterError, InferenceError, ReachError
+            As in `Stream.update`. The stream is then as before.
+        """
+        began, had = perf_counter(), self.samples
+        if self._stream is not None and _continues(self._stream.record, record):
+            if had == record.sizes["sample"]:
+                return None
+            with suppress(RecordError):  # the samples are a record, but do not follow those before
+                self._stream.update(record.isel(sample=slice(had, None)))
+                self._stream.save(self.state)
+                return self._update(self._stream, had, began, sha256)
+        stream = Stream(**self._options, load_cell=load_cell)
+        stream.update(record)
+        self._stream = stream
+        stream.save(self.state)
+        return self._update(stream, 0, began, sha256, restarted=had > 0)
+
+    def finish(self, load_cell: LoadCell | None) -> ContourRun:
+        """Write all files of a run for the last answer.
+
+        Raises
+        ------
+        InferenceError
+            If there is none.
+        """
+        if self._answer is None:
+            raise InferenceError("there is no answer yet: no samples have been taken into account")
+        posterior, record = self._answer
+        return complete(posterior, record, self.folder.path, load_cell=load_cell, probability=self._probability)
+
+    def _update(self, stream: Stream, had: int, began: float, sha256: str, *, restarted: bool = False) -> WatchUpdate:
+        """Write the posterior, and return the answer."""
+        posterior, record = stream.posterior(), stream.record
+        assert record is not None
+        posterior.attrs |= origin_of(record, self._probability, self._command) | file_of(self._file, sha256)
+        self.folder.write_posterior(posterior)
+        self._answer = posterior, record
+        band = None
+        with suppress(InferenceError):  # nothing is touched yet
+            band = contour_band(posterior, reach(posterior) if self._x is None else self._x, self._probability)
+        widths = np.array([np.nan]) if band is None else (band["upper"] - band["lower"]).values
+        narrow = self._until_width is not None and bool(np.all(widths < self._until_width))
+        return WatchUpdate(
+            samples=record.sizes["sample"],
+            new=record.sizes["sample"] - had,
+            seconds=perf_counter() - began,
+            restarted=restarted,
+            posterior=posterior,
+            summary=summary(posterior, self._probability),
+            band=band,
+            width=float(np.nanmax(widths)) if np.isfinite(widths).any() else np.nan,
+            may_stop=narrow and bool(posterior.attrs["converged"]),
+        )
+
+
+def _continues(before: xr.Dataset | None, record: xr.Dataset) -> bool:
+    """Return whether a record begins with the samples of another."""
+    if before is None or before.sizes["sample"] > record.sizes["sample"]:
+        return False
+    return record_hash(record.isel(sample=slice(0, before.sizes["sample"]))) == record_hash(before)

@@ -1,0 +1,284 @@
+"""The command watch: a record that grows, in a folder."""
+
+import json
+import os
+import signal
+import threading
+import time
+from functools import partial
+
+import numpy as np
+import pytest
+
+from helpers import commands
+from helpers.report_pages import Page
+from tactile_bayes.cli import watching
+from tactile_bayes.inference.result import read_result
+from tactile_bayes.inference.stream import Stream
+from tactile_bayes.record import read_record
+from tactile_bayes.runs import contour as contour_run
+
+FEW = ("--as-stated", "--particles", 120)
+
+
+@pytest.fixture(scope="module")
+def lines(record):
+    """Header and rows of the file of a record, with their ends."""
+    whole = record.read_text(encoding="utf-8").splitlines(keepends=True)
+    head = next(number for number, line in enumerate(whole) if not line.startswith("#")) + 1
+    return whole[:head], whole[head:]
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "live.csv"
+
+
+@pytest.fixture(autouse=True)
+def undrawn(monkeypatch):
+    monkeypatch.setattr(contour_run, "_draw", lambda *arguments, **options: {})
+
+
+def write(path, *parts):
+    path.write_text("".join(text for part in parts for text in part), encoding="utf-8")
+
+
+@pytest.fixture
+def follow(path, monkeypatch):
+    """Call the command, with what happens to the file at each look at it; it ends when nothing happens any more."""
+
+    def call(*options, then=(), json=False):
+        actions = iter(then)
+
+        def act(seconds):
+            next(actions, lambda: None)()
+
+        monkeypatch.setattr(watching.time, "sleep", act)
+        words = [*FEW, *options, *(["--json"] if json else [])]
+        return commands.call("watch", path, "--out", path.parent / "run", "--idle", 0, *words)
+
+    return call
+
+
+def objects(result):
+    assert result.exit_code == 0, result.output
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+def test_it_follows_a_file_and_ends_with_the_answer_of_a_run(path, lines, follow):
+    head, rows = lines
+    write(path, head, rows[:60])
+    result = follow(
+        then=[partial(write, path, head, rows[:100], rows[100][:9]), partial(write, path, head, rows[:130])]
+    )
+    assert result.exit_code == 0, result.output
+    said = result.stdout.splitlines()
+    assert said[0].startswith("60 samples, 60 new; band up to ")
+    assert said[0].endswith(" s behind")
+    assert said[1].startswith("    a ")
+    assert " 1/m, q " in said[1]
+    assert said[2].startswith("100 samples, 40 new")
+    assert said[4].startswith("130 samples, 30 new")
+    assert said[6] == "Ended after 130 samples: no new rows for 0 s."
+    assert said[8].startswith("All is well: the particles have lost their places")
+    folder = path.parent / "run"
+    assert {"stream.nc", "posterior.nc", "band.csv", "summary.txt", "watch.html"} <= set(os.listdir(folder))
+    posterior = read_result(folder / "posterior.nc")
+    assert posterior.attrs["sampler"] == "sequential Monte Carlo"
+    assert posterior.attrs["record_file"] == "live.csv"
+    assert posterior["observed_data"].sizes["sample"] == 130
+    assert commands.call("report", folder).exit_code == 0
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    assert "Have the particles moved enough?" in page.texts["h3"]
+
+
+def test_its_page_loads_itself_again_until_the_end(path, lines, follow):
+    head, rows = lines
+    pages = []
+    write(path, head, rows[:4])
+
+    def look():
+        pages.append((path.parent / "run" / "watch.html").read_text(encoding="utf-8"))
+
+    def grow():
+        look()
+        write(path, head, rows[:50], ["broken\n"])
+
+    follow("--poll", 3, then=[grow, look])
+    look()
+    first, middle, last = pages
+    assert '<meta http-equiv="refresh" content="3">' in first
+    assert "<strong>4 samples, 4 new.</strong>" in first
+    assert '<meta http-equiv="refresh" content="3">' in middle
+    assert "<strong>50 samples, 46 new.</strong>" in middle
+    assert "there are 1 cells in 8 columns" in middle
+    assert "refresh" not in last
+    assert "<strong>Ended after 50 samples" in last
+    assert 'id="band-detail"' in last
+
+
+def test_each_update_is_a_line_for_programs(path, lines, follow):
+    head, rows = lines
+    spoilt = [*rows[:30], rows[30].replace(rows[30].split(",")[6], "nan"), *rows[31:50]]
+    write(path, head, rows[:30])
+    result = follow(json=True, then=[partial(write, path, head, spoilt)])
+    one, two, end = objects(result)
+    assert [each["event"] for each in (one, two, end)] == ["update", "update", "end"]
+    assert [(each["samples"], each["new"]) for each in (one, two)] == [(30, 30), (49, 19)]
+    assert {row["quantity"] for row in two["quantities"]} == {"a", "q", "x_c", "noise_scale"}
+    assert two["seconds_behind"] >= two["seconds"] > 0.0
+    (warning,) = two["warnings"]
+    assert f"line {len(head) + 31}, column 'force_x': the value is missing (nan)" in warning
+    assert one["warnings"] == []
+    assert warning in result.stderr
+    assert (end["reason"], end["samples_taken"], end["converged"]) == ("no new rows for 0 s", 49, True)
+    assert end["words"][0].startswith("All is well")
+
+
+def test_a_file_that_is_replaced_begins_again(path, lines, follow):
+    head, rows = lines
+    write(path, head, rows[:40])
+    result = follow(
+        json=True, then=[partial(write, path, head), partial(write, path, head, rows[5:30]), path.unlink, lambda: None]
+    )
+    one, two, end = objects(result)
+    assert (one["samples"], two["samples"], two["new"]) == (40, 25, 25)
+    assert "has been replaced or cut short" in two["warnings"][0]
+    assert end["samples_taken"] == 25
+
+
+def test_the_same_command_goes_on_with_the_same_numbers(path, lines, follow):
+    head, rows = lines
+    write(path, head, rows[:30])
+    first = follow(json=True)
+    write(path, head, rows[:60])
+    resumed, grown, _ = objects(follow(json=True))
+    assert (resumed["samples"], resumed["new"]) == (30, 0)
+    assert resumed["quantities"] == objects(first)[0]["quantities"]
+    measured = read_record(path)
+    stream = Stream(nuisances=[], seed=1, particles=120)
+    stream.update(measured.isel(sample=slice(0, 30)))
+    stream.update(measured.isel(sample=slice(30, None)))
+    expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
+    assert [row["median"] for row in grown["quantities"]] == pytest.approx(expected, rel=1e-12)
+    assert follow().stdout.startswith("60 samples, resumed; ")
+    for change, words in ((["--seed", 2], "seed (was"), (["--family", "circle"], "family (was")):
+        commands.assert_refused(follow(*change), words)
+    write(path, head, rows[1:70])
+    commands.assert_refused(follow(), "record (its SHA-256)")
+    write(path, head, rows[:20])
+    commands.assert_refused(follow(), "samples (was '60', now '20')")
+
+
+def test_samples_that_do_not_go_on_in_order_are_taken_anew(path, lines, follow):
+    """The backward sweep, of which some samples came before, now with the whole forward sweep before them."""
+    head, rows = lines
+    turn = next(k for k, row in enumerate(rows) if "backward" in row)
+    write(path, head, rows[:11], rows[12:13])
+    result = follow(json=True, then=[partial(write, path, head, rows[:11], rows[12:13], rows[11:12], rows[13:turn])])
+    _, two, _ = objects(result)
+    assert (two["samples"], two["new"], two["restarted"]) == (turn, turn, True)
+    assert "do not go on in order" in two["warnings"][0]
+
+
+def test_it_ends_when_the_band_is_narrow(path, lines, follow):
+    head, rows = lines
+    write(path, head, rows[:20])
+    options = ("--between", "-0.02,0.02", "--until-width", 0.002)
+    result = follow(*options, json=True, then=[partial(write, path, head, rows), lambda: pytest.fail("goes on")])
+    one, two, end = objects(result)
+    assert (one["may_stop"], two["may_stop"]) == (False, True)
+    assert one["band_width"] > 0.002 > two["band_width"]
+    assert end["reason"] == "the band is narrow enough"
+
+
+def test_control_c_ends_it_with_the_answer(path, lines, monkeypatch):
+    head, rows = lines
+    write(path, head, rows[:30])
+    monkeypatch.setattr(watching.time, "sleep", lambda seconds: os.kill(os.getpid(), signal.SIGINT))
+    result = commands.call("watch", path, "--out", path.parent / "run", *FEW)
+    assert result.exit_code == 0
+    assert "\nEnded after 30 samples: stopped by Ctrl-C.\n" in result.stdout
+    path.unlink()
+    result = commands.call("watch", path, "--out", path.parent / "other", *FEW)
+    assert result.exit_code == 130
+    assert "interrupted before the first answer" in result.stderr
+
+
+def test_quiet_prints_the_answer_alone_and_warns_of_few_particles(path, lines, follow):
+    write(path, lines[0], lines[1][:10])
+    result = follow("--quiet", "--particles", 100)
+    assert result.stdout.startswith("Ended after ")
+    assert (
+        "100 particles are few for 4 parameters, so that intervals may be wrong: give --particles 120" in result.stderr
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--until-width", 0.1], "--until-width is for a stretch of the contour"),
+        (["--until-width", -1, "--between", "0,1"], "until_width is -1.0"),
+        (["--between", "0.1"], "--between is '0.1': give 2 numbers"),
+        (["--between", "0.1,-0.1"], "give the smaller one first"),
+        (["--family", "star"], "star"),
+        (["--nuisance", "leaver"], "--as-stated and --nuisance contradict"),
+        (["--column", "force_x"], "--column force_x: write"),
+        (["--column", "force_x=Fx"], "Fx"),
+        (["--length", 0.1], "--length and --flexural-rigidity go together"),
+        (["--missing", "torque"], "torque"),
+        (["--rig", "none.nc"], "there is no file none.nc"),
+        (["--force-noise", 0.1], "give --moment-noise as well"),
+    ],
+)
+def test_options_that_are_wrong_are_refused(path, lines, follow, options, words):
+    write(path, lines[0], lines[1][:5])
+    commands.assert_refused(follow(*options), words)
+
+
+def test_a_wrong_call_is_refused(path):
+    for options, words in (
+        (["--particles", 10], "Invalid value for --particles"),
+        (["--poll", 0], "Invalid value for --poll"),
+        (["--idle", -1], "Invalid value for --idle"),
+    ):
+        commands.assert_misused(commands.call("watch", path, "--out", path.parent, *options), words)
+
+
+def test_what_can_never_be_followed_is_refused(path, tmp_path):
+    for where, words in ((tmp_path, "is a folder"), (tmp_path / "record.nc", "only a .csv file can be followed")):
+        commands.assert_refused(commands.call("watch", where, "--out", tmp_path / "run"), words)
+
+
+def test_a_file_without_samples_is_said_to_have_none(path, lines, follow):
+    commands.assert_refused(follow(), "no new rows for 0 s, and there is no sample in it")
+    write(path, lines[0])
+    commands.assert_refused(follow(), "there is no sample in it")
+    write(path, ["drive_angle,force_x\n", "1.0,2.0\n"])
+    commands.assert_refused(follow(), "there is no column 'sweep'")
+
+
+def test_a_rig_that_writes_100_rows_a_second(path, lines, monkeypatch):
+    """In real time, with lines that are half written at any moment."""
+    head, rows = lines
+
+    def measure():
+        with open(path, "w", encoding="utf-8", buffering=1) as file:
+            file.writelines(head)
+            for row in rows[:60]:
+                file.write(row[: len(row) // 2])
+                file.flush()
+                time.sleep(0.005)
+                file.write(row[len(row) // 2 :])
+                time.sleep(0.005)
+
+    rig = threading.Thread(target=measure)
+    rig.start()
+    out = path.parent / "run"
+    result = commands.call("watch", path, "--out", out, *FEW, "--poll", 0.05, "--idle", 0.4, "--json")
+    rig.join()
+    *updates, end = objects(result)
+    assert end["samples_taken"] == updates[-1]["samples"] == 60
+    assert sum(each["new"] for each in updates) == 60
+    assert any(each["taken_together"] for each in updates)
+    assert result.stderr == ""

@@ -1,0 +1,219 @@
+"""A record in a file to which another program appends rows."""
+
+import os
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.refusals import refused
+from tactile_bayes.errors import RecordError
+from tactile_bayes.record import GrowingRecord, read_record, write_record
+
+
+@pytest.fixture(scope="module")
+def lines(measured, tmp_path_factory):
+    """Lines of the file of a record, header and rows, with their ends."""
+    path = tmp_path_factory.mktemp("whole") / "record.csv"
+    write_record(measured, path)
+    whole = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    head = next(number for number, line in enumerate(whole) if not line.startswith("#")) + 1
+    return whole[:head], whole[head:]
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "record.csv"
+
+
+def write(path, *parts):
+    path.write_text("".join(text for part in parts for text in part), encoding="utf-8")
+    return path
+
+
+def polled(path, **options):
+    return GrowingRecord(path, **options).poll()
+
+
+def with_cell(row, place, text):
+    cells = row.rstrip("\n").split(",")
+    cells[place] = text
+    return ",".join(cells) + "\n"
+
+
+SWEEP, ANGLE, MOMENT, FORCE = 0, 4, 5, 6
+
+
+def test_whole_lines_are_taken_as_they_come(path, lines, measured):
+    head, rows = lines
+    growing = GrowingRecord(path)
+    assert growing.poll() is None
+    write(path, head[:3])
+    assert growing.poll().record is None
+    write(path, head, ["0,forw"])
+    assert growing.poll().record is None
+    for taken, rest in ((4, ""), (9, rows[9][:20]), (20, "")):
+        write(path, head, rows[:taken], [rest])
+        now = growing.poll()
+        assert (now.record.sizes["sample"], now.messages, now.is_other, now.error) == (taken, (), False, None)
+    write(path, head, rows[:20], rows[20][:5])
+    assert growing.poll() is None
+    assert growing.poll() is None
+    write(path, head, rows)
+    xr.testing.assert_identical(growing.poll().record, read_record(path))
+
+
+def test_a_file_that_is_replaced_or_cut_short_is_told(path, lines):
+    head, rows = lines
+    growing = GrowingRecord(write(path, head, rows[:10]))
+    growing.poll()
+    write(path, head, rows[:4])
+    now = growing.poll()
+    assert now.is_other
+    assert now.record.sizes["sample"] == 4
+    assert now.messages == (
+        f"{path} has been replaced or cut short (it had {len(head) + 10} lines, and has {len(head) + 4}): begun again",
+    )
+    other = write(path.with_name("other.csv"), head, rows[2:12])
+    os.replace(other, path)
+    assert growing.poll().is_other
+    path.unlink()
+    assert growing.poll() is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda row: with_cell(row, FORCE, "overload"), "'overload' is no number"),
+        (lambda row: with_cell(row, MOMENT, ""), "is missing (nan)"),
+        (lambda row: with_cell(row, MOMENT, "inf"), "is inf"),
+        (lambda row: row.rstrip("\n") + ",1.0\n", "there are 9 cells in 8 columns"),
+        (lambda row: "\0" * 8 + "\n", "NUL"),
+        (lambda row: row[:12] + "\n", "cells in 8 columns"),
+        (lambda row: with_cell(row, 1, "up"), "is no direction"),
+        (lambda row: with_cell(row, ANGLE, "99.0"), "more than a turn"),
+    ],
+)
+def test_rows_that_no_record_can_have_are_told_once_and_left_out(path, lines, measured, wrong, words):
+    head, rows = lines
+    spoilt = [*rows[:10], wrong(rows[10]), *rows[11:30]]
+    growing = GrowingRecord(write(path, head, spoilt))
+    now = growing.poll()
+    (message,) = now.messages
+    assert message.startswith(f"{path}: line {len(head) + 11}")
+    assert words in message
+    assert message.endswith("; the row is left out")
+    np.testing.assert_array_equal(now.record.force_y, measured.force_y[np.delete(np.arange(30), 10)])
+    write(path, head, spoilt, rows[30:40])
+    again = growing.poll()
+    assert (again.record.sizes["sample"], again.messages) == (39, ())
+
+
+def test_many_rows_with_the_same_fault_are_one_message(path, lines):
+    head, rows = lines
+    spoilt = [with_cell(row, FORCE, "nan") if 5 <= k < 12 else row for k, row in enumerate(rows[:30])]
+    (message,) = polled(write(path, head, spoilt)).messages
+    first = len(head) + 6
+    assert f"line {first}, " in message
+    assert message.endswith(f"; the row is left out, and 6 more, up to line {first + 6} likewise")
+
+
+def test_samples_before_the_sensor_speaks_are_waited_for(path, lines):
+    head, rows = lines
+    mute = [",".join([*row.split(",")[:5], "", "", ""]) + "\n" for row in rows[:4]]
+    growing = GrowingRecord(write(path, head, mute))
+    now = growing.poll()
+    assert (now.record, now.error) == (None, None)
+    assert "every load channel is empty" in now.messages[0]
+    write(path, head, mute, rows[4:10])
+    assert growing.poll().record.sizes["sample"] == 6
+
+
+def test_a_file_that_is_mostly_unreadable_is_an_error_until_it_is_not(path, lines):
+    """Such as angles in degrees, of which a few are less than a turn in radians."""
+    head, rows = lines
+    growing = GrowingRecord(write(path, head, [with_cell(row, ANGLE, str(k)) for k, row in enumerate(rows[:80])]))
+    now = growing.poll()
+    assert now.record is None
+    assert "look like degrees" in str(now.error)
+
+
+def test_what_is_wrong_with_the_columns_is_an_error(path, lines):
+    now = polled(write(path, ["sweep,direction,drive_angle\n", "0,forward,1.2\n"]))
+    with refused(RecordError, "there is no column 'holding_moment'"):
+        raise now.error
+    assert not now.error.lines
+
+
+# --- The order of samples ------------------------------------------------------------------------------------------
+
+
+def kept(path, lines, order):
+    """The message on a file with these rows, and the rows that are left out."""
+    head, rows = lines
+    now = polled(write(path, head, [rows[k] for k in order]))
+    angles = [float(rows[k].split(",")[ANGLE]) for k in order]
+    found, out = now.record.drive_angle.values.tolist(), []
+    for k, angle in enumerate(angles):
+        if len(found) > k - len(out) and found[k - len(out)] == angle:
+            continue
+        out.append(k)
+    return now.messages, out
+
+
+def test_a_sample_far_behind_is_told_and_left_out(path, lines):
+    messages, out = kept(path, lines, [*range(20), 3, 4, *range(20, 30)])
+    assert out == [20, 21]
+    assert f"line {len(lines[0]) + 21}: sweep 0 at a drive angle of" in messages[0]
+    assert messages[0].endswith(f"; the row is left out, and line {len(lines[0]) + 22} likewise")
+
+
+def test_neighbours_in_the_other_order_are_kept(path, lines):
+    assert kept(path, lines, [*range(15), 16, 15, *range(17, 30)]) == ((), [])
+
+
+def test_a_sample_far_ahead_does_not_make_the_others_late(path, lines):
+    messages, out = kept(path, lines, [*range(20), 35, *range(20, 30)])
+    assert (messages, out) == ((), [])
+
+
+def test_a_sweep_that_was_over_and_a_stray_number_are_told(path, lines, measured):
+    turn = int((measured.direction == "forward").sum())
+    assert kept(path, lines, [*range(turn + 8), 5, *range(turn + 8, turn + 12)])[1] == [turn + 8]
+    head, rows = lines
+    stray = [*rows[:10], with_cell(rows[10], SWEEP, "7"), *rows[11:30]]
+    now = polled(write(path, head, stray))
+    assert now.record.sizes["sample"] == 29
+    assert set(now.record.sweep.values.tolist()) == {0}
+    assert "sweep 7" in now.messages[0]
+
+
+@pytest.mark.parametrize("quantum", [0.0, 0.004])
+def test_the_scatter_of_an_encoder_is_no_fault(path, measured, quantum):
+    """Noise of three steps, or counts of as much, leave out none of 2,000 samples."""
+    count = 2000
+    angle = np.linspace(0.5, 2.5, count) + np.random.default_rng(1).normal(0.0, 0.003, count)
+    if quantum:
+        angle = np.round(angle / quantum) * quantum
+    rows = [f"0,forward,{value!r},0.1,0.1,0.1\n" for value in angle.tolist()]
+    now = polled(write(path, ["sweep,direction,drive_angle,holding_moment,force_x,force_y\n"], rows))
+    assert now.messages == ()
+    assert now.record.sizes["sample"] == count
+
+
+def test_sweeps_can_be_split_while_they_come(path, lines, measured):
+    bare = [",".join(line.split(",")[2:]) for line in [lines[0][-1], *lines[1]]]
+    head = [line for line in lines[0] if line.startswith("#") and "column" not in line]
+    growing = GrowingRecord(path, split_sweeps=True)
+    write(path, head, bare[:2])
+    now = growing.poll()
+    assert now.record is None
+    assert "one sample" in str(now.error)
+    write(path, head, bare)
+    np.testing.assert_array_equal(growing.poll().record.direction, measured.direction)
+
+
+def test_only_a_csv_file_grows(tmp_path):
+    for path, words in ((tmp_path, "is a folder"), (tmp_path / "record.nc", "only a .csv file")):
+        with refused(RecordError, words):
+            GrowingRecord(path)
