@@ -310,7 +310,7 @@ def nuisances_of(
     check_number("friction", friction, f"give a coefficient from 0 to {most:.2f}", least=0.0, most=most)
     if "friction" in names and friction:
         raise ParameterError(f"friction is {friction!r} and to be inferred as well: leave one of the two")
-    if "rigidity_scale" in names and set(every_gain) <= set(names):
+    if "rigidity_scale" in names and set(every_gain) <= set(names) - found:
         raise ParameterError(
             f"rigidity_scale and {', '.join(every_gain)} cannot all be inferred: a stiffer rod and larger gains "
             "have the same effect; leave one of them out"
