@@ -107,7 +107,7 @@ def calibrated(folder: Path, rod: tb.Rod, cell: tb.LoadCell) -> xr.DataTree:
             "suspension_compliance": stats.halfnorm(scale=0.3 / unit),
             **dict.fromkeys(("gauge_x", "gauge_y"), stats.norm(0.0, 3e-3)),
         }
-        known = {"nuisances": ("drive_angle_offset", "friction"), "priors": priors, "seed": 1}
+        known = {"nuisances": ("drive_angle_offset", "friction", "rest_curvature"), "priors": priors, "seed": 1}
         probe = tb.contours.Circle(r=1e-5, q=-1e-5)
         tb.write_result(tb.infer_rig(points(rod), contour=probe, load_cell=cell, **known), path)
     return tb.read_result(path)

@@ -33,10 +33,6 @@ _FEWEST_UNLOADED = 12
 _MOST_TRIALS = 50
 """Largest number of draws from the prior for each requested draw within reach."""
 
-_HOPELESS = -1e6
-"""Logarithm of a prior density for which no likelihood makes up. Points beyond, like a discrepancy of 1e13 loads,
-are proposed now and then, and beyond the precision of likelihoods."""
-
 _FEWEST_TRIALS = 1000
 """Number of draws from the prior before none within reach is an error, so that one requested draw is found too."""
 
@@ -229,10 +225,9 @@ class ContourModel:
     def log_probability(self, points: Floats) -> Floats:
         """Return the logarithm of prior times likelihood, shape (n,); −inf outside support or reach.
 
-        It lacks the prior's normalisation over contours within reach, and is −inf far in the tails of the prior too.
+        It lacks the prior's normalisation over contours within reach.
         """
         values = self.log_prior(points)
-        values[values < _HOPELESS] = -np.inf
         inside = np.flatnonzero(np.isfinite(values))
         for block in blocks(inside.size, self.loads_of_a_point) if inside.size else ():
             values[inside[block]] += self.log_likelihood(points[inside[block]])
