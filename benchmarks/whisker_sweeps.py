@@ -2,10 +2,10 @@
 
 The data are those of `../shared/data/whisker-sweeps`, or of the folder that TACTILE_BAYES_MEASURED names; the README
 there describes them. A thin probe touches a bent nitinol whisker at known points, and a stage moves cylinders past it.
-A Hall sensor under the clamp counts, with a gain that differs by 2 % from session to session. Taken from that README
-are the direction of the whisker, the transformation of the stage's coordinates, and 4.1 mm between the hinge of the
-sensor and the first traced point. From that point the rod is 51 mm long: there it lets go of the smaller cylinder. Its
-rigidity is that of a wire of 0.24 mm, and scales the gain.
+A Hall sensor under the clamp counts, with a gain that differs by 2 % from session to session, and hysteresis of 1 % of
+the peak, over some 6 mm. Taken from that README are the direction of the whisker, the transformation of the stage's
+coordinates, and 4.1 mm between the hinge of the sensor and the first traced point. From that point the rod is 51 mm
+long: there it lets go of the smaller cylinder. Its rigidity is that of a wire of 0.24 mm, and scales the gain.
 
     python -m benchmarks.whisker_sweeps FOLDER [SWEEP ...]
 
@@ -123,7 +123,11 @@ def main() -> None:
     for name, draws in rig["posterior"].mean().items():
         print(f"  {name:24s} {float(draws):12.5g} ± {float(rig['posterior'][name].std()):.2g}")
     unknown = ("moment_bias", "friction", "discrepancy")
-    session = {"rigidity_scale": stats.lognorm(s=0.02)}
+    priors = {
+        "rigidity_scale": stats.lognorm(s=0.02),
+        "discrepancy_scale": stats.lognorm(s=0.01, scale=0.01),
+        "discrepancy_length": stats.lognorm(s=0.3, scale=6.0 / (HINGE + LENGTH)),
+    }
     for name in names:
         path, began = folder / f"{name.replace('/', '-')}.nc", perf_counter()
         if not path.exists():
@@ -133,7 +137,7 @@ def main() -> None:
                 family="circle",
                 load_cell=cell,
                 nuisances=unknown,
-                priors=session,
+                priors=priors,
                 rig=rig,
                 seed=1,
                 settings=ENOUGH,

@@ -209,3 +209,18 @@ def test_simulated_readings_have_the_density_of_the_likelihood():
 def test_posteriors_with_it_are_calibrated(family):
     found = calibrate(seed=1, family=family, replicates=50, nuisances=SMOOTH, workers=1)
     assert found.attrs["calibrated"] == 1, found.attrs["verdict"]
+
+
+def test_it_is_in_the_unit_of_the_readings():
+    """Of a cell that counts, a discrepancy of 1 % is one of counts."""
+    record, gain = swept(Parabola(0.5, 0.5), step=0.1), 900.0 * np.eye(3)
+    counting = LoadCell(force_noise=45.0, moment_noise=18.0, gain=tuple(map(tuple, gain)))
+    counted = record.assign({name: record[name] * 900.0 for name in CHANNELS})
+    models = [
+        Experiment(one, load_cell=cell, nuisances=SMOOTH).model for one, cell in ((record, CELL), (counted, counting))
+    ]
+    values = []
+    for model in models:
+        points = points_of(model, noise_scale=1.0, discrepancy_scale=0.03, discrepancy_length=0.3)
+        values.append(model.log_likelihood(points)[0])
+    np.testing.assert_allclose(values[1], values[0] - 3 * record.sizes["sample"] * np.log(900.0), rtol=1e-10)

@@ -182,12 +182,16 @@ class ContourModel:
         return scale
 
     def discrepancy(self, points: Floats, loads: Floats) -> Discrepancy | None:
-        """Return the discrepancy of points, for the loads (n, samples, 3) of contour and rig alone; None without."""
+        """Return the discrepancy of points, for the loads (n, samples, 3) of contour and rig alone; None without.
+
+        It is one of readings: with the gain of the cell.
+        """
         if not self.noise.of_discrepancy:
             return None
         scale, length = points[:, [self.names.index(name) for name in self.noise.of_discrepancy]].T
         course = self.likelihood.course
-        return Discrepancy(course, scale[:, None, None] * load_in_contact(loads, course), length)
+        read = load_in_contact(loads, course) * self.likelihood.load_cell.own_gains
+        return Discrepancy(course, scale[:, None, None] * read, length)
 
     def discrepancy_at(self, point: Floats) -> Discrepancy | None:
         """Return the discrepancy of one point, shape (d,), for a single record; None without."""
