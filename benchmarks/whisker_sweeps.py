@@ -123,6 +123,7 @@ def main() -> None:
     for name, draws in rig["posterior"].mean().items():
         print(f"  {name:24s} {float(draws):12.5g} ± {float(rig['posterior'][name].std()):.2g}")
     unknown = ("moment_bias", "friction", "discrepancy")
+    # Radius and friction follow a smooth deviation, so that residuals do not tell its size: it is given.
     priors = {
         "rigidity_scale": stats.lognorm(s=0.02),
         "discrepancy_scale": stats.lognorm(s=0.01, scale=0.01),
