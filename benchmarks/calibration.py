@@ -33,8 +33,10 @@ class Family(NamedTuple):
 
 class Noise(NamedTuple):
     title: str
-    factor: float
-    """Factor on standard deviations of 0.05 EI/L² and 0.02 EI/L."""
+    force: float
+    """Standard deviation [EI/L²]."""
+    moment: float
+    """Standard deviation [EI/L]."""
 
 
 FAMILIES = {
@@ -46,9 +48,9 @@ FAMILIES = {
     "shape-free": Family("shape-free", 100),
 }
 NOISES = {
-    "usual": Noise("at the usual noise", 1.0),
-    "tenth": Noise("at a tenth of the noise", 0.1),
-    "threefold": Noise("at three times the noise", 3.0),
+    "usual": Noise("at the usual noise", 0.05, 0.02),
+    "tenth": Noise("at a tenth of the noise", 0.005, 0.002),
+    "threefold": Noise("at three times the noise", 0.15, 0.06),
 }
 
 
@@ -57,8 +59,7 @@ def folder_of(family: str, noise: str) -> str:
 
 
 def load_cell(noise: str) -> tb.LoadCell:
-    factor = NOISES[noise].factor
-    return tb.LoadCell(force_noise=0.05 * factor, moment_noise=0.02 * factor)
+    return tb.LoadCell(force_noise=NOISES[noise].force, moment_noise=NOISES[noise].moment)
 
 
 def published(noise: str) -> dict[str, xr.Dataset]:

@@ -92,6 +92,8 @@ class ContourModel:
         for i, name in enumerate(self.names):
             columns.setdefault(id(priors[name]), []).append(i)
         self._columns = [(log_density_of(priors[self.names[which[0]]]), which) for which in columns.values()]
+        of_path = (*family.parameters, *nuisances.of_path)
+        self._of_path = [i for i, name in enumerate(self.forward_parameters) if name in of_path]
         self._jointly = [self.names.index(name) for name in nuisances.joint.priors] if nuisances.joint else []
         rubs = bool(nuisances.friction) or "friction" in nuisances.names
         self.likelihood = RecordLikelihood(
@@ -165,9 +167,15 @@ class ContourModel:
         return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell)
 
     def loads_and_events(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return `loads`, and drive angles of events as from `RecordLikelihood.predict_with_events`."""
-        loads, _, events = self.likelihood.predict_with_events(self.contours(points), self.rig(points))
-        return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell), events
+        """Return `loads`, and drive angles of events as from `RecordLikelihood.predict_with_events`.
+
+        Points that differ only in what the load cell senses, as many do in differences, share one path.
+        """
+        _, first, path = np.unique(points[:, self._of_path], axis=0, return_index=True, return_inverse=True)
+        different = points[first]
+        loads, _, events = self.likelihood.predict_with_events(self.contours(different), self.rig(different))
+        sensed = self.nuisances.sensed(loads[path], self.values(points), self.likelihood.load_cell)
+        return sensed, events[path]
 
     def loads_with_errors(self, points: Floats) -> tuple[Floats, Flags]:
         """Return `loads` for every encoder error, shape (n, errors, samples, 3), and which points are usable, (n,)."""

@@ -91,6 +91,9 @@ _RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspens
 _RIG["backlash"] = "drive_angle_backlash"
 """Parameters that change the path or the reading of the drive angle, and their names in `Rig`."""
 
+_SENSED = tuple(name for what in ("bias", "drift", "gain", "lever", "moment_curve") for name in _GROUPS[what])
+"""Parameters that change only what the load cell senses, not the path."""
+
 
 @dataclass(frozen=True)
 class Nuisances:
@@ -141,6 +144,11 @@ class Nuisances:
         """Return the bounds of a parameter, whatever its prior."""
         kind = _KINDS.get(name)
         return (-np.inf, np.inf) if kind is None else (kind.low, kind.high)
+
+    @property
+    def of_path(self) -> tuple[str, ...]:
+        """Names of the parameters that change the path, or where along it the samples lie."""
+        return tuple(name for name in self.names if name not in _SENSED)
 
     def unit(self, name: str) -> str:
         """Return the SI unit of a parameter, like "N m"."""

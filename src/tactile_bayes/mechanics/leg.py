@@ -7,6 +7,7 @@ of Chebyshev series of loads, contact and drive angle (numerical continuation by
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -77,12 +78,19 @@ class LegCurves(NamedTuple):
 
 def leg_curves(order: int) -> LegCurves:
     """Workspace for series of an even number of terms."""
+    nodes, onward, fit = _weights(order)
+    empty = np.zeros(order)
+    return LegCurves(curves_of(order), nodes, onward, fit, np.zeros((6, order)), empty, empty.copy())
+
+
+@cache
+def _weights(order: int) -> tuple[Floats, Floats, Floats]:
+    """Nodes, and the weights `onward` and `fit`, which compiled code only reads."""
     nodes, unit = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, order // 2)), np.eye(order)
     slopes = np.vstack([chebyshev.derivative(unit), np.zeros(order)])
     at_nodes = chebyshev.polynomials(order, nodes)
     fit = np.ascontiguousarray(np.linalg.inv(np.vstack([at_nodes, at_nodes @ slopes])).T)
-    empty = np.zeros(order)
-    return LegCurves(curves_of(order), nodes, _onward(nodes), fit, np.zeros((6, order)), empty, empty.copy())
+    return nodes, _onward(nodes), fit
 
 
 def _onward(nodes: Floats) -> Floats:
