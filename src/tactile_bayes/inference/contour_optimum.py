@@ -21,7 +21,7 @@ from tactile_bayes.inference.start import Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS, present_channels
 
-__all__ = ["ContourOptimum", "contact_fit", "fitted_discrepancy", "fitted_noise", "optima_of", "optimum_of"]
+__all__ = ["ContourOptimum", "certainly_loaded", "contact_fit", "fitted_discrepancy", "fitted_noise", "optima_of", "optimum_of"]
 
 _PRIOR_DRAWS = 1000
 _CANDIDATES = 24
@@ -110,7 +110,7 @@ def event_brackets(model: ContourModel) -> Brackets:
             width = _EVENT_TOLERANCE * (angle[after] - angle[before])
             rows.append((of_sample[before], ends, angle[before], angle[after], width))
     found = {row[0] for row in rows}
-    for segment, (before, first, last, after) in enumerate(model.likelihood.event_samples(_certainly_loaded(model))):
+    for segment, (before, first, last, after) in enumerate(model.likelihood.event_samples(certainly_loaded(model))):
         if segment not in found and before >= 0 and after >= 0:  # contact is too brief for its loads to show events
             width = _EVENT_TOLERANCE * (angle[after] - angle[before]) / 2.0
             rows += [(segment, 0, -np.inf, angle[first], width), (segment, 1, angle[last], angle[after], width)]
@@ -118,8 +118,8 @@ def event_brackets(model: ContourModel) -> Brackets:
     return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
 
 
-def _certainly_loaded(model: ContourModel) -> Flags:
-    """Return True for samples whose load noise does not explain, each taken by itself."""
+def certainly_loaded(model: ContourModel) -> Flags:
+    """Return True for samples whose load noise does not explain, each taken by itself, above the zero of the record."""
     measured, present = model.likelihood.measured[:, model.present], model.present
     zero = np.where(np.isfinite(model.zero[present]), model.zero[present], np.median(measured, axis=0))
     squared_distance = np.square((measured - zero) / model.deviation[present]).sum(axis=1)

@@ -25,6 +25,7 @@ from tactile_bayes.inference.ensembles import (
     approximate,
     in_coordinates,
     learn_coordinates,
+    pilot_mean,
     scatter_walkers,
 )
 from tactile_bayes.inference.flank_coordinates import FlankCoordinates
@@ -160,7 +161,12 @@ def _whitened_around(
         settings=replace(settings, walkers=settings.walkers or max(48, 2 * count)),
     )
     # If posteriors are standard normal in these coordinates, their evidences differ as their densities at the centre.
-    return Walk(start, whitening, float(log_probability(whitening.middle[None])[0]))
+    log_evidence = float(log_probability(whitening.middle[None])[0])
+    if not deadline.has_passed:
+        mean = pilot_mean(log_probability, whitening.moves(), start[0], rng, deadline)
+        start[..., whitening.bent :] -= mean[whitening.bent :]
+        whitening = whitening.recentred(mean)
+    return Walk(start, whitening, log_evidence)
 
 
 def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> InferenceError:

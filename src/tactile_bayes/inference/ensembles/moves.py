@@ -17,8 +17,8 @@ __all__ = ["FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "
 Moves = Sequence[tuple[Any, float]]
 """Moves of an ensemble, with their shares. They keep nothing from step to step."""
 
-_MIN_NEW_SHARE = 0.2
-"""Smallest share of the new normal draw in a step of `NormalMove`."""
+_MIN_NEW_SHARE, _WHOLLY_NEW = 0.2, 0.5
+"""Smallest share of the new normal draw in a step of `NormalMove`, and the probability that it is all of the step."""
 
 _SHORT_SCALE = 0.25
 """Scale of short differences over the usual scale, for targets along bent ridges or between bounds."""
@@ -112,7 +112,7 @@ class NormalMove(emcee.moves.RedBlueMove):
 
     A step of random length combines a share of the walker's position with a new normal draw (Neal 1999; Cotter,
     Roberts, Stuart & White 2013, doi 10.1214/13-STS421); the acceptance depends only on the target relative to that
-    normal.
+    normal. Half of the steps are new draws, after which nothing is left of the position if the target is that normal.
     """
 
     def __init__(self, columns: slice) -> None:
@@ -125,7 +125,8 @@ class NormalMove(emcee.moves.RedBlueMove):
     ) -> tuple[Floats, Floats]:
         """Return proposals, (n, parameters), and the log of the backward over the forward proposal density, (n,)."""
         moving = sample[:, self._columns]
-        new = random.uniform(_MIN_NEW_SHARE, 1.0, len(moving))[:, None]
+        new = random.uniform(_MIN_NEW_SHARE, 1.0, len(moving))
+        new = np.where(random.rand(len(moving)) < _WHOLLY_NEW, 1.0, new)[:, None]
         there = np.sqrt(1.0 - new**2) * moving + new * random.standard_normal(moving.shape)
         proposed = sample.copy()
         proposed[:, self._columns] = there

@@ -1,4 +1,4 @@
-"""A short pilot run that learns coordinates in which a posterior is nearly normal, and a proposal in them."""
+"""Short pilot runs: of coordinates in which a posterior is nearly normal, with a proposal, and of the centre."""
 
 from __future__ import annotations
 
@@ -12,15 +12,19 @@ from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.block import Block, make_block
 from tactile_bayes.inference.ensembles.coordinates import Proposing, in_coordinates
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time
+from tactile_bayes.inference.ensembles.moves import Moves
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
 from tactile_bayes.inference.ensembles.straightened import Straightened
 from tactile_bayes.inference.ensembles.target import LogProbability
-from tactile_bayes.inference.ensembles.walkers import first_random_state
+from tactile_bayes.inference.ensembles.walkers import RandomState, first_random_state
 
-__all__ = ["learn_coordinates"]
+__all__ = ["learn_coordinates", "pilot_mean"]
 
 _STEPS = (60, 120, 240, 480, 960)
 """Number of steps of each stage, which samples in the best coordinates so far."""
+
+_STEPS_TO_CENTRE = 40
+"""Number of steps after whose half walkers are about the centre, in coordinates that are nearly standard normal."""
 
 _MAX_DRAWS = 3000
 """Largest number of draws from each half of the walkers to which the coordinates of a stage are fitted."""
@@ -68,10 +72,7 @@ def learn_coordinates(
     for steps in _STEPS:
         density = in_coordinates(log_probability, best)
         coordinates = best.of(points)
-        first = Block(coordinates[None, None], density(coordinates)[None, None], (random,))
-        block = make_block(density, best.moves(), first, steps, deadline.moment)
-        if not block.whole:
-            raise KeyboardInterrupt
+        block = _pilot(density, best.moves(), coordinates, steps, random, deadline)
         (random,) = block.random_states
         late = block.samples[:, block.steps // 2 :]
         points = best.parameters(late[0, -1])[0]
@@ -92,6 +93,38 @@ def learn_coordinates(
         if quality >= _GOOD_QUALITY or deadline.has_passed:
             break
     return best
+
+
+def pilot_mean(
+    density: LogProbability, moves: Moves, start: Floats, rng: np.random.Generator, deadline: Deadline = NEVER
+) -> Floats:
+    """Return the mean of the coordinates, shape (d,), over the second half of a pilot run.
+
+    Parameters
+    ----------
+    density : callable
+        Log-density of coordinates, (n, d) to (n,).
+    moves : sequence of moves with their shares
+    start : ndarray, shape (walkers, d)
+        Starting points of an even number of walkers, in coordinates.
+    rng : np.random.Generator
+    deadline : Deadline
+        After it, the walkers make one more step.
+    """
+    random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
+    block = _pilot(density, moves, start, _STEPS_TO_CENTRE, random, deadline)
+    return np.asarray(block.samples[0, block.steps // 2 :].mean(axis=(0, 1)))
+
+
+def _pilot(
+    density: LogProbability, moves: Moves, start: Floats, steps: int, random: RandomState, deadline: Deadline
+) -> Block:
+    """Return the steps of one ensemble; an interrupt is raised."""
+    first = Block(start[None, None], density(start)[None, None], (random,))
+    block = make_block(density, moves, first, steps, deadline.moment)
+    if not block.whole:
+        raise KeyboardInterrupt
+    return block
 
 
 def _straightened(base: Proposing, draws: Floats, scale: Floats, share: float, efficiency: float = 0.0) -> Straightened:

@@ -14,6 +14,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_optimum import certainly_loaded
 from tactile_bayes.inference.discrepancy import load_in_contact
 from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.reconstruction import loaded_samples
@@ -135,7 +136,9 @@ class Observer:
 
     def __init__(self, model: ContourModel) -> None:
         self.model = model
-        self.loaded = loaded_samples(model.measured, model.noise.stated_cell)
+        self.loaded = certainly_loaded(model)
+        if not np.isfinite(model.zero[model.present]).all():  # hardly any sample is unloaded
+            self.loaded = loaded_samples(model.measured, model.noise.stated_cell)
         stated = np.asarray(model.likelihood.load_cell.noise)
         self.noise = np.where(stated > 0.0, stated, model.deviation)
         between = model.likelihood.event_angles(self.loaded)[:, 2:]
