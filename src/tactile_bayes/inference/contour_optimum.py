@@ -21,7 +21,15 @@ from tactile_bayes.inference.start import Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS, present_channels
 
-__all__ = ["ContourOptimum", "certainly_loaded", "contact_fit", "fitted_discrepancy", "fitted_noise", "optima_of", "optimum_of"]
+__all__ = [
+    "ContourOptimum",
+    "certainly_loaded",
+    "contact_fit",
+    "fitted_discrepancy",
+    "fitted_noise",
+    "optima_of",
+    "optimum_of",
+]
 
 _PRIOR_DRAWS = 1000
 _CANDIDATES = 24

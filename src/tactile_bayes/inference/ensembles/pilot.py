@@ -1,4 +1,4 @@
-"""Short pilot runs: of coordinates in which a posterior is nearly normal, with a proposal, and of the centre."""
+"""Short pilot runs, which learn coordinates in which a posterior is nearly normal."""
 
 from __future__ import annotations
 
@@ -18,13 +18,16 @@ from tactile_bayes.inference.ensembles.straightened import Straightened
 from tactile_bayes.inference.ensembles.target import LogProbability
 from tactile_bayes.inference.ensembles.walkers import RandomState, first_random_state
 
-__all__ = ["learn_coordinates", "pilot_mean"]
+__all__ = ["learn_coordinates", "pilot_normal"]
 
 _STEPS = (60, 120, 240, 480, 960)
 """Number of steps of each stage, which samples in the best coordinates so far."""
 
-_STEPS_TO_CENTRE = 40
-"""Number of steps after whose half walkers are about the centre, in coordinates that are nearly standard normal."""
+_STEPS_OF_NORMAL = 40
+"""Number of steps of a pilot run in coordinates that are nearly standard normal."""
+
+_MOVES_PER_DRAW = 4.0
+"""Number of accepted moves of a walker there after which its position is a draw of its own."""
 
 _MAX_DRAWS = 3000
 """Largest number of draws from each half of the walkers to which the coordinates of a stage are fitted."""
@@ -95,10 +98,20 @@ def learn_coordinates(
     return best
 
 
-def pilot_mean(
-    density: LogProbability, moves: Moves, start: Floats, rng: np.random.Generator, deadline: Deadline = NEVER
-) -> Floats:
-    """Return the mean of the coordinates, shape (d,), over the second half of a pilot run.
+def pilot_normal(
+    density: LogProbability,
+    moves: Moves,
+    start: Floats,
+    columns: slice,
+    rng: np.random.Generator,
+    deadline: Deadline = NEVER,
+) -> tuple[Floats, Floats, Floats]:
+    """Return mean, (k,), and root, (k, k), of the covariance of some coordinates, and last positions, (walkers, d).
+
+    These coordinates should be nearly standard normal: of the covariance only principal axes count whose variances
+    differ from one by more than the number of draws explains (Marchenko & Pastur 1967, doi
+    10.1070/SM1967v001n04ABEH001994), less the bias of their size (Baik & Silverstein 2006, doi
+    10.1016/j.jmva.2005.08.003).
 
     Parameters
     ----------
@@ -107,13 +120,26 @@ def pilot_mean(
     moves : sequence of moves with their shares
     start : ndarray, shape (walkers, d)
         Starting points of an even number of walkers, in coordinates.
+    columns : slice
+        The k coordinates.
     rng : np.random.Generator
     deadline : Deadline
         After it, the walkers make one more step.
     """
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
-    block = _pilot(density, moves, start, _STEPS_TO_CENTRE, random, deadline)
-    return np.asarray(block.samples[0, block.steps // 2 :].mean(axis=(0, 1)))
+    block = _pilot(density, moves, start, _STEPS_OF_NORMAL, random, deadline)
+    late = block.samples[:, block.steps // 2 :, :, columns]
+    draws = late.reshape(-1, late.shape[-1])
+    variances, axes = np.linalg.eigh(np.cov(draws.T))
+    moves_of_walker = np.mean(np.any(np.diff(late[0], axis=0) != 0.0, axis=-1)) * late.shape[1]
+    independent = late.shape[2] * max(1.0, moves_of_walker / _MOVES_PER_DRAW)
+    ratio = variances.size / independent
+    unlike = np.abs(np.sqrt(variances) - 1.0) > np.sqrt(ratio)
+    variances, axes = variances[unlike], axes[:, unlike]
+    twice = variances + 1.0 - ratio
+    true = 0.5 * (twice + np.sign(variances - 1.0) * np.sqrt(np.maximum(twice**2 - 4.0 * variances, 0.0)))
+    root = np.eye(draws.shape[1]) + axes * (np.sqrt(true) - 1.0) @ axes.T
+    return draws.mean(axis=0), root, block.samples[0, -1]
 
 
 def _pilot(

@@ -66,7 +66,8 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
             if deadline.has_passed or not observer.narrow_snap_offs(here):
                 break
     _, scales, linear = found
-    return Whitening(NormalApproximation(observer, prior, scales, linear), scales, np.zeros(prior.mean.size))
+    size = prior.mean.size
+    return Whitening(NormalApproximation(observer, prior, scales, linear), scales, np.zeros(size), np.eye(size))
 
 
 def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: Floats) -> Floats:

@@ -28,15 +28,17 @@ class Whitening:
     Given the scales (amplitude and length scale of the random radius, and the noise), the approximation gives mean and
     covariance of all other parameters. The coordinates are the logarithms of the scales, and the other parameters
     standardised by that mean and covariance, which makes them nearly independent and standard normal; of those that may
-    vanish by the positive part of that distribution, so that no coordinate ends at a wall. They are counted from the
-    mean of the posterior, as far as it is known.
+    vanish by the positive part of that distribution, so that no coordinate ends at a wall. Where mean and covariance of
+    the posterior are known to differ from those of the approximation, they are standardised by these.
     """
 
     approximation: NormalApproximation
     scales: Floats
     """Amplitude, length scale and noise at the centre of the walkers' starting points, shape (bent,)."""
     mean: Floats
-    """Posterior mean of the standardised parameters, shape (d,), which is zero if the approximation is exact."""
+    """Posterior mean of the parameters as the approximation standardises them, shape (d,): zero if it is exact."""
+    root: Floats
+    """Root of their posterior covariance, shape (d, d): one if the approximation is exact."""
 
     @property
     def bent(self) -> int:
@@ -46,7 +48,8 @@ class Whitening:
     @property
     def digest(self) -> str:
         """Hash of all that determines the change of variables."""
-        arrays = (*self.approximation.arrays, self.scales, np.ones(self.approximation.vanishing), self.mean)
+        vanishing = np.ones(self.approximation.vanishing)
+        arrays = (*self.approximation.arrays, self.scales, vanishing, self.mean, self.root)
         return hashlib.sha256(b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in arrays)).hexdigest()
 
     @property
@@ -71,11 +74,12 @@ class Whitening:
         scales, linear = split(self.approximation.model, points)
         pulled, root = self.approximation.conditional(scales)
         normal = (np.swapaxes(root, 1, 2) @ linear[..., None])[..., 0] - pulled
-        return np.hstack([np.log(scales), self.approximation.untruncated(pulled, root, normal) - self.mean])
+        numbers = self.approximation.untruncated(pulled, root, normal)
+        return np.hstack([np.log(scales), np.linalg.solve(self.root, (numbers - self.mean).T).T])
 
-    def recentred(self, mean: Floats) -> Whitening:
-        """Return the coordinates that are counted from a point, shape (coordinates,), except the first `bent`."""
-        return replace(self, mean=self.mean + mean[self.bent :])
+    def standardised(self, mean: Floats, root: Floats) -> Whitening:
+        """Return the coordinates in which those after the first `bent` have been standardised by mean and root."""
+        return replace(self, mean=self.mean + self.root @ mean, root=self.root @ root)
 
     def moves(self) -> Moves:
         """Return the moves of an ensemble, with their shares."""
@@ -88,9 +92,11 @@ class Whitening:
         away = coordinates[:, :bent] - middle
         scales: Floats = np.exp(middle + np.clip(away, -_FAR, _FAR))
         pulled, root = self.approximation.conditional(scales)
-        normal, growth = self.approximation.truncated(pulled, root, coordinates[:, bent:] + self.mean)
+        numbers = self.mean + coordinates[:, bent:] @ self.root.T
+        normal, growth = self.approximation.truncated(pulled, root, numbers)
         linear = np.linalg.solve(np.swapaxes(root, 1, 2), (pulled + normal)[..., None])[..., 0]
         linear[:, 0] = np.clip(linear[:, 0], -_LARGEST, _LARGEST)
         volume = np.log(scales).sum(axis=1) - np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1) + growth
+        volume += np.linalg.slogdet(self.root).logabsdet
         volume[(np.abs(away) > _FAR).any(axis=1)] = -np.inf
         return joined(self.approximation.model, scales, np.asarray(linear)), linear[:, 0] + volume
