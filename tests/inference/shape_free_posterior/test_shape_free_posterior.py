@@ -139,10 +139,10 @@ def test_in_its_coordinates_the_posterior_is_nearly_standard_normal():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("profile", "nuisances", "evaluations"),
-    [("I", STANDARD, 100_000), ("II", STANDARD, 100_000), ("II", [], 60_000), ("III", STANDARD, 100_000)],
+    [("I", STANDARD, 50_000), ("II", STANDARD, 50_000), ("II", [], 40_000), ("III", STANDARD, 50_000)],
 )
 def test_a_smooth_contour_is_within_its_band(profile, nuisances, evaluations):
-    """Converged in some 250 steps; 95 % band, of nine places at most one is outside.
+    """Converged in some 100 steps; 95 % band, of nine places at most one is outside.
 
     With the nuisances there are 43 parameters in place of 34, and as a step moves two walkers for each parameter in
     each of four ensembles, it makes 344 evaluations in place of 272.
