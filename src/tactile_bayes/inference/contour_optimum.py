@@ -11,6 +11,7 @@ from scipy.special import chdtri
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.axial_rig import axial_rig
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.discrepancy import load_in_contact
@@ -60,6 +61,9 @@ _DISCREPANCY_SPREAD = 0.4
 
 _MAX_RESIDUAL = 100.0
 """Largest residual in standard deviations from which a discrepancy is estimated."""
+
+_MAX_TRIED = 9
+"""Number of searches after which the best optimum is taken though it does not explain the record."""
 
 _MAX_COST_RATIO = 0.9
 """Largest share of the cost that a search from Step 2's contacts may leave for its result to be taken."""
@@ -135,7 +139,7 @@ def certainly_loaded(model: ContourModel) -> Flags:
 
 
 def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
-    """Return the first optimum of `optima_of` that explains the record, or else the best one.
+    """Return the first optimum of `optima_of` that explains the record, or else the best of the first ones.
 
     Raises
     ------
@@ -143,10 +147,10 @@ def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline
         If there is no optimum.
     """
     best: ContourOptimum | None = None
-    for found in optima_of(model, rng, deadline):
+    for tried, found in enumerate(optima_of(model, rng, deadline), start=1):
         if best is None or found.cost < best.cost:
             best = found
-        if best.fits:
+        if best.fits or tried == _MAX_TRIED:
             break
     if best is None:
         raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
@@ -174,6 +178,7 @@ class _Search:
         self.deviation = model.deviation[model.present]
         self.measured = model.likelihood.measured[:, model.present] / self.deviation
         self.brackets = event_brackets(model)
+        self.axial_rig_is_due = True
         self.candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
         for name, zero in _zeros(model).items():
             self.candidates[:, model.names.index(name)] = zero
@@ -233,8 +238,14 @@ class _Search:
     def refine(self, found: Optimum) -> Optimum:
         """Return an optimum, refined by searches from Step 2's contacts while it does not explain the record.
 
-        The rig often converges long before a distant contour; with that rig, Step 2 locates the contour.
+        The rig often converges long before a distant contour; with that rig, Step 2 locates the contour. Where loads
+        are large, the record shows the rig without a contour.
         """
+        if self.axial_rig_is_due and not found.fits and not self.deadline.has_passed:
+            self.axial_rig_is_due = False
+            again = self.by_axial_rig()
+            if again is not None and again.cost < _MAX_COST_RATIO * found.cost:
+                found = again
         while not found.fits and not self.deadline.has_passed:
             point = self.points(found.point[None])[0]
             point = np.where(self.model.may_vanish[: point.size], np.maximum(point, 0.0), point)
@@ -247,6 +258,15 @@ class _Search:
                 break
             found = again
         return found
+
+    def by_axial_rig(self) -> Optimum | None:
+        """Optimum of the search from Step 2's contacts with the rig that axial forces show; None without."""
+        rig = axial_rig(self.model, certainly_loaded(self.model))
+        fitted = None if rig is None else contact_fit(self.model, rig)
+        if rig is None or fitted is None:
+            return None
+        place = self.coordinates.of(np.append(fitted, list(rig.values())))
+        return next(optima(self.residuals, [place], *self.limits))
 
     def complete(self, found: Optimum) -> ContourOptimum:
         """Return the optimum with the noise parameters and the covariance of all parameters."""

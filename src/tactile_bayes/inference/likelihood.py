@@ -390,6 +390,11 @@ class RecordLikelihood:
             which[segment.samples] = k
         return which
 
+    @property
+    def signs_of_samples(self) -> Floats:
+        """−1 for the samples of segments with contact as in a backward sweep, else 1, shape (samples,)."""
+        return np.asarray(self._signs[self.segment_of_sample])
+
     @cached_property
     def course(self) -> Course:
         """Order in which a discrepancy passes through the samples: by drive angle, in the direction of the drive, or by

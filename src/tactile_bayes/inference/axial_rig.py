@@ -1,0 +1,99 @@
+"""The rig that the readings show without a contour, by the axial force."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.record import CHANNELS, carried_sweeps, frame_of, present_channels
+
+__all__ = ["axial_rig"]
+
+_THRESHOLDS = (1e4, 1e3, 1e2, 1e1, 1.0)
+"""Residuals, in standard deviations, beyond which the loss is linear, of successive searches."""
+
+_ROUNDING = 1e-6
+"""Share of the force to which the axial force of a sample is believed."""
+
+_SAMPLES_PER_PARAMETER = 2
+"""Least number of loaded samples for each parameter."""
+
+_NOT_LINEAR = ("rest_curvature", "taper", "drift", "moment_curve")
+"""Parts of the names of parameters by which the axial force does not follow from a sample's moment in this form."""
+
+
+def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
+    """Return the rig for which the axial forces of tangential contacts agree with their moments.
+
+    In tangential contact the axial component of the reaction follows from the moment, whatever the contour is:
+    fAx cos φ0 + fAy sin φ0 = m0²/(2 EI) − f sin δ, with the contact force f and the angle of friction δ; it is the first
+    integral of the elastica at the pivot and at the contact (Love 1927, A Treatise on the Mathematical Theory of
+    Elasticity, § 262). Of a sample's four numbers one is thus redundant, which determines stiffness, encoder, lever,
+    zeros and friction where loads are large. Tip contacts deviate, and have little weight.
+
+    Parameters
+    ----------
+    model : ContourModel
+    loaded : ndarray of bool, shape (samples,)
+        Samples in contact.
+
+    Returns
+    -------
+    dict of str to float, or None
+        Nuisance parameters by name, in the record's units. None if the rod is curved, tapered or carried, if a channel
+        is missing, or if few samples are loaded.
+    """
+    names, likelihood = model.nuisances.names, model.likelihood
+    rod = likelihood.rod
+    if (
+        not names
+        or np.count_nonzero(loaded) < _SAMPLES_PER_PARAMETER * len(names)
+        or len(present_channels(model.measured)) < len(CHANNELS)
+        or carried_sweeps(model.measured)
+        or not rod.is_uniform
+        or rod.mean_rest_curvature != 0.0
+        or any(part in name for name in names for part in _NOT_LINEAR)
+    ):
+        return None
+    middle = np.array([float(model.priors[name].median()) for name in names])  # type: ignore[attr-defined]
+    spread = np.array([float(model.priors[name].std()) for name in names])
+    readings, deviation = likelihood.measured[loaded], model.deviation
+    sign = likelihood.signs_of_samples[loaded]
+    angle = likelihood.angles_in_sweep_frame[loaded]
+    turning = frame_of(model.measured) == "turning"
+
+    def residuals(steps: Floats) -> Floats:
+        """Return axial forces less those that follow from the moments, in standard deviations, and the steps."""
+        values = {name: np.array([value]) for name, value in zip(names, middle + spread * steps, strict=True)}
+        rig = model.nuisances.rig(values)
+        # Readings are affine functions of loads, known by their values at no load and at unit loads.
+        none_and_units = np.vstack([np.zeros(3), np.eye(3)])[None]
+        read = likelihood.load_cell.expected(model.nuisances.sensed(none_and_units, values, likelihood.load_cell))[0]
+        loads = np.linalg.solve((read[1:] - read[0]).T, (readings - read[0]).T)
+        moment, force_x, force_y = loads
+        if turning:
+            axial = force_x
+        else:
+            there = angle - sign * (likelihood.misread(rig)[0, loaded] + rig.suspension_compliance * moment)
+            axial = sign * force_x * np.cos(there) + force_y * np.sin(there)
+        force = np.hypot(force_x, force_y)
+        slope = np.sin(np.arctan(rig.friction))
+        surplus = axial + force * slope - moment**2 / (2.0 * rig.rigidity_scale)
+        noise = np.sqrt(deviation[1] ** 2 + np.square(deviation[0] * moment) + np.square(_ROUNDING * force))
+        return np.append(surplus / noise, steps)
+
+    def bent(steps: Floats, threshold: float) -> Floats:
+        """Return residuals whose squares are the pseudo-Huber loss for the record, and quadratic for the priors."""
+        found = residuals(steps)
+        scaled = found[: -steps.size] / threshold
+        found[: -steps.size] = np.sign(scaled) * np.sqrt(2.0 * (np.sqrt(1.0 + scaled**2) - 1.0))
+        return found
+
+    steps = np.zeros(len(names))
+    for threshold in _THRESHOLDS:
+        steps = least_squares(bent, steps, args=(threshold,)).x
+    which = [model.names.index(name) for name in names]
+    found = np.clip(middle + spread * steps, model.ends.low[which], model.ends.high[which])
+    return dict(zip(names, found.tolist(), strict=True))
