@@ -103,6 +103,8 @@ class Rig(NamedTuple):
     """Rest curvature of the rod in addition to the stated one [1/L]."""
     taper: Any = 0.0
     """Taper of the rod in addition to the stated one."""
+    stem: Any = 0.0
+    """Rigid piece between pivot and rod in addition to the stated one [L]."""
     base_shifts: Any = None
     """Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
     after the last given one are not shifted."""
@@ -259,7 +261,7 @@ class RecordLikelihood:
         base_x, base_y = self._bases(rig).reshape(-1, 2).T
         backward = np.repeat(self._signs < 0.0, count)
         every = contours.take(np.tile(np.arange(count), segments))
-        of_rod = (np.tile(values, segments) for values in self._shape_of_rod(rig))
+        of_rod = (np.tile(values, segments) for values in (*self._shape_of_rod(rig), self._stem(rig)))
         return SweepFrame(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward, *of_rod)
 
     def _profile(self, rig: Rig) -> Profile | None:
@@ -274,6 +276,10 @@ class RecordLikelihood:
         """Return rest curvature and taper of each contour, as in `Sweeps`."""
         known = self.rod.rest_curvature / self.rod.curvature_unit if self._profile(rig) is None else 0.0
         return known + rig.rest_curvature, self.rod.taper + rig.taper
+
+    def _stem(self, rig: Rig) -> Floats:
+        """Return the stem of each contour [L]."""
+        return np.asarray(self.rod.stem / self.rod.length + rig.stem)
 
     def _table(self, rig: Rig) -> ForwardTable:
         """Return a table for the rod, made at the first rig in which the same differs from what is stated."""
@@ -485,6 +491,7 @@ class RecordLikelihood:
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, segments),
             rest_curvature=np.tile(curvature, segments),
             taper=np.tile(taper, segments),
+            stem=np.tile(self._stem(rig), segments),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
             rigidity=np.tile(rig.rigidity_scale, segments),
         )

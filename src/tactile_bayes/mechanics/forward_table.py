@@ -1,6 +1,6 @@
 """The pose of rods whose properties vary along them, as polynomials, for likelihoods.
 
-All rods of a likelihood have one profile. Its table holds their pose as polynomials in
+All rods of a likelihood have one profile. Its table holds their pose, as seen from where they begin, as polynomials in
 
     tip contact:         ψ1 and f Λ(1)²,
     tangential contact:  s1 and f Λ(s1)², up to the tip, and beyond it: the last series of a phase may go on there,
@@ -233,9 +233,9 @@ def _write_poses(
 
 @cached
 def _write_chords(profile: Profile, distances: Floats, work: Floats, out: Floats) -> None:
-    reach = rest_along(profile, 1.0, work).distance
+    reach = rest_along(profile, 0.0, 1.0, work).distance
     for k in range(distances.size):
-        found = chord_along(profile, distances[k] * reach, work)
+        found = chord_along(profile, 0.0, distances[k] * reach, work)
         out[0, k], out[1, k], out[2, k] = found.arclength, found.bearing, found.slope
 
 

@@ -81,6 +81,8 @@ class Sweeps(NamedTuple):
     """Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]; with a profile, what is added to its own."""
     taper: Floats
     """Taper, for rods with a profile."""
+    stem: Floats
+    """Rigid piece between pivot and rod [L]."""
     offset: Floats
     """Encoder offset in the laboratory frame [rad]."""
     rigidity: Floats
@@ -175,7 +177,8 @@ def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
     standoff = sweep.standoff / length
     half_angle = math.atan(standoff * sweep.taper)
     sin, cos = math.sin(half_angle), math.cos(half_angle)
-    outline = Outline(left, right, low, right.size, 1.0, x, y, standoff * cos, half_angle, sin, table)
+    reach = 1.0 + sweep.stem
+    outline = Outline(left, right, low, right.size, 1.0, x, y, standoff * cos, half_angle, sin, reach, table)
     return mirrored(outline) if sweep.backward else outline
 
 
@@ -213,11 +216,11 @@ def _place_lines(lines: Floats | None, sweep: Any, room: Floats | None) -> None:
 def _beam(varied: Varied | None, table: ForwardTable, sweep: Any, sign: float, lean: float) -> Beam:
     """Rod of a sweep; −ψ1 in tangential contact is wanted from its table."""
     if varied is None:
-        return beam_of(sign * sweep.rest_curvature, varied)
+        return beam_of(sign * sweep.rest_curvature, varied, sweep.stem)
     edges, curvature, rigidity, _, bend, _ = varied.profile
     room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
     slenderness = table.slenderness if prepare(table, room, lean, varied.sheet) else 0.0
-    return beam_of(0.0, Varied(room, varied.work, varied.sheet, slenderness, sign))
+    return beam_of(0.0, Varied(room, varied.work, varied.sheet, slenderness, sign), sweep.stem)
 
 
 @cached
