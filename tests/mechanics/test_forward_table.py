@@ -25,7 +25,9 @@ ERROR, ERROR_OF_SLOPES = 1e-5, 1e-3
 def _poses(varied, table, delta, psi1, arclength, force, tip, out):
     profile = varied.profile
     slenderness = table.slenderness if _prepare(table, profile, delta, varied.sheet) else 0.0
-    rod = _beam_of(0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign), 0.0)
+    rod = _beam_of(
+        0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0), 0.0
+    )
     for i in range(psi1.size):
         for k, pose in enumerate(_beam_pose(rod, psi1[i], arclength[i], force[i], tip)):
             out[i, k, 0], out[i, k, 1], out[i, k, 2] = pose
@@ -36,7 +38,9 @@ def _poses(varied, table, delta, psi1, arclength, force, tip, out):
 def _chords(varied, table, stem, mirrored, distances, out):
     profile = varied.profile
     slenderness = table.slenderness if _prepare(table, profile, 0.0, varied.sheet) else 0.0
-    rod = _beam_of(0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign), stem)
+    rod = _beam_of(
+        0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0), stem
+    )
     if mirrored:
         rod = _mirrored_beam(rod)
     for i in range(distances.size):

@@ -43,16 +43,17 @@ __all__ = [
     "chord_to",
     "free_end",
     "from_tip",
-    "integrated",
     "lever_of_stem",
     "loaded_part",
     "mirrored_beam",
     "mirrored_by",
     "moved_by_stem",
     "rest_curvature",
+    "rubbed_otherwise",
     "varied",
     "varied_of",
     "whole_pose",
+    "with_profile",
     "with_sign",
     "with_stem",
 ]
@@ -76,6 +77,9 @@ class Varied(NamedTuple):
     """That of the table; 0 if there are no coefficients."""
     sign: float
     """Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose."""
+    other_sheet: Floats
+    other_slenderness: float
+    """Coefficients and slenderness for friction that acts in the other sense."""
 
 
 class Beam(NamedTuple):
@@ -115,7 +119,7 @@ def varied_of(profile: Profile | None) -> Varied | None:
 
 def varied(profile: Profile) -> Varied:
     """Profile with a workspace, and without coefficients of a table."""
-    return Varied(profile, workspace(), sheet(), 0.0, 1.0)
+    return Varied(profile, workspace(), sheet(), 0.0, 1.0, sheet(), 0.0)
 
 
 @compiled
@@ -156,22 +160,29 @@ def _mirrored(varied: Varied | None) -> Varied | None:
 def with_sign(varied: Varied, sign: float) -> Varied:
     """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
     edges, curvature, rigidity, taper, bend, _ = varied.profile
-    profile = Profile(edges, curvature, rigidity, taper, bend, sign)
-    return Varied(profile, varied.work, varied.sheet, varied.slenderness, varied.sign)
+    return with_profile(varied, Profile(edges, curvature, rigidity, taper, bend, sign))
 
 
 @compiled
-def integrated(beam: Beam) -> Beam:
-    """Rod without coefficients of a table, which hold for one angle of friction."""
-    varied = _integrated(beam.varied)
+def with_profile(varied: Varied, profile: Profile) -> Varied:
+    """Rod with another profile."""
+    _, work, own, slenderness, sign, other, other_slenderness = varied
+    return Varied(profile, work, own, slenderness, sign, other, other_slenderness)
+
+
+@compiled
+def rubbed_otherwise(beam: Beam) -> Beam:
+    """Rod with the coefficients for friction that acts in the other sense: they hold for one angle of friction."""
+    varied = _rubbed_otherwise(beam.varied)
     return Beam(beam.curvature, beam.reach, beam.most_curvature, varied, beam.stem, beam.own_reach)
 
 
 @compiled
-def _integrated(varied: Varied | None) -> Varied | None:
+def _rubbed_otherwise(varied: Varied | None) -> Varied | None:
     if varied is None:
         return varied
-    return Varied(varied.profile, varied.work, varied.sheet, 0.0, varied.sign)
+    profile, work, own, slenderness, sign, other, other_slenderness = varied
+    return Varied(profile, work, other, other_slenderness, sign, own, slenderness)
 
 
 @compiled

@@ -94,7 +94,8 @@ def _mixed(varied: Varied | None, curvature: float, begin: float, way: float, ro
         room.rigidity[i, 0] += 1.0 - rigid_share
     bend = bent_share * bend + left * sign * begin
     profile = Profile(edges, room.curvature, room.rigidity, rigid_share * taper, bend, sign)
-    return Beam(0.0, 1.0, math.inf, Varied(profile, varied.work, varied.sheet, 0.0, 1.0), 0.0, 1.0)
+    varied = Varied(profile, varied.work, varied.sheet, 0.0, 1.0, varied.other_sheet, 0.0)
+    return Beam(0.0, 1.0, math.inf, varied, 0.0, 1.0)
 
 
 @compiled

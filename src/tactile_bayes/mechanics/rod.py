@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number, check_positive
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.along import Along, along
+from tactile_bayes.mechanics.along import MISS, Along, along
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile, Rods, profile_of
 from tactile_bayes.mechanics.surface import Surface
 
@@ -27,6 +27,9 @@ _MOST_TURN = math.pi
 
 _POINTS = 2001
 """Points of a rod at rest."""
+
+_NEGLIGIBLE = 1e-4
+"""Error of a traced rest curvature over its standard deviation that is negligible."""
 
 LARGEST_STRAIN = 0.1
 """Bending strain up to which a rod is slender and its bending moment is proportional to its curvature."""
@@ -220,7 +223,8 @@ class Rod:
         """Rod whose rest curvature follows from points traced along it while nothing touches it.
 
         The rest curvature is the posterior mean for a smooth random function of the arc length, an integrated Wiener
-        process; how smooth it is follows from the points (`mechanics.traced`).
+        process; how smooth it is follows from the points (`mechanics.traced`). It is interpolated with an error of a
+        ten-thousandth of its standard deviation.
 
         Parameters
         ----------
@@ -262,11 +266,19 @@ class Rod:
 
         traced = traced_rod(x, y, scatter=scatter, length=length)
         whole, rigidity = (1.0, 1.0) if flexural_rigidity is None else (traced.length, flexural_rigidity)
+        s = np.linspace(0.0, 1.0, _POINTS)
+        negligible = _NEGLIGIBLE * traced.deviation(s).min() / max(float(np.abs(traced.rest_curvature(s)).max()), 1.0)
+        curvature = along(
+            "rest_curvature",
+            lambda s: traced.rest_curvature(s / whole) / whole,
+            whole,
+            miss=max(float(negligible), MISS),
+        )
         return cls(
             whole,
             rigidity,
             diameter * whole / traced.length,
-            rest_curvature=lambda s: traced.rest_curvature(s / whole) / whole,
+            rest_curvature=curvature,
             taper=taper,
             rigidity_profile=rigidity_profile,
             rest_curvature_deviation=traced.deviation_of_mean / whole,

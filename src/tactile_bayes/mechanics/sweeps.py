@@ -197,7 +197,7 @@ def _scene(
     offset = sign * sweep.offset if line is None else 0.0  # it is in the lines
     rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, sweep.rigidity)
     outline = _outline(shapes, sweep, table)
-    beam = _beam(varied, known, sweep, sign, sweep.friction_angle - outline.half_angle)
+    beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
     return Scene(outline, beam, rig, exact, line)
 
 
@@ -213,14 +213,20 @@ def _place_lines(lines: Floats | None, sweep: Any, room: Floats | None) -> None:
 
 
 @compiled
-def _beam(varied: Varied | None, table: ForwardTable, sweep: Any, sign: float, lean: float) -> Beam:
-    """Rod of a sweep; −ψ1 in tangential contact is wanted from its table."""
+def _beam(
+    varied: Varied | None, table: ForwardTable, sweep: Any, sign: float, half_angle: float, may_slip_back: bool
+) -> Beam:
+    """Rod of a sweep, with coefficients for its friction, and for friction of the other sense if that may act."""
     if varied is None:
         return beam_of(sign * sweep.rest_curvature, varied, sweep.stem)
     edges, curvature, rigidity, _, bend, _ = varied.profile
     room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
-    slenderness = table.slenderness if prepare(table, room, lean, varied.sheet) else 0.0
-    return beam_of(0.0, Varied(room, varied.work, varied.sheet, slenderness, sign), sweep.stem)
+    angle, own, other = sweep.friction_angle, varied.sheet, varied.other_sheet
+    slenderness = table.slenderness if prepare(table, room, angle - half_angle, own) else 0.0
+    otherwise = 0.0
+    if may_slip_back and angle > 0.0 and slenderness > 0.0 and prepare(table, room, -angle - half_angle, other):
+        otherwise = table.slenderness
+    return beam_of(0.0, Varied(room, varied.work, own, slenderness, sign, other, otherwise), sweep.stem)
 
 
 @cached
