@@ -133,6 +133,7 @@ def calibrated(folder: Path, rod: tb.Rod, cell: tb.LoadCell) -> xr.DataTree:
         known: dict[str, Any] = {"nuisances": ("drive_angle_offset", "friction", "rest_curvature"), "seed": 1}
         if rod.stem:
             priors |= dict.fromkeys(("gauge_x", "gauge_y"), stats.norm(0.0, 5e-3)) | hysteresis(AT_POINTS, rod)
+            priors["noise_scale"] = stats.lognorm(s=0.2)  # beside a discrepancy 30 readings do not tell it
             priors["stem"] = stats.truncnorm(-STEM[0] / STEM[1], np.inf, *STEM)
             known |= {"nuisances": (*known["nuisances"], "discrepancy"), "checkpoint": folder / "rig", "settings": LONG}
         probe = tb.contours.Circle(r=1e-5, q=-1e-5)
