@@ -23,6 +23,20 @@ RIG = {
 }
 """The posterior mean of `python -m benchmarks.whisker_sweeps`."""
 
+ON_STEM = {
+    "moment_gain": 0.8916,
+    "moment_curve_quadratic": 403.4,
+    "moment_curve_cubic": 1.945e6,
+    "suspension_compliance": 1578.0,
+    "drive_angle_offset": -0.02553,
+    "friction": 0.3927,
+    "rest_curvature": -32.77,
+    "stem": 4.598e-3,
+    "gauge_x": 0.284e-3,
+    "gauge_y": 2.957e-3,
+}
+"""The likeliest rig with a stem before the whisker, with the benchmark's priors and white noise of 7 counts."""
+
 COUNTS = ((whisker_sweeps.COUNTS, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -51,6 +65,9 @@ def test_readings_at_known_points_are_explained(whisker):
     gauge = Gauge(Circle(r=1e-5, q=-1e-5))
     left = residuals(model_of(whisker_sweeps.points(whisker), RIG, gauge=gauge), RIG)
     assert np.sqrt(np.mean(left**2)) < 7.5
+    on_stem = whisker_sweeps.points(whisker_sweeps.whisker(on_stem=True))
+    left = residuals(model_of(on_stem, ON_STEM, gauge=gauge), ON_STEM)
+    assert np.sqrt(np.mean(left**2)) < 5.0
 
 
 @pytest.mark.parametrize("trial", [0, 3])

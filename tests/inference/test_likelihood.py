@@ -17,11 +17,12 @@ from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.forward_table import NO_TABLE
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
 from tactile_bayes.record.units import with_rod
-from tactile_bayes.sweep import scan
+from tactile_bayes.sweep import Translation, scan
 
 SHARE = {False: 3e-4, True: 1e-6}
 """Error of the interpolated loads over their largest value, at worst, in 150 contours."""
@@ -178,6 +179,26 @@ def test_rods_that_vary_cost_no_accuracy_where_all_of_the_rig_is_inferred():
     error = SHARE[False] * np.abs(exact).max(axis=(0, 1))
     close = np.all(np.abs(loads - exact) <= error, axis=-1)
     assert np.count_nonzero(~close) <= 4  # samples so near snap-off that they are on the other side of it
+
+
+def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
+    """First contact decides in which sense friction acts: here both occur, on a bent rod with a stem."""
+    rod = Rod(rest_curvature=lambda s: -3.4 / (1.0 + np.exp(-(s - 0.55) / 0.08)), stem=0.03)
+    rng, count, senses = np.random.default_rng(5), 40, []
+    bend, friction = rng.uniform(-0.1, 0.1, count), np.abs(rng.normal(0.2, 0.1, count))
+    rig = Rig(rest_curvature=bend, friction=friction, stem=rng.uniform(-0.02, 0.02, count))
+    for drive in (Translation((0.11, 0.0), np.pi, 1.13, 1.1), Translation((0.3, -1.2), 2.05, 1.13, 1.1)):
+        measured = CELL.measure(scan(Circle(0.29, 0.21), rod=rod, drive=drive, friction=0.2).record, seed=1)
+        places = 0.003 * rng.normal(size=(3, count)) + np.array([[0.29], [0.21], [0.0]])
+        likelihood, exactly = (RecordLikelihood(measured, CELL, exact=exact) for exact in (False, True))
+        loads, usable = likelihood.predict(Circle(*places), rig)
+        assert likelihood._tables[False, True, True] is not NO_TABLE
+        exact, usable_exactly = exactly.predict(Circle(*places), rig)
+        np.testing.assert_array_equal(usable, usable_exactly)
+        assert np.count_nonzero(usable) > 20
+        np.testing.assert_allclose(loads[usable], exact[usable], atol=2e-4 * np.abs(exact).max())
+        senses += np.sign(likelihood.paths(Circle(*places), rig).changes[usable, 0, 5]).tolist()
+    assert set(senses) == {-1.0, 1.0}
 
 
 def test_rods_curved_toward_a_flat_object_touch_it_twice_with_a_table_too():

@@ -8,7 +8,7 @@ from helpers.comparisons import made_up
 from tactile_bayes.comparison.verdict import NONE_FITS, verdict_on
 from tactile_bayes.inference.misfit import what_to_try
 
-EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance", "rest_curvature", "taper"]
+EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance", "rest_curvature", "taper", "stem"]
 
 
 def suggested(nuisances, **stated):
@@ -26,6 +26,7 @@ def suggested(nuisances, **stated):
         (["backlash"], "backlash"),
         (["suspension_compliance"], "suspension_compliance"),
         (["taper"], "taper"),
+        (["stem"], "stem"),
     ],
 )
 def test_what_was_inferred_is_not_suggested(inferred, name):
@@ -38,7 +39,7 @@ def test_what_would_be_refused_is_not_suggested():
 
 
 def test_where_everything_was_inferred_only_the_family_is_left():
-    words = what_to_try(["circle"], ["friction", "moment_gain", "force_y_drift", "lever_y", "backlash", *EVERY[-3:]])
+    words = what_to_try(["circle"], ["friction", "moment_gain", "force_y_drift", "lever_y", "backlash", *EVERY[-4:]])
     assert words == "It may be the family or the rig. Try another family (--family shape-free, or compare)."
 
 

@@ -10,7 +10,7 @@ from scipy import stats
 
 from helpers.contour_posteriors import TRUTH, assert_near
 from helpers.refusals import refused
-from tactile_bayes.contours import Parabola, paper_profile
+from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import ParameterError
@@ -24,7 +24,7 @@ from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record
-from tactile_bayes.sweep import scan
+from tactile_bayes.sweep import Translation, scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 STATED = {
@@ -310,6 +310,37 @@ def test_the_taper_is_inferred_about_the_stated_one():
             expected = scan(truth, rod=rod, drive_angles=angles).record
             loads = np.stack([expected[name].values for name in CHANNELS], axis=-1)
             np.testing.assert_allclose(model.loads(point)[0], loads, atol=1e-6 * np.abs(loads).max())
+
+
+@pytest.mark.parametrize("bent", [0.0, lambda s: 30.0 * s], ids=["straight", "traced"])
+def test_the_stem_is_inferred_about_the_stated_one(bent):
+    """In the loads of scans, in SI, and with a prior that ends at none."""
+    angles = np.linspace(0.3, 2.8, 59)
+    for stem in (0.0, 0.005):
+        stated = Rod(0.1, 1e-5, rest_curvature=bent, stem=stem)
+        record = scan(Parabola(5.0, 0.06), rod=stated, drive_angles=angles).record
+        record = LoadCell(force_noise=5e-5, moment_noise=2e-6).measure(record, seed=1)
+        model = model_of(record, ["stem", "friction"], LoadCell(force_noise=5e-5, moment_noise=2e-6))
+        assert model.may_vanish[model.names.index("stem")]
+        prior = model.priors["stem"]
+        assert prior.support() == (pytest.approx(0.0, abs=1e-12), np.inf)
+        assert prior.logpdf(stem) - prior.logpdf(stem + 0.002) == pytest.approx(0.5)
+        assert model.nuisances.unit("stem") == "m"
+        for true in (stem, stem + 0.003):
+            expected = scan(Parabola(5.0, 0.06), rod=replace(stated, stem=true), drive_angles=angles, friction=0.1)
+            loads = np.stack([expected.record[name].values for name in CHANNELS], axis=-1) / stated.load_units
+            found = model.loads(np.array([[5.0, 0.06, 0.0, true, 0.1]]))[0]
+            np.testing.assert_allclose(found, loads, atol=1e-6 * np.abs(loads).max())
+
+
+def test_a_stem_that_is_a_shift_and_a_lever_is_refused():
+    """The rod keeps its direction on a pivot that does not yield."""
+    record = scan(Circle(0.3, 0.7), drive=Translation((1.0, 0.0), np.pi, 1.3, 1.9)).record
+    with refused(ParameterError, "stem", "lever"):
+        model_of(record, ["stem", "lever"])
+    for others in (["lever", "suspension_compliance"], ["moment_bias"]):
+        assert "stem" in model_of(record, ["stem", *others]).names
+    assert "stem" in model_of(scanned(), ["stem", "lever"]).names
 
 
 @pytest.mark.parametrize("rod", [Rod(), SI], ids=["dimensionless", "SI"])

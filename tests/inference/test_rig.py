@@ -22,6 +22,8 @@ from tactile_bayes.inference.rig_prior import RigPrior, rig_prior
 from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.inference.stream import Stream
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import with_rod
 from tactile_bayes.uncertainty.band import contour_band
 
 PIN, OBJECT = Circle(r=0.2, q=0.5), Parabola(0.7, 0.45)
@@ -92,6 +94,20 @@ def test_the_rig_is_found_with_its_gauge():
     assert_near(rig(), TRUE)
     assert rig().attrs["gauge"] == repr(PIN)
     assert list(rig()["posterior"].data_vars) == [*NAMES, "noise_scale"]
+
+
+def test_a_stem_is_found_and_lasts():
+    """The rod is stated to begin at the pivot, and begins 4 % of its length from there."""
+    true = Rod(stem=0.04)
+    record = CELL.measure(swept(PIN, step=0.05, rod=true), seed=1)
+    record = with_rod(record, Rod())
+    found = infer_rig(record, contour=PIN, load_cell=CELL, nuisances=["stem", "rigidity_scale"], seed=1, settings=SOUND)
+    assert_near(found, {"stem": 0.04, "rigidity_scale": 1.0})
+    assert float(found["posterior"].stem.std()) < 0.01
+    prior = rig_prior(found)
+    assert set(prior.priors) == {"stem", "rigidity_scale"}
+    model = Experiment(record, load_cell=CELL, nuisances=(), joint=prior).model
+    assert model.may_vanish[model.names.index("stem")]
 
 
 def test_two_records_tell_as_much_as_one_of_both():

@@ -49,12 +49,12 @@ def bending(profile, wrench, end, work):
 
 @numba.njit(error_model="numpy")
 def rest(profile, arclength, work):
-    return _rest(profile, arclength, work)
+    return _rest(profile, 0.0, arclength, work)
 
 
 @numba.njit(error_model="numpy")
 def chord(profile, distance, work):
-    return _chord(profile, distance, work)
+    return _chord(profile, 0.0, distance, work)
 
 
 @functools.cache

@@ -157,5 +157,6 @@ class Misspecification:
             drive_angle_backlash=drawn.drive_angle_backlash,
             rest_curvature=drawn.rest_curvature + self.rest_curvature,
             taper=drawn.taper + self.taper,
+            stem=drawn.stem,
             base_shifts=shifts,
         )

@@ -68,6 +68,10 @@ class RodOptions:
     taper: Annotated[
         float, typer.Option(help="Part by which the diameter of a tapered rod has fallen at its tip, 0 to 0.95.")
     ] = 0.0
+    stem: Annotated[
+        float,
+        typer.Option(help="Rigid, straight piece between pivot and rod [m, or L], as of a clamp on a hinge.", min=0.0),
+    ] = 0.0
     rod_shape: Annotated[
         Path | None,
         typer.Option(
@@ -93,7 +97,13 @@ class RodOptions:
                 raise ParameterError("--rod-shape gives the rest curvature: leave out --rest-curvature")
             x, y = columns_in(self.rod_shape, ("x", "y"))
             return Rod.from_shape(
-                x, y, self.flexural_rigidity, length=self.length, diameter=self.diameter, taper=self.taper
+                x,
+                y,
+                self.flexural_rigidity,
+                length=self.length,
+                diameter=self.diameter,
+                taper=self.taper,
+                stem=self.stem,
             )
         if (self.length is None) != (self.flexural_rigidity is None):
             raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
@@ -106,7 +116,7 @@ class RodOptions:
     @property
     def shape(self) -> dict[str, Any]:
         """In what the options make the rod another than a straight, uniform one."""
-        given = {"rest_curvature": self.rest_curvature, "taper": self.taper}
+        given = {"rest_curvature": self.rest_curvature, "taper": self.taper, "stem": self.stem}
         return {name: value for name, value in given.items() if value}
 
 
@@ -159,8 +169,8 @@ class UnknownOptions:
         typer.Option(
             help="Unknown of the rig to be inferred, in place of rigidity_scale, drive_angle_offset, bias, lever, "
             "backlash and friction: one of these, standard (all of these), or drift, gain, moment_curve, "
-            "suspension_compliance, rest_curvature, taper, base (positions of further pivots), or gauge (place of the "
-            "gauge, for calibrate-rig); may be repeated."
+            "suspension_compliance, rest_curvature, taper, stem, base (positions of further pivots), or gauge (place "
+            "of the gauge, for calibrate-rig); may be repeated."
         ),
     ] = None
     as_stated: Annotated[

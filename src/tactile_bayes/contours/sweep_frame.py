@@ -39,6 +39,8 @@ class SweepFrame:
         curvature varies along it, what is added to it.
     taper : float or ndarray, shape (n,)
         Taper of the rod.
+    stem : float or ndarray, shape (n,)
+        Rigid piece between pivot and rod [rod length].
     """
 
     contour: Contour
@@ -49,6 +51,7 @@ class SweepFrame:
     mirrored: Flags
     rest_curvature: Parameter = 0.0
     taper: Parameter = 0.0
+    stem: Parameter = 0.0
 
     @property
     def size(self) -> int:
@@ -80,14 +83,14 @@ class SweepFrame:
         """
         lo, hi = (np.broadcast_to(end, (self.size,)).astype(float) for end in self.contour.domain)
         lo, hi = np.where(self.mirrored, -hi, lo), np.where(self.mirrored, -lo, hi)
-        size = np.arange(self.size)
+        size, ends = np.arange(self.size), np.broadcast_to(1.0 + np.asarray(self.stem), (self.size,))
         for end, outward in ((lo, -1.0), (hi, 1.0)):
             open_ended = ~np.isfinite(end)
             reach = np.full(self.size, self.length)
             while np.any(open_ended):
                 end[open_ended] = outward * reach[open_ended]
                 x = self.locate(size[open_ended], end[open_ended]).x
-                open_ended[open_ended] = outward * x <= 1.0
+                open_ended[open_ended] = outward * x <= ends[open_ended]
                 reach *= 2.0
             far = np.flatnonzero(~(outward * self.locate(size, end).x <= _FAR))
             if far.size:

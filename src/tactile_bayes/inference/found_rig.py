@@ -110,7 +110,7 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
             columns[name] = columns.get(name, measured[name]) + shift * at_pivot
     record = measured.assign({name: values.assign_attrs(measured[name].attrs) for name, values in columns.items()})
     rod = rod_of(measured)
-    shape = rig.get("rest_curvature", rod.mean_rest_curvature), rig.get("taper", rod.taper)
+    shape = rig.get("rest_curvature", rod.mean_rest_curvature), rig.get("taper", rod.taper), rig.get("stem", rod.stem)
     return FoundRig(
         with_rod(record, rod.reshaped(*shape)),
         cell,

@@ -52,10 +52,11 @@ _LEAST = 1e-10
 _TABULATED = 5e-6
 """Least tolerance of loads for which the pose of a rod with a profile comes from a table."""
 
-_TAPERS, _BEND, _FRICTION_ANGLE = (0.15, 0.1), 0.2, (0.0, 0.5)
+_TAPERS, _BENDS, _FRICTION_ANGLE = (0.15, 0.1), (0.2, 0.15), (0.0, 0.5)
 """Ranges of tables: distances from the stated taper and rest curvature [1/L], three and four standard deviations of the
-default priors, and angles up to that of a coefficient of 0.55. Few draws are beyond them, and integrated. For thin tips
-the second range of the taper is taken."""
+default priors, and angles up to that of a coefficient of 0.55, in either sense where the base is carried. Few draws are
+beyond them, and integrated. For thin tips the second range of the taper is taken, and for uneven curvature that of the
+curvature."""
 
 
 _OFF = 1e-6
@@ -103,6 +104,8 @@ class Rig(NamedTuple):
     """Rest curvature of the rod in addition to the stated one [1/L]."""
     taper: Any = 0.0
     """Taper of the rod in addition to the stated one."""
+    stem: Any = 0.0
+    """Rigid piece between pivot and rod in addition to the stated one [L]."""
     base_shifts: Any = None
     """Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
     after the last given one are not shifted."""
@@ -259,7 +262,7 @@ class RecordLikelihood:
         base_x, base_y = self._bases(rig).reshape(-1, 2).T
         backward = np.repeat(self._signs < 0.0, count)
         every = contours.take(np.tile(np.arange(count), segments))
-        of_rod = (np.tile(values, segments) for values in self._shape_of_rod(rig))
+        of_rod = (np.tile(values, segments) for values in (*self._shape_of_rod(rig), self._stem(rig)))
         return SweepFrame(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward, *of_rod)
 
     def _profile(self, rig: Rig) -> Profile | None:
@@ -275,6 +278,10 @@ class RecordLikelihood:
         known = self.rod.rest_curvature / self.rod.curvature_unit if self._profile(rig) is None else 0.0
         return known + rig.rest_curvature, self.rod.taper + rig.taper
 
+    def _stem(self, rig: Rig) -> Floats:
+        """Return the stem of each contour [L]."""
+        return np.asarray(self.rod.stem / self.rod.length + rig.stem)
+
     def _table(self, rig: Rig) -> ForwardTable:
         """Return a table for the rod, made at the first rig in which the same differs from what is stated."""
         from tactile_bayes.mechanics.forward_table import NO_TABLE, forward_table  # numba takes a second to load
@@ -284,21 +291,27 @@ class RecordLikelihood:
             return NO_TABLE
         varied = bool(np.any(rig.taper)), bool(np.any(rig.rest_curvature)), bool(np.any(rig.friction != self.friction))
         if varied not in self._tables:
-            for fine, width in product((False, True), _TAPERS if varied[0] else (0.0,)):
-                self._tables[varied] = forward_table(profile, self._box(width, *varied[1:]), fine)
+            widths = _TAPERS if varied[0] else (0.0,), _BENDS if varied[1] else (0.0,)
+            senses = (True, False) if self._lines is not None and (varied[2] or self.friction) else (False,)
+            for fine, both, bend, taper in product((False, True), senses, *widths[::-1]):
+                self._tables[varied] = forward_table(profile, self._box(taper, bend, varied[2], both), fine)
                 if self._tables[varied] is not NO_TABLE:
                     break
         return self._tables[varied]
 
-    def _box(self, width: float, bends: bool, slides: bool) -> Box:
-        """Return the ranges of a table, for tapers within a distance from the stated one."""
+    def _box(self, width: float, bend: float, slides: bool, both: bool) -> Box:
+        """Return the ranges of a table, for tapers and rest curvatures within distances from the stated ones.
+
+        Friction acts in one sense, or in both, as where first contact of a carried rod decides it.
+        """
         from tactile_bayes.mechanics.forward_table import Box
 
         surface, angle = self.rod.surface, float(np.arctan(self.friction))
         tapers = max(surface.taper - width, 0.0), min(surface.taper + width, STEEPEST_TAPER)
         least, most = (surface._replace(taper=end).half_angle for end in tapers)
         low, high = _FRICTION_ANGLE if slides else (angle, angle)
-        return Box(tapers, (-_BEND, _BEND) if bends else (0.0, 0.0), (low - most, high - least))
+        low = -high if both else low
+        return Box(tapers, (-bend, bend), (low - most, high - least))
 
     def _bases(self, rig: Rig) -> Floats:
         """Return the pivots, shape (segments, n, 2)."""
@@ -490,6 +503,7 @@ class RecordLikelihood:
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, segments),
             rest_curvature=np.tile(curvature, segments),
             taper=np.tile(taper, segments),
+            stem=np.tile(self._stem(rig), segments),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
             rigidity=np.tile(rig.rigidity_scale, segments),
         )

@@ -7,15 +7,16 @@ from collections.abc import Collection
 __all__ = ["CHECK_RIG", "GAUGE", "is_inferred", "what_to_try"]
 
 CHECK_RIG = (
-    "check the rod (length, flexural rigidity, rest curvature, taper), unit, sign and axes of each load, the zero of "
-    "the drive angle and its backlash, the point where the load cell takes its moment, and the friction"
+    "check the rod (length, flexural rigidity, rest curvature, taper, stem), unit, sign and axes of each load, the "
+    "zero of the drive angle and its backlash, the point where the load cell takes its moment, and the friction"
 )
 """Advice if loads contradict one another for any contour: the cause is the rig."""
 
 GAUGE = "gauge"
 """Name of the family of a gauge, whose contour is known."""
 
-_SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance", "rest_curvature", "taper")
+_OF_ROD = ("rest_curvature", "taper", "stem")
+_SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance", *_OF_ROD)
 """Nuisance parameters, or groups of them, that may cause a misfit."""
 
 _SMOOTH = "shape-free"
@@ -55,7 +56,7 @@ def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, f
     --------
     >>> print(what_to_try(["circle"], ["friction", "drift", "lever_x", "lever_y", "backlash"]))
     It may be the family or the rig. Try another family (--family shape-free, or compare), or infer more of the rig \
-(--nuisance gain, suspension_compliance, rest_curvature, taper).
+(--nuisance gain, suspension_compliance, rest_curvature, taper, stem).
     """
     suspects = (*_SUSPECTS, GAUGE) if GAUGE in families else _SUSPECTS
     left = [name for name in suspects if not is_inferred(name, nuisances)]

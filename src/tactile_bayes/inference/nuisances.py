@@ -35,7 +35,7 @@ STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash",
 _STANDARD = "standard"
 """Name that stands for the default nuisance parameters."""
 
-MAY_VANISH = ("friction", "suspension_compliance", "taper")
+MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem")
 """Parameters that are zero or positive, and may be zero."""
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
@@ -51,11 +51,14 @@ BIAS = 0.1
 """Standard deviation of the prior of a bias, in EI/L and EI/L²."""
 
 _RIGIDITY, _OFFSET, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.02, 0.3, 0.05, 0.01
-_LEVER, _BACKLASH, _CURVATURE, _TAPER = 0.005, np.radians(0.2), 0.05, 0.05
+_LEVER, _BACKLASH, _CURVATURE, _TAPER, _STEM = 0.005, np.radians(0.2), 0.05, 0.05, 0.02
 _BENT = {"moment_curve_quadratic": 0.05, "moment_curve_cubic": 0.02}
 """Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; L; 1/L; of the
-diameter at the base; and of the curve of the moment, in powers of L/EI."""
+diameter at the base; L; and of the curve of the moment, in powers of L/EI."""
 
+
+_SAME_DIRECTION = 1e-3
+"""Range of drive angles [rad] within which a rod keeps its direction."""
 
 _NO_GAUGE = "only the place of a gauge, whose contour is known, is one of the rig's parameters (infer_rig)"
 
@@ -82,6 +85,7 @@ _KINDS = {
     "friction": _Kind(0.0, float(np.tan(MAX_FRICTION_ANGLE))),
     "rest_curvature": _Kind(-np.inf, np.inf, power_of_length=-1),
     "taper": _Kind(0.0, STEEPEST_TAPER),
+    "stem": _Kind(0.0, np.inf, power_of_length=1),
     **{name: _Kind(-np.inf, np.inf, power_of_moment=1) for name in (*_GROUPS["bias"], *_GROUPS["drift"])},
     **{name: _Kind(0.0, np.inf) for name in _GROUPS["gain"]},
     **{name: _Kind(-np.inf, np.inf, power_of_length=1) for name in (*_GROUPS["lever"], *_GROUPS["gauge"])},
@@ -154,7 +158,7 @@ class Nuisances:
         """Return the SI unit of a parameter, like "N m"."""
         if name in (*_GROUPS["bias"], *_GROUPS["drift"]):
             return "N m" if name.startswith("moment") else "N"
-        if _BASE.fullmatch(name) or name in (*_GROUPS["lever"], *_GROUPS["gauge"]):
+        if _BASE.fullmatch(name) or name in (*_GROUPS["lever"], *_GROUPS["gauge"], "stem"):
             return "m"
         if name in CURVE:
             return LOAD_CELL_UNITS[name]
@@ -170,6 +174,8 @@ class Nuisances:
             known["rest_curvature"] = off / self.units["rest_curvature"]
         if "taper" in self.names:
             known["taper"] = values["taper"] - self.rod.taper
+        if "stem" in self.names:
+            known["stem"] = (values["stem"] - self.rod.stem) / self.units["stem"]
         return Rig(
             base_shifts=self._base_shifts(values),
             **known,
@@ -342,6 +348,10 @@ def nuisances_of(
     if "taper" in defaults:
         ends = ((end - rod.taper) / _TAPER for end in nuisances.bounds("taper"))
         defaults["taper"] = stats.truncnorm(*ends, loc=rod.taper, scale=_TAPER)
+    if "stem" in defaults:
+        deviation = _STEM * rod.length
+        defaults["stem"] = stats.truncnorm(-rod.stem / deviation, np.inf, loc=rod.stem, scale=deviation)
+        _refuse_shifted_stem(measured, names, gauge)
     if joint is None or not found:
         return replace(nuisances, priors=defaults)
     return replace(nuisances, priors={**defaults, **joint.priors}, joint=joint)
@@ -362,6 +372,23 @@ def _unidentifiable(measured: xr.Dataset) -> dict[str, str]:
             "infer that"
         )
     return reasons
+
+
+def _refuse_shifted_stem(measured: xr.Dataset, names: Sequence[str], gauge: bool) -> None:
+    """Refuse a stem where it only shifts the place of the object and the point of the moment's reference.
+
+    A rod that keeps its direction, on a pivot that does not yield, has its beginning at a constant distance from it.
+    """
+    turned = not np.all(np.isin(measured.sweep.values, carried_sweeps(measured)))
+    placed = gauge and not set(_GROUPS["gauge"]) <= set(names)
+    angles = measured.drive_angle.values
+    if turned or placed or "suspension_compliance" in names or np.ptp(angles) > _SAME_DIRECTION:
+        return
+    if any(name in names for name in _GROUPS["lever"]):
+        raise ParameterError(
+            "stem cannot be inferred beside lever: in every sweep the base is carried without turning, and a longer "
+            "stem is the same as another lever and place of the object; leave one of the two, or turn the rod"
+        )
 
 
 def _is_measured(name: str, present: Sequence[str]) -> bool:

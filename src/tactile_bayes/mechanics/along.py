@@ -17,13 +17,13 @@ from tactile_bayes.checks import as_number, as_numbers, check_number, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["Along", "GivenAlong", "along"]
+__all__ = ["MISS", "Along", "GivenAlong", "along"]
 
 _ORDER = 12
 """Coefficients of the polynomials that represent a function."""
 
-_MISS = 1e-12
-"""Largest error of these, as a share of the largest value."""
+MISS = 1e-12
+"""Largest error of these, as a share of the largest value, if no other is stated."""
 
 _ROUNDING = 1e-15
 """Size of coefficients that are rounding errors, as a share of the largest."""
@@ -91,11 +91,11 @@ GivenAlong: TypeAlias = float | Along | Callable[[Floats], ArrayLike] | tuple[Ar
 """A property of a rod as users give it: a number, a function of s, or arrays (s, values)."""
 
 
-def along(name: str, given: Any, length: float, positive: bool = False) -> float | Along:
+def along(name: str, given: Any, length: float, positive: bool = False, miss: float = MISS) -> float | Along:
     """Return a property of a rod as a number or as polynomials.
 
     Tables are interpolated by monotone cubic polynomials (PCHIP): values stay between those of neighbours, so that a
-    rigidity stays positive, and steps do not ring. Functions are interpolated to 1e-12 of their largest value.
+    rigidity stays positive, and steps do not ring. Functions are interpolated.
 
     Parameters
     ----------
@@ -107,6 +107,8 @@ def along(name: str, given: Any, length: float, positive: bool = False) -> float
         Length of the rod.
     positive : bool
         Whether values have to be positive.
+    miss : float
+        Error with which a function is interpolated, over its largest value.
 
     Raises
     ------
@@ -135,7 +137,7 @@ def along(name: str, given: Any, length: float, positive: bool = False) -> float
             )
         return given
     if callable(given):
-        return _of_function(_Named(given, name, positive), length)
+        return _of_function(_Named(given, name, positive), length, miss)
     return _of_table(name, given, length, positive)
 
 
@@ -219,7 +221,7 @@ class _Named(NamedTuple):
         return values
 
 
-def _of_function(function: _Named, length: float) -> Along:
+def _of_function(function: _Named, length: float, most: float) -> Along:
     """Polynomials on cells that are halved until they equal a function, at nodes and between them."""
     probes = chebyshev.nodes(2 * _ORDER + 1)
     largest = float(np.abs(function(np.linspace(0.0, length, 201))).max())
@@ -230,7 +232,7 @@ def _of_function(function: _Named, length: float) -> Along:
         values = function(length * (begin + (end - begin) * probes))
         miss = np.abs(chebyshev.evaluate(series, probes) - values).max()
         # A rigidity counts by its inverse: each cell is as accurate as any.
-        if miss <= _MISS * (float(values.min()) if function.positive else largest):
+        if miss <= most * (float(values.min()) if function.positive else largest):
             done.append((length * begin, _powers(series, length * (end - begin))))
             continue
         if end - begin < 0.5**_HALVINGS or len(waiting) + len(done) >= _MOST_CELLS:

@@ -2,6 +2,13 @@
 
 Uniform rods of constant rest curvature have closed forms (`pose`); all others are integrated (`taylor`). Functions are
 compiled for each of the two: where an argument is None, numba leaves out what an `is None` excludes.
+
+A rigid, straight stem may lie between pivot and rod. It continues the rod beyond its base, in the direction ψ0 that the
+rod has there, so that with its length h
+
+    u → u + h cos ψ0,    v → v + h sin ψ0,
+
+and the turn is the same. The moment at the pivot is f u as before. Arc lengths begin where the rod does.
 """
 
 from __future__ import annotations
@@ -36,20 +43,27 @@ __all__ = [
     "chord_to",
     "free_end",
     "from_tip",
-    "integrated",
+    "lever_of_stem",
     "loaded_part",
     "mirrored_beam",
     "mirrored_by",
+    "moved_by_stem",
     "rest_curvature",
+    "rubbed_otherwise",
     "varied",
     "varied_of",
     "whole_pose",
+    "with_profile",
     "with_sign",
+    "with_stem",
 ]
 
 
 _ACROSS = 1e-6
 """Cosine of the angle of a chord to the rod that counts as zero: the rod goes no farther from the pivot."""
+
+_MOST_STEPS, _SETTLED = 20, 1e-10
+"""Largest number of Newton steps to a distance from the pivot, and the last one [L]."""
 
 
 class Varied(NamedTuple):
@@ -63,6 +77,9 @@ class Varied(NamedTuple):
     """That of the table; 0 if there are no coefficients."""
     sign: float
     """Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose."""
+    other_sheet: Floats
+    other_slenderness: float
+    """Coefficients and slenderness for friction that acts in the other sense."""
 
 
 class Beam(NamedTuple):
@@ -76,13 +93,17 @@ class Beam(NamedTuple):
     """Upper bound of the rest curvature [1/L]."""
     varied: Varied | None
     """Properties along the rod; None for uniform rods of constant rest curvature."""
+    stem: float
+    """Length of the rigid piece between pivot and rod [L]."""
+    own_reach: float
+    """Distance from where the rod begins to its tip at rest [L], for tables."""
 
 
 class Chord(NamedTuple):
     """Line from the pivot to a point of the rod at rest."""
 
     arclength: float
-    """Arc length of the point [L]."""
+    """Arc length of the point [L], < 0 on the stem."""
     at_base: float
     """Angle from the rod at the pivot to the chord [rad]."""
     at_point: float
@@ -98,31 +119,34 @@ def varied_of(profile: Profile | None) -> Varied | None:
 
 def varied(profile: Profile) -> Varied:
     """Profile with a workspace, and without coefficients of a table."""
-    return Varied(profile, workspace(), sheet(), 0.0, 1.0)
+    return Varied(profile, workspace(), sheet(), 0.0, 1.0, sheet(), 0.0)
 
 
 @compiled
-def mirrored_by(curvature: float, varied: Varied | None) -> Beam:
+def mirrored_by(curvature: float, varied: Varied | None, stem: float) -> Beam:
     """Rod of a contact, as in `Rods`."""
     if varied is None:
-        return Beam(curvature, 1.0, curvature, varied)
-    return Beam(0.0, 1.0, math.inf, with_sign(varied, curvature))
+        return Beam(curvature, 1.0, curvature, varied, stem, 1.0)
+    return Beam(0.0, 1.0, math.inf, with_sign(varied, curvature), stem, 1.0)
 
 
 @compiled
-def beam_of(curvature: float, varied: Varied | None) -> Beam:
-    """Uniform rod whose rest shape is an arc of length one, or a rod whose properties vary along it."""
+def beam_of(curvature: float, varied: Varied | None, stem: float) -> Beam:
+    """Uniform rod whose rest shape is an arc of length one, or a rod whose properties vary along it, on a stem."""
     if varied is None:
         half = 0.5 * curvature
-        return Beam(curvature, 1.0 if half == 0.0 else math.sin(half) / half, curvature, varied)
-    reach = rest_along(varied.profile, 1.0, varied.work).distance
-    return Beam(0.0, reach, most_rest_curvature(varied.profile), varied)
+        chord = 1.0 if half == 0.0 else math.sin(half) / half
+        reach = chord if stem == 0.0 else math.hypot(stem + chord * math.cos(half), chord * math.sin(half))
+        return Beam(curvature, reach, curvature, varied, stem, chord)
+    chord = rest_along(varied.profile, 0.0, 1.0, varied.work).distance
+    reach = chord if stem == 0.0 else rest_along(varied.profile, stem, 1.0, varied.work).distance
+    return Beam(0.0, reach, most_rest_curvature(varied.profile), varied, stem, chord)
 
 
 @compiled
 def mirrored_beam(beam: Beam) -> Beam:
     """Rod in the frame of the opposite sweep."""
-    return Beam(-beam.curvature, beam.reach, math.inf, _mirrored(beam.varied))
+    return Beam(-beam.curvature, beam.reach, math.inf, _mirrored(beam.varied), beam.stem, beam.own_reach)
 
 
 @compiled
@@ -136,27 +160,62 @@ def _mirrored(varied: Varied | None) -> Varied | None:
 def with_sign(varied: Varied, sign: float) -> Varied:
     """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
     edges, curvature, rigidity, taper, bend, _ = varied.profile
-    profile = Profile(edges, curvature, rigidity, taper, bend, sign)
-    return Varied(profile, varied.work, varied.sheet, varied.slenderness, varied.sign)
+    return with_profile(varied, Profile(edges, curvature, rigidity, taper, bend, sign))
 
 
 @compiled
-def integrated(beam: Beam) -> Beam:
-    """Rod without coefficients of a table, which hold for one angle of friction."""
-    return Beam(beam.curvature, beam.reach, beam.most_curvature, _integrated(beam.varied))
+def with_profile(varied: Varied, profile: Profile) -> Varied:
+    """Rod with another profile."""
+    _, work, own, slenderness, sign, other, other_slenderness = varied
+    return Varied(profile, work, own, slenderness, sign, other, other_slenderness)
 
 
 @compiled
-def _integrated(varied: Varied | None) -> Varied | None:
+def rubbed_otherwise(beam: Beam) -> Beam:
+    """Rod with the coefficients for friction that acts in the other sense: they hold for one angle of friction."""
+    varied = _rubbed_otherwise(beam.varied)
+    return Beam(beam.curvature, beam.reach, beam.most_curvature, varied, beam.stem, beam.own_reach)
+
+
+@compiled
+def _rubbed_otherwise(varied: Varied | None) -> Varied | None:
     if varied is None:
         return varied
-    return Varied(varied.profile, varied.work, varied.sheet, 0.0, varied.sign)
+    profile, work, own, slenderness, sign, other, other_slenderness = varied
+    return Varied(profile, work, other, other_slenderness, sign, own, slenderness)
 
 
 @compiled
 def beam_pose(beam: Beam, psi1: float, arclength: float, force: float, tip: bool) -> tuple[Pose, Pose, Pose]:
     """Pose, and its derivatives by ψ1 in tip contact or by the arc length in tangential contact, and by the force."""
-    return _pose(beam.varied, beam.curvature, psi1, arclength, force, tip)
+    here, by_q, by_force = _pose(beam.varied, beam.curvature, psi1, arclength, force, tip)
+    if beam.stem == 0.0:
+        return here, by_q, by_force
+    psi0, h = psi1 + here.turn, beam.stem
+    by_psi0 = by_q.turn + 1.0 if tip else by_q.turn
+    return (
+        with_stem(h, psi0, here),
+        moved_by_stem(h, psi0, by_q, by_psi0),
+        moved_by_stem(h, psi0, by_force, by_force.turn),
+    )
+
+
+@compiled
+def with_stem(stem: float, psi0: float, here: Pose) -> Pose:
+    """Pose as seen from the pivot, from that seen from where the rod begins."""
+    return Pose(here.u + stem * math.cos(psi0), here.v + stem * math.sin(psi0), here.turn)
+
+
+@compiled
+def moved_by_stem(stem: float, psi0: float, by: Pose, by_psi0: float) -> Pose:
+    """Derivative of such a pose, from that without the stem and that of ψ0."""
+    return Pose(by.u - stem * math.sin(psi0) * by_psi0, by.v + stem * math.cos(psi0) * by_psi0, by.turn)
+
+
+@compiled
+def lever_of_stem(stem: float, drive_angle: float, force_x: float, force_y: float) -> float:
+    """Moment of the contact force about the pivot less that about the beginning of the rod, from the reaction."""
+    return stem * (force_y * math.cos(drive_angle) - force_x * math.sin(drive_angle))
 
 
 @compiled
@@ -182,7 +241,7 @@ def _pose(
 
 @compiled
 def whole_pose(beam: Beam, psi1: float, arclength: float, force: float) -> tuple[Pose, Pose, Pose, Pose]:
-    """Pose, and its derivatives by ψ1, by the arc length and by the force."""
+    """Pose as seen from where the rod begins, and its derivatives by ψ1, by the arc length and by the force."""
     return _whole_pose(beam.varied, beam.curvature, psi1, arclength, force)
 
 
@@ -199,7 +258,55 @@ def _whole_pose(
 @compiled
 def chord_to(beam: Beam, distance: float) -> Chord:
     """Chord of the rod at rest to its first point at a distance from the pivot."""
-    return _chord(beam.varied, beam.curvature, beam.reach, distance)
+    if beam.stem == 0.0:
+        return _chord(beam.varied, beam.curvature, beam.reach, distance)
+    return _chord_over_stem(beam.varied, beam, distance)
+
+
+@compiled
+def _chord_over_stem(varied: Varied | None, beam: Beam, distance: float) -> Chord:
+    """Chord of a rod that begins at a distance from the pivot.
+
+    For an arc let c be the chord from where it begins, at an angle w with sin w = κ0 c/2: then r² = h² + 2 h c cos w +
+    c², a quadratic equation for c². With a table c is found by Newton's method.
+    """
+    h, curvature = beam.stem, beam.curvature
+    if varied is None:
+        square = (distance - h) * (distance + h)
+        root = math.sqrt(max(4.0 * distance * distance - curvature * curvature * square * square, 0.0))
+        c = square / math.sqrt(square + h * (2.0 * h + root))
+        return _over_stem(h, c, _chord(varied, curvature, 1.0, c), curvature, distance)
+    if varied.slenderness > 0.0:
+        c = max(distance - h, 0.0)
+        own = _chord(varied, curvature, beam.own_reach, c)
+        for _ in range(_MOST_STEPS):
+            cos, sin = math.cos(own.at_base), math.sin(own.at_base)
+            rate = (c + h * cos - h * sin * math.tan(own.at_point)) / distance
+            step = (math.hypot(h + c * cos, c * sin) - distance) / rate
+            c = max(c - step, 0.0)
+            own = _chord(varied, curvature, beam.own_reach, c)
+            if not abs(step) > _SETTLED:
+                break
+        bent = own.rate * math.cos(own.at_point)
+        return _over_stem(h, c, own, bent + (math.sin(own.at_point) / c if c > 0.0 else 0.0), distance)
+    found = chord_along(varied.profile, h, distance, varied.work)
+    return _to_chord(found.arclength, found.bearing, found.slope, found.curvature, distance)
+
+
+@compiled
+def _over_stem(h: float, c: float, own: Chord, curvature: float, distance: float) -> Chord:
+    """Chord from the pivot, from that of length c from where the rod begins, and the curvature at its end."""
+    bearing = math.atan2(c * math.sin(own.at_base), h + c * math.cos(own.at_base))
+    return _to_chord(own.arclength, bearing, own.at_base + own.at_point, curvature, distance)
+
+
+@compiled
+def _to_chord(arclength: float, bearing: float, slope: float, curvature: float, distance: float) -> Chord:
+    """Chord to a point of given bearing, slope and curvature."""
+    at_point = slope - bearing
+    cos = math.cos(at_point)
+    rate = (curvature - math.sin(at_point) / distance) / cos if cos > _ACROSS else 0.0
+    return Chord(arclength, bearing, at_point, rate)
 
 
 @compiled
@@ -212,17 +319,16 @@ def _chord(varied: Varied | None, curvature: float, reach: float, distance: floa
     if varied.slenderness > 0.0:
         in_table = chord_in(varied.sheet, varied.sign != varied.profile.sign, reach, distance)
         return Chord(in_table.arclength, in_table.at_base, in_table.at_point, in_table.rate)
-    found = chord_along(varied.profile, distance, varied.work)
-    at_point = found.slope - found.bearing
-    cos = math.cos(at_point)
-    rate = (found.curvature - math.sin(at_point) / distance) / cos if cos > _ACROSS else 0.0
-    return Chord(found.arclength, found.bearing, at_point, rate)
+    found = chord_along(varied.profile, 0.0, distance, varied.work)
+    return _to_chord(found.arclength, found.bearing, found.slope, found.curvature, distance)
 
 
 @compiled
 def bending(beam: Beam, drive_angle: float, moment: float, force_x: float, force_y: float, arclength: float) -> float:
     """Largest change of curvature between pivot and contact in a forward contact, times the diameter over that at the
     base [1/L]."""
+    if beam.stem != 0.0:
+        moment -= lever_of_stem(beam.stem, drive_angle, force_x, force_y)
     return _bending(beam.varied, beam.curvature, drive_angle, moment, force_x, force_y, arclength)
 
 

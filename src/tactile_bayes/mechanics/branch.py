@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.beam import free_end, from_tip, integrated, loaded_part, rest_curvature
+from tactile_bayes.mechanics.beam import free_end, from_tip, loaded_part, rest_curvature, rubbed_otherwise
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
@@ -348,7 +348,7 @@ def with_friction(scene: Scene, angle: float) -> Scene:
     """Scene with friction that acts in the other sense."""
     _, compliance, offset, sign, rigidity = scene.rig
     rig = Rig(angle, compliance, offset, sign, rigidity)
-    return Scene(scene.outline, integrated(scene.beam), rig, scene.exact, scene.line)
+    return Scene(scene.outline, rubbed_otherwise(scene.beam), rig, scene.exact, scene.line)
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 Quantities are dimensionless and relative to the pivot, as in `elastica`. Between pivot and contact the rod is a piece
 of elastica, and its point at arc length s is the pivot of a rod of length s1 − s with the same contact (`pose`). Beyond
-the contact it has its rest curvature.
+the contact it has its rest curvature. A rigid stem only moves where it begins.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.elastica import contact_from_wrench
+from tactile_bayes.mechanics.elastica import contact_from_wrench, lever_of_stem
 from tactile_bayes.mechanics.profile import Profile, Rods
 
 __all__ = ["rod_shape"]
@@ -49,10 +49,10 @@ def rod_shape(
 
     Returns
     -------
-    x, y : ndarray, shape (..., points)
-        Coordinates relative to the pivot [L]. Where the force is zero or the wrench NaN, the rod is not loaded and has
-        its rest shape. Where the bending moment has no zero, no contact makes such a wrench, and the coordinates are
-        NaN.
+    x, y : ndarray, shape (..., points), or one more if there is a stem
+        Coordinates relative to the pivot [L], of which the first is the pivot. Where the force is zero or the wrench
+        NaN, the rod is not loaded and has its rest shape. Where the bending moment has no zero, no contact makes such a
+        wrench, and the coordinates are NaN.
 
     Raises
     ------
@@ -81,13 +81,16 @@ def rod_shape(
     sign = np.where(sign < 0.0, -1.0, 1.0)
     phi0 = np.where(sign < 0.0, np.pi - phi0, phi0)
     moment, fx, curvature = sign * moment, sign * fx, sign * curvature
+    stem = 0.0
     if rods is not None:
-        curvature = np.broadcast_to(rods.curvature, shape).ravel()
+        curvature, stem = np.broadcast_to(rods.curvature, shape).ravel(), rods.stem
+    if stem:
+        moment = moment - lever_of_stem(stem, phi0, fx, fy)
 
     s, full = np.linspace(0.0, 1.0, points), (*shape, points)
     if rods is not None and rods.profile is not None:
         x, y = _along(np.stack([phi0, moment, fx, fy, curvature], axis=-1), rods.profile, s)
-        return (sign[:, None] * x).reshape(full), y.reshape(full)
+        return _on_stem(stem, phi0, sign, x, y, full)
     force = np.hypot(fx, fy)
     x, y = _unloaded(phi0[:, None], s, curvature[:, None])
     loaded = (force > 0.0) & np.isfinite(moment)
@@ -111,7 +114,18 @@ def rod_shape(
     beyond_x, beyond_y = _unloaded(tip_angle, np.maximum(s - s1, 0.0), curvature)
     x[bent] = u * cos - v * sin + beyond_x
     y[bent] = u * sin + v * cos + beyond_y
-    return (sign[:, None] * x).reshape(full), y.reshape(full)
+    return _on_stem(stem, phi0, sign, x, y, full)
+
+
+def _on_stem(
+    stem: float, phi0: Floats, sign: Floats, x: Floats, y: Floats, shape: tuple[int, ...]
+) -> tuple[Floats, Floats]:
+    """Move points of rods from the pivot to the end of the stem, put the pivot before them, and mirror them back."""
+    if stem:
+        x, y = x + stem * np.cos(phi0)[:, None], y + stem * np.sin(phi0)[:, None]
+        x, y = (np.concatenate([np.zeros_like(of[:, :1]), of], axis=1) for of in (x, y))
+        shape = (*shape[:-1], shape[-1] + 1)
+    return (sign[:, None] * x).reshape(shape), y.reshape(shape)
 
 
 def _along(wrenches: Floats, profile: Profile, s: Floats) -> tuple[Floats, Floats]:

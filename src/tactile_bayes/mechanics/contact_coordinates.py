@@ -101,11 +101,11 @@ def _contact_states(
     count = len(coordinates)
     coordinates = np.ascontiguousarray(coordinates, dtype=float)
     delta = np.array(np.broadcast_to(friction_angle, (count,)), dtype=float)
-    curvature, profile = rods_of(rods, count)
+    curvature, profile, stem = rods_of(rods, count)
     loads, place, volumes = np.empty((3, count)), np.empty((4, count)), np.empty((2, count))
     by = ContactStateSlopes(np.empty((slopes, 3, 4)), np.empty((slopes, 4, 4)))
     write_contact_states(
-        coordinates, delta, curvature, varied_of(profile), loads, place, volumes, *by, contact_workspace()
+        coordinates, delta, curvature, varied_of(profile), stem, loads, place, volumes, *by, contact_workspace()
     )
     return ContactStates(loads, place, *volumes), by
 
@@ -127,7 +127,7 @@ def place_by_wrench(coordinates: Floats, rods: Rods | ArrayLike = 0.0) -> Floats
     from tactile_bayes.mechanics.contact_map import wrench_slopes
 
     slopes = np.empty((len(coordinates), 4, 4))
-    curvature, profile = rods_of(rods, len(coordinates))
+    curvature, profile, stem = rods_of(rods, len(coordinates))
     coordinates = np.ascontiguousarray(coordinates, dtype=float)
-    wrench_slopes(coordinates, curvature, varied_of(profile), contact_workspace(), slopes)
+    wrench_slopes(coordinates, curvature, varied_of(profile), stem, contact_workspace(), slopes)
     return slopes

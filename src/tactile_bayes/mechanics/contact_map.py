@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.arc_states import MOST_LOAD
-from tactile_bayes.mechanics.beam import Beam, Varied, mirrored_by, whole_pose
+from tactile_bayes.mechanics.beam import Beam, Varied, lever_of_stem, mirrored_by, moved_by_stem, whole_pose, with_stem
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.pose import Pose
 
@@ -27,7 +27,7 @@ _MOST_INTEGRATED = 1e3
 
 
 class Bend(NamedTuple):
-    """Pose of a contact and its derivatives; NaN where there is none."""
+    """Pose of a contact, as seen from where the rod begins, and its derivatives; NaN where there is none."""
 
     here: Pose
     by_force: Pose
@@ -83,6 +83,8 @@ def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> Bend:
             possible = _is_first(half * half + load * math.sin(0.25 * math.pi - 0.5 * psi1) ** 2, load)
         here, by_psi1, longer, by_force = whole_pose(beam, psi1, arclength, force)
         if possible and (here.u >= 0.0 or (longer.u < 0.0 and is_arc and curvature != 0.0)):
+            bend = Bend(here, by_force, by_psi1, longer)
+            here, by_force, by_psi1, longer = from_pivot(bend, psi1, beam.stem)
             beta = drive_angle - psi1 - here.turn
             cos, sin = math.cos(beta), math.sin(beta)
             x, y = here.u * cos - here.v * sin, here.u * sin + here.v * cos
@@ -93,12 +95,27 @@ def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> Bend:
             _column(longer, -longer.turn, 0.0, cos, sin, by, 3)
             by[1, 0], by[2, 0], by[3, 0] = here.u + force * by_force.u, force * by_psi1.u, force * longer.u
             by[4, 0], by[4, 1], by[4, 2], by[4, 3], by[4, 4], by[4, 5] = 0.0, -by[0, 2], by[0, 1], -y, x, 1.0
-            return Bend(here, by_force, by_psi1, longer)
+            return bend
     for c in range(5):
         for k in range(6):
             by[c, k] = math.nan
     nothing = Pose(math.nan, math.nan, math.nan)
     return Bend(nothing, nothing, nothing, nothing)
+
+
+@compiled
+def from_pivot(bend: Bend, psi1: float, stem: float) -> Bend:
+    """Pose of a contact and its derivatives as seen from the pivot."""
+    if stem == 0.0:
+        return bend
+    here, by_force, by_psi1, by_arclength = bend
+    psi0 = psi1 + here.turn
+    return Bend(
+        with_stem(stem, psi0, here),
+        moved_by_stem(stem, psi0, by_force, by_force.turn),
+        moved_by_stem(stem, psi0, by_psi1, 1.0 + by_psi1.turn),
+        moved_by_stem(stem, psi0, by_arclength, by_arclength.turn),
+    )
 
 
 @compiled
@@ -118,9 +135,14 @@ def moved(
     With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945) and the curvature κ = κ0 − m0 at the
     pivot, sin ψ1 = sin ψ0 + (κ0² − κ²)/(2 f). The arc length follows from the changes of ψ0 and of the lever u = m0/f
     that remain; each of them alone would be 0/0 in some rods. Rods that vary along their length have no first integral:
-    the changes of ψ0 and u together determine those of ψ1 and the arc length.
+    the changes of ψ0 and u together determine those of ψ1 and the arc length. Moments are those where the rod begins.
     """
     force, psi1 = z[i, 0], z[i, 1]
+    at_rod = by[0, 0]
+    if beam.stem != 0.0:
+        at_rod -= lever_of_stem(beam.stem, z[i, 3], by[0, 1], by[0, 2])
+        moment -= lever_of_stem(beam.stem, z[i, 3], fx, fy)
+        moment += angle * beam.stem * (by[0, 2] * math.sin(z[i, 3]) + by[0, 1] * math.cos(z[i, 3]))
     here, by_force, by_psi1, longer = bend
     growth = (by[0, 1] * fx + by[0, 2] * fy) / (force * force)
     beta = (by[0, 1] * fy - by[0, 2] * fx) / (force * force)
@@ -128,8 +150,8 @@ def moved(
     du = moment / force - here.u * growth
     if beam.varied is None:
         curvature = beam.curvature
-        at_pivot, cos0, cos1 = curvature - by[0, 0], longer.u, math.cos(psi1)
-        shift = (cos0 * psi0 + at_pivot * moment / force + 0.5 * here.u * (by[0, 0] - 2.0 * curvature) * growth) / cos1
+        at_pivot, cos0, cos1 = curvature - at_rod, longer.u, math.cos(psi1)
+        shift = (cos0 * psi0 + at_pivot * moment / force + 0.5 * here.u * (at_rod - 2.0 * curvature) * growth) / cos1
         turned = psi0 - (1.0 + by_psi1.turn) * shift - by_force.turn * df
         levered = du - by_psi1.u * shift - by_force.u * df
         by_length = (longer.turn * turned + force * cos0 * levered) / (at_pivot * at_pivot + force * cos0 * cos0)
@@ -152,6 +174,7 @@ def write_contact_states(
     delta: Floats,
     curvature: Floats,
     varied: Varied | None,
+    stem: float,
     loads: Floats,
     place: Floats,
     volumes: Floats,
@@ -167,7 +190,7 @@ def write_contact_states(
         As in `contact_states`.
     delta : ndarray, shape (n,)
         Friction angle [rad].
-    curvature, varied
+    curvature, varied, stem
         As in `Rods`.
     loads, place, volumes : ndarray, shapes (3, n), (4, n) and (2, n)
         As in `ContactStates`.
@@ -177,7 +200,8 @@ def write_contact_states(
         As in `contact_state`.
     """
     for i in range(delta.size):
-        _, by_force, by_psi1, longer = contact_state(coordinates, i, mirrored_by(curvature[i], varied), by)
+        bend = contact_state(coordinates, i, mirrored_by(curvature[i], varied, stem), by)
+        _, by_force, by_psi1, longer = from_pivot(bend, coordinates[i, 1], stem)
         for k in range(3):
             loads[k, i] = by[0, k]
         place[0, i], place[1, i], place[2, i], place[3, i] = by[0, 3], by[0, 4], by[0, 5] - delta[i], coordinates[i, 2]
@@ -192,10 +216,12 @@ def write_contact_states(
 
 
 @cached
-def wrench_slopes(coordinates: Floats, curvature: Floats, varied: Varied | None, by: Floats, out: Floats) -> None:
+def wrench_slopes(
+    coordinates: Floats, curvature: Floats, varied: Varied | None, stem: float, by: Floats, out: Floats
+) -> None:
     """Write the derivatives of places by drive angle and loads, shape (n, 4, 4)."""
     for i in range(coordinates.shape[0]):
-        beam = mirrored_by(curvature[i], varied)
+        beam = mirrored_by(curvature[i], varied, stem)
         bend = contact_state(coordinates, i, beam, by)
         for c in range(4):
             errors = 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3)

@@ -83,7 +83,7 @@ def _between(beam: Beam, begin: float, way: float, room: Profile | None) -> Beam
 def _mixed(varied: Varied | None, curvature: float, begin: float, way: float, room: Profile | None) -> Beam:
     left = min(_WHOLE - way, 1.0)
     if varied is None or room is None:
-        return Beam(curvature - left * (curvature - begin), 1.0, math.inf, varied)
+        return Beam(curvature - left * (curvature - begin), 1.0, math.inf, varied, 0.0, 1.0)
     edges, bent, rigidity, taper, bend, sign = varied.profile
     bent_share, rigid_share = 1.0 - left, min(way, 1.0)
     for i in range(edges.size):
@@ -94,7 +94,8 @@ def _mixed(varied: Varied | None, curvature: float, begin: float, way: float, ro
         room.rigidity[i, 0] += 1.0 - rigid_share
     bend = bent_share * bend + left * sign * begin
     profile = Profile(edges, room.curvature, room.rigidity, rigid_share * taper, bend, sign)
-    return Beam(0.0, 1.0, math.inf, Varied(profile, varied.work, varied.sheet, 0.0, 1.0))
+    varied = Varied(profile, varied.work, varied.sheet, 0.0, 1.0, varied.other_sheet, 0.0)
+    return Beam(0.0, 1.0, math.inf, varied, 0.0, 1.0)
 
 
 @compiled

@@ -27,12 +27,20 @@ __all__ = [
     "contact_from_wrench",
     "forward_contacts",
     "largest_curvature",
+    "lever_of_stem",
     "tangential_arclength",
     "wrench_from_contact",
 ]
 
 MAX_FRICTION_ANGLE = 0.7
 """Largest friction angle δ [rad]: the map of Phase B folds unless 2 E(m) > K(m) for m = (1 + sin δ)/2."""
+
+
+_FARTHEST = 3.0
+"""Angle [rad] by which a rod on a stem may be turned from the bearing of its contact."""
+
+_MOST_HALVINGS, _SETTLED, _MISSED = 100, 1e-15, 1e-9
+"""Largest number of steps to that angle, the error that is rounding, and the least that is none [rad]."""
 
 
 class Wrench(NamedTuple):
@@ -131,6 +139,7 @@ def wrench_from_contact(
     phase: ArrayLike | None = None,
     rest_curvature: ArrayLike = 0.0,
     profile: Profile | None = None,
+    stem: float = 0.0,
 ) -> Wrench:
     """Base wrench of a rod that touches a contour at a given point: Step 1 for one state.
 
@@ -156,6 +165,9 @@ def wrench_from_contact(
         Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
     profile : Profile, optional
         Rod whose rest curvature or rigidity varies along it, in place of an arc.
+    stem : float
+        Rigid piece between pivot and rod, in the direction of its base [L]: the drive angle is found by Newton's method
+        within a bracket, from states of the rod on the stem's end.
 
     Returns
     -------
@@ -176,7 +188,11 @@ def wrench_from_contact(
     (array([1, 2], dtype=int8), array([2.901776, 2.923367]))
     """
     known = NONE if phase is None else phase
-    found, columns = _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, profile, side, known)
+    of_rod: tuple[Any, ...] = friction_angle, rest_curvature, profile, side, known
+    if stem == 0.0:
+        found, columns = _states(contact_x, contact_y, slope_angle, *of_rod)
+    else:
+        found, columns = _states_on_stem(stem, contact_x, contact_y, slope_angle, *of_rod)
     drive_angle, moment, force_x, force_y, arclength, tip_angle, by_slope, by_distance, tangential = columns
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
@@ -192,6 +208,63 @@ def wrench_from_contact(
         by_distance=sign * by_distance,
         tangential_arclength=tangential,
     )
+
+
+def lever_of_stem(stem: float, drive_angle: Floats, force_x: Floats, force_y: Floats) -> Floats:
+    """Moment of a contact force about the pivot less that where the rod begins, from the support reaction."""
+    return np.asarray(stem * (force_y * np.cos(drive_angle) - force_x * np.sin(drive_angle)))
+
+
+def _states_on_stem(
+    stem: float,
+    x: ArrayLike,
+    y: ArrayLike,
+    alpha: ArrayLike,
+    delta: ArrayLike,
+    curvature: ArrayLike,
+    profile: Profile | None,
+    side: ArrayLike,
+    phase: ArrayLike,
+) -> tuple[NDArray[np.int8], Floats]:
+    """`_states` of rods that begin at the end of a stem.
+
+    A drive angle a puts the beginning of the rod somewhere, from where the contact takes the drive angle φ0(a). Sought
+    is the a with φ0(a) = a: the farther the stem is turned, the less the rod.
+    """
+    sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
+    given = np.broadcast_arrays(sign * x, y, sign * alpha, delta, sign * curvature, phase, sign)
+    shape = given[0].shape
+    x, y, alpha, delta, bent, phase, sign = (np.asarray(column.ravel()) for column in given)
+    bearing = np.arctan2(y, x)
+    low, high, angle = bearing - _FARTHEST, bearing + _FARTHEST, bearing
+    for _ in range(_MOST_HALVINGS):
+        from_x, from_y = x - stem * np.cos(angle), y - stem * np.sin(angle)
+        found, columns = _states(sign * from_x, from_y, sign * alpha, delta, sign * bent, profile, sign, phase)
+        # Out of reach the stem is turned too far, to either side.
+        off = np.where(np.isfinite(columns[0]), columns[0] - angle, np.where(angle < bearing, 1.0, -1.0))
+        if not np.any((np.abs(off) > _SETTLED) & (high - low > _SETTLED)):
+            break
+        low, high = np.where(off >= 0.0, angle, low), np.where(off >= 0.0, high, angle)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            new = angle + off / (1.0 - _turned_by_stem(stem, angle, from_x, from_y, columns))
+        angle = np.where((new > low) & (new < high), new, 0.5 * (low + high))
+    missed = ~(np.abs(columns[0] - angle) <= _MISSED)
+    columns[:8, missed], found[missed] = np.nan, NONE
+    fx, fy, by_slope, by_distance = columns[2], columns[3], columns[6], columns[7]
+    square, own = x * x + y * y, from_x * from_x + from_y * from_y
+    left = 1.0 - _turned_by_stem(stem, angle, from_x, from_y, columns)
+    turned = (from_x * y - from_y * x) / (2.0 * square * own)
+    columns[7] = (by_distance * (from_x * x + from_y * y) / square + (1.0 - by_slope) * turned) / left
+    columns[6] = by_slope / left
+    columns[1] += lever_of_stem(stem, columns[0], fx, fy)
+    return found.reshape(shape), columns.reshape(9, *shape)
+
+
+def _turned_by_stem(stem: float, angle: Floats, x: Floats, y: Floats, columns: Floats) -> Floats:
+    """Derivative of the rod's drive angle by that of the stem, for a contact at (x, y) from the rod's beginning."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    nearer, turned = 2.0 * stem * (x * sin - y * cos), -stem * (x * cos + y * sin) / (x * x + y * y)
+    return np.asarray(columns[7] * nearer + (1.0 - columns[6]) * turned)
 
 
 def _states(
@@ -256,6 +329,7 @@ def contact_from_wrench(
     side: ArrayLike | None = None,
     rest_curvature: ArrayLike = 0.0,
     profile: Profile | None = None,
+    stem: float = 0.0,
 ) -> Contact:
     """Contact that follows from a base wrench: Step 2 for one state, without integration or root search.
 
@@ -276,6 +350,8 @@ def contact_from_wrench(
         Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
     profile : Profile, optional
         Rod whose rest curvature or rigidity varies along it, in place of an arc; it is integrated up to its contact.
+    stem : float
+        Rigid piece between pivot and rod, in the direction of its base [L].
 
     Returns
     -------
@@ -306,7 +382,8 @@ def contact_from_wrench(
     of_rods = sign * rest_curvature if profile is None else sign
     given = np.broadcast_arrays(phi0, sign * moment, sign * force_x, force_y, delta, of_rods)
     *wrench, of_rods = (column.ravel() for column in given)
-    found = forward_contacts(np.stack(wrench, axis=-1).astype(float), Rods(of_rods.astype(float), profile))
+    rods = Rods(of_rods.astype(float), profile, stem)
+    found = forward_contacts(np.stack(wrench, axis=-1).astype(float), rods)
     x, y, slope_angle, arclength, tip_angle, modulus = found.reshape(6, *given[0].shape)
     tip_angle = np.where(mirrored, np.pi - tip_angle, tip_angle)
     return Contact(sign * x, y, sign * slope_angle, arclength, tip_angle, modulus)
@@ -331,10 +408,15 @@ def forward_contacts(wrenches: Floats, rods: Rods) -> Floats:
     from tactile_bayes.mechanics.states import arc_contacts, contacts, profile_contacts
 
     columns, out = np.column_stack([wrenches, rods.curvature]), np.empty((len(wrenches), 6))
+    if rods.stem:
+        columns[:, 1] -= lever_of_stem(rods.stem, columns[:, 0], columns[:, 2], columns[:, 3])
     if rods.profile is None:
         _solve(contacts, arc_contacts, columns, (), (out,))
     else:
         profile_contacts(columns, varied(rods.profile), out)
+    if rods.stem:
+        out[:, 0] += rods.stem * np.cos(columns[:, 0])
+        out[:, 1] += rods.stem * np.sin(columns[:, 0])
     return np.ascontiguousarray(out.T)
 
 

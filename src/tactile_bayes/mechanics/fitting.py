@@ -105,8 +105,8 @@ def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike = 0.0) 
     count = delta.size
     fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
     workspace = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3)), np.empty((3, 3))
-    curvature, profile = rods_of(rods, count)
-    known = plain(reading), np.array(delta), curvature, varied_of(profile)
+    curvature, profile, stem = rods_of(rods, count)
+    known = plain(reading), np.array(delta), curvature, varied_of(profile), stem
     raw_fits(*known, fit, *workspace, contact_workspace())
     return fit
 
@@ -235,7 +235,7 @@ class _Descent:
 
         count, target = len(self._free), self._target
         workspace = Workspace(np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), contact_workspace())
-        of_rods = target.rods.curvature, varied_of(target.rods.profile)
+        of_rods = target.rods.curvature, varied_of(target.rods.profile), target.rods.stem
         known = target.reading, *of_rods, target.whitening, who, np.array(self._free)
         descents(*known, gain, most_steps, self.z, self.misfit, self._normal, self._hardness, workspace)
 

@@ -1,6 +1,6 @@
 """The pose of rods whose properties vary along them, as polynomials, for likelihoods.
 
-All rods of a likelihood have one profile. Its table holds their pose as polynomials in
+All rods of a likelihood have one profile. Its table holds their pose, as seen from where they begin, as polynomials in
 
     tip contact:         ψ1 and f Λ(1)²,
     tangential contact:  s1 and f Λ(s1)², up to the tip, and beyond it: the last series of a phase may go on there,
@@ -45,10 +45,10 @@ _RANGES = _POSE + 3
 _WORST = 1e-5
 """Largest error of the pose with which a table is of use."""
 
-_OUTER = 5, 5, 7
-"""Nodes in a taper, bend and friction angle that vary."""
+_OUTER, _OUTER_OF_BOTH, _BOTH = (5, 5, 7), (5, 5, 12), 0.7
+"""Nodes in a taper, bend and friction angle that vary, also for friction of either sense: angles of a wider range."""
 
-_MOST = max(_OUTER)
+_MOST = max(_OUTER_OF_BOTH)
 
 _NEGLIGIBLE, _AT_ONSET = 2e-7, 100.0
 """Size of terms in these that are left out, and how much smaller it is without a force."""
@@ -150,8 +150,10 @@ def _tabulated(profile: Profile, box: Box, fine: bool) -> ForwardTable:
     if fine:
         rows, (low, high), most = _MOST_ROWS, (-box.friction_angle[1] - _BELOW, _FINE_PSI1), _THRUST
     span = math.log1p(most / _SCALE)
-    shares = [chebyshev.nodes(count if high > low else 1) for count, (low, high) in zip(_OUTER, box, strict=True)]
-    tapers, bends, deltas = (low + (high - low) * z for z, (low, high) in zip(shares, box, strict=True))
+    wide = box.friction_angle[1] - box.friction_angle[0] > _BOTH
+    counts = _OUTER_OF_BOTH if wide else _OUTER
+    shares = [chebyshev.nodes(n if end > begin else 1) for n, (begin, end) in zip(counts, box, strict=True)]
+    tapers, bends, deltas = (begin + (end - begin) * z for z, (begin, end) in zip(shares, box, strict=True))
     outer = tapers.size, bends.size, deltas.size
     slenderness = _slenderness(profile)
     ways, loading = chebyshev.nodes(rows), np.concatenate([[0.0], chebyshev.nodes(_TERMS - 1)])
@@ -233,9 +235,9 @@ def _write_poses(
 
 @cached
 def _write_chords(profile: Profile, distances: Floats, work: Floats, out: Floats) -> None:
-    reach = rest_along(profile, 1.0, work).distance
+    reach = rest_along(profile, 0.0, 1.0, work).distance
     for k in range(distances.size):
-        found = chord_along(profile, distances[k] * reach, work)
+        found = chord_along(profile, 0.0, distances[k] * reach, work)
         out[0, k], out[1, k], out[2, k] = found.arclength, found.bearing, found.slope
 
 

@@ -171,7 +171,7 @@ def approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
     reach = _TOUCHES
     if not below:
         reach = _RUNS_OUT if beyond_low and not beyond_high else _CUTS_PIVOT
-    elif distance < _CLEARANCE:
+    elif distance < beam.stem + _CLEARANCE:
         reach = _TOO_CLOSE
     elif math.hypot(at_tip.x, at_tip.y) >= beam.reach - _ROUNDING:
         reach = _TOO_FAR
@@ -217,7 +217,7 @@ def _turned(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> _Tu
     if frame(at)[1] <= 0.0:
         cuts = not (beyond_high or beyond_low)
         return _Turned(_CUTS_PIVOT if cuts else _TOO_FAR, 1.0 + max(missing, 0.0), nearest, True, distance)
-    if distance < _CLEARANCE:
+    if distance < beam.stem + _CLEARANCE:
         return _Turned(_TOO_CLOSE, 0.0, nearest, True, distance)
     if missing >= 0.0:
         return _Turned(_TOO_FAR, 1.0 + missing, nearest, True, distance)

@@ -68,6 +68,8 @@ class Outline(NamedTuple):
     """Half angle ε of the cone [rad]."""
     narrowing: float
     """Distance less per arc length, sin ε."""
+    reach: float
+    """Lengths of rod and stem, beyond which a contour is cut."""
     table: Floats
     """In rod lengths."""
 
@@ -89,15 +91,16 @@ class Place(NamedTuple):
 @compiled
 def mirrored(outline: Outline) -> Outline:
     """Outline in the frame of the opposite sweep."""
-    left, right, low, high, sign, x, y, standoff, half_angle, narrowing, table = outline
-    return Outline(right, left, -high, -low, -sign, -x, y, standoff, half_angle, narrowing, table)
+    left, right, low, high, sign, x, y, standoff, half_angle, narrowing, reach, table = outline
+    return Outline(right, left, -high, -low, -sign, -x, y, standoff, half_angle, narrowing, reach, table)
 
 
 @compiled
 def from_base(outline: Outline, x: float, y: float) -> Outline:
     """Outline relative to another base."""
-    left, right, low, high, sign, vertex_x, vertex_y, standoff, half_angle, narrowing, table = outline
-    return Outline(left, right, low, high, sign, vertex_x - x, vertex_y - y, standoff, half_angle, narrowing, table)
+    left, right, low, high, sign, vertex_x, vertex_y, standoff, half_angle, narrowing, reach, table = outline
+    x, y = vertex_x - x, vertex_y - y
+    return Outline(left, right, low, high, sign, x, y, standoff, half_angle, narrowing, reach, table)
 
 
 @compiled
@@ -257,7 +260,7 @@ def _end(outline: Outline, outward: float) -> float:
         end = outward * _UPRIGHT
     elif half.kind == POWER_LAW:
         end = outward * half.unit
-        while not outward * place(outline, end).x > 1.0:
+        while not outward * place(outline, end).x > outline.reach:
             end *= 2.0
     else:
         return outline.low if outward < 0.0 else outline.high

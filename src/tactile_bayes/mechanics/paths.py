@@ -226,6 +226,7 @@ def trace(
         compliance=_each(compliance, count),
         rest_curvature=_each(sweep_frame.rest_curvature, count),
         taper=_each(sweep_frame.taper, count),
+        stem=_each(sweep_frame.stem, count),
         offset=np.zeros(count),
         rigidity=np.ones(count),
     )

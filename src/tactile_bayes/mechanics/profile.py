@@ -47,15 +47,17 @@ class Rods(NamedTuple):
     curvature: Floats
     """Rest curvatures of arcs [1/L]; with a profile −1 for a mirrored rod, else 1, shape (n,)."""
     profile: Profile | None = None
+    stem: float = 0.0
+    """Rigid piece between pivot and rod [L]."""
 
     def take(self, where: Index | slice) -> Rods:
-        return Rods(self.curvature[where], self.profile)
+        return self._replace(curvature=self.curvature[where])
 
 
 def rods_of(rods: Rods | ArrayLike, count: int) -> Rods:
     """Return rods from themselves, or from the rest curvatures of arcs."""
-    curvature, profile = rods if isinstance(rods, Rods) else (rods, None)
-    return Rods(np.array(np.broadcast_to(curvature, (count,)), dtype=float), profile)
+    given = rods if isinstance(rods, Rods) else Rods(np.asarray(rods))
+    return given._replace(curvature=np.array(np.broadcast_to(given.curvature, (count,)), dtype=float))
 
 
 def profile_of(rest_curvature: GivenAlong = 0.0, rigidity_profile: GivenAlong = 1.0, taper: float = 0.0) -> Profile:

@@ -1,6 +1,7 @@
 """The shape of a rod of any rest curvature and rigidity: loaded, at rest, and where it is bent most.
 
-Shapes begin at the pivot. At rest the rod lies in the frame of its base, whose direction is that of x.
+Shapes begin where the rod does. At rest it lies in the frame of its base, whose direction is that of x; distances and
+directions are from the pivot, which a rigid stem may keep away from the rod.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class Chord(NamedTuple):
     """Point of a rod at rest, in the frame of its base."""
 
     arclength: float
-    """Arc length from the pivot [L]."""
+    """Arc length from where the rod begins [L]."""
     distance: float
     """Distance from the pivot [L]."""
     bearing: float
@@ -94,9 +95,9 @@ def shape_along(
 
 
 @compiled
-def rest_along(profile: Profile, arclength: float, work: Floats) -> Chord:
+def rest_along(profile: Profile, stem: float, arclength: float, work: Floats) -> Chord:
     """Point of the rod at rest at an arc length."""
-    march = begin(profile, 0.0, FORWARD, _AT_REST)
+    march = begin(profile, 0.0, FORWARD, State(0.0, 0.0, stem, 0.0))
     while march.at < arclength:
         _, march = advance(profile, march, FORWARD, arclength, 0.0, work)
     return _chord(profile, march.at, march.state)
@@ -112,12 +113,13 @@ def beyond_along(profile: Profile, arclength: float, work: Floats) -> tuple[floa
 
 
 @compiled
-def chord_along(profile: Profile, distance: float, work: Floats) -> Chord:
+def chord_along(profile: Profile, stem: float, distance: float, work: Floats) -> Chord:
     """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
 
     The rod is continued beyond its tip as in `contact_along`."""
-    march = begin(profile, 0.0, FORWARD, _AT_REST)
-    found, farthest, at = _AT_REST, 0.0, 0.0
+    beginning = State(0.0, 0.0, stem, 0.0)
+    march = begin(profile, 0.0, FORWARD, beginning)
+    found, farthest, at = beginning, 0.0, 0.0
     while march.at < FARTHEST:
         before = march
         step, march = advance(profile, before, FORWARD, FARTHEST, 0.0, work)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number, check_positive
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.along import Along, along
+from tactile_bayes.mechanics.along import MISS, Along, along
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile, Rods, profile_of
 from tactile_bayes.mechanics.surface import Surface
 
@@ -27,6 +27,9 @@ _MOST_TURN = math.pi
 
 _POINTS = 2001
 """Points of a rod at rest."""
+
+_NEGLIGIBLE = 1e-4
+"""Error of a traced rest curvature over its standard deviation that is negligible."""
 
 LARGEST_STRAIN = 0.1
 """Bending strain up to which a rod is slender and its bending moment is proportional to its curvature."""
@@ -63,13 +66,18 @@ class Rod:
     rest_curvature_deviation : float
         Standard deviation of the mean rest curvature [1/m], if it was measured (`from_shape`): that of the nuisance
         parameter `rest_curvature` in its default prior.
+    stem : float
+        Length of a rigid, straight piece between the pivot and the rod, in the direction of its base [m], as of a
+        clamp that sits on a hinge; at most that of the rod. Drive angle, moment and forces are those at the pivot, and
+        a compliant suspension yields there; arc lengths begin where the rod does. Contact is with the rod alone.
 
     Raises
     ------
     ParameterError
         If length or flexural rigidity is not positive and finite, the diameter is negative or larger than the length,
-        the elastic strain is not positive, a taper is not from 0 to 0.95, a property along the rod is invalid, or the
-        rod at rest curls back toward its base, as an arc of more than a half circle does.
+        the elastic strain is not positive, a taper is not from 0 to 0.95, a stem negative or longer than the rod, a
+        property along the rod is invalid, or the rod at rest curls back toward its pivot, as an arc of more than a half
+        circle does.
 
     Examples
     --------
@@ -90,6 +98,7 @@ class Rod:
     taper: float = 0.0
     rigidity_profile: Any = None
     rest_curvature_deviation: float = 0.0
+    stem: float = 0.0
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
@@ -111,6 +120,8 @@ class Rod:
         object.__setattr__(self, "rest_curvature", along("the rod's rest_curvature", self.rest_curvature, self.length))
         correction = "give zero, for an unknown one, or a positive number [1/m]"
         check_number("the rod's rest_curvature_deviation", self.rest_curvature_deviation, correction, least=0.0)
+        correction = f"give a length [m] from 0, for none, to that of the rod, {self.length:g}"
+        check_number("the rod's stem", self.stem, correction, least=0.0, most=self.length)
         self._refuse_curl()
         square = float(self.length) * float(self.length)
         if not (square > 0.0 and 0.0 < float(self.flexural_rigidity) / square < math.inf):
@@ -125,18 +136,20 @@ class Rod:
             most = _MOST_TURN / self.length
             correction = f"give a number [1/m] between ±{most:.4g}, where the rod is a half circle; 0 if it is straight"
             check_number("the rod's rest_curvature", self.rest_curvature, correction, least=-most, most=most)
-            return
+            if self.stem == 0.0:
+                return
         from scipy.integrate import cumulative_simpson  # takes a while to load
 
         s = np.linspace(0.0, self.length, _POINTS)
-        slope = cumulative_simpson(self.rest_curvature(s), x=s, initial=0.0)
+        bent = self.rest_curvature(s) if isinstance(self.rest_curvature, Along) else self.rest_curvature + 0.0 * s
+        slope = cumulative_simpson(bent, x=s, initial=0.0)
         x, y = (cumulative_simpson(way, x=s, initial=0.0) for way in (np.cos(slope), np.sin(slope)))
-        outward = x * np.cos(slope) + y * np.sin(slope)
+        outward = (self.stem + x) * np.cos(slope) + y * np.sin(slope)
         if np.any(outward[1:] <= 0.0):
             at = s[1:][outward[1:] <= 0.0][0]
             raise ParameterError(
-                f"the rod's rest_curvature lets it curl back toward its base from s = {at:.4g} on, and it is "
-                f"{self.length:.4g} long: give a curvature with which it leads away from the base all along"
+                f"the rod's rest_curvature lets it curl back toward its {'pivot' if self.stem else 'base'} from s = "
+                f"{at:.4g} on, and it is {self.length:.4g} long: give a curvature with which it leads away all along"
             )
 
     def __repr__(self) -> str:
@@ -146,6 +159,7 @@ class Rod:
         deviation = self.rest_curvature_deviation
         more += "" if deviation == 0.0 else f", rest_curvature_deviation={deviation!r}"
         more += "" if self.rigidity_profile is None else f", rigidity_profile={self.rigidity_profile!r}"
+        more += "" if self.stem == 0.0 else f", stem={self.stem!r}"
         return (
             f"Rod(length={self.length!r}, flexural_rigidity={self.flexural_rigidity!r}, "
             f"diameter={self.diameter!r}{more})"
@@ -204,11 +218,13 @@ class Rod:
         diameter: float = 0.0,
         taper: float = 0.0,
         rigidity_profile: Any = None,
+        stem: float = 0.0,
     ) -> Rod:
         """Rod whose rest curvature follows from points traced along it while nothing touches it.
 
         The rest curvature is the posterior mean for a smooth random function of the arc length, an integrated Wiener
-        process; how smooth it is follows from the points (`mechanics.traced`).
+        process; how smooth it is follows from the points (`mechanics.traced`). It is interpolated with an error of a
+        ten-thousandth of its standard deviation.
 
         Parameters
         ----------
@@ -223,7 +239,7 @@ class Rod:
             Length of the rod from the first point on, in the unit of the points, if it goes on beyond the last one, as
             a whisker does whose tip is not to be touched. The rest curvature there goes on with its trend. By default
             the last point is the tip.
-        diameter : float
+        diameter, stem : float
             As in `Rod`, in the unit of the points.
         taper, rigidity_profile
             As in `Rod`.
@@ -250,20 +266,30 @@ class Rod:
 
         traced = traced_rod(x, y, scatter=scatter, length=length)
         whole, rigidity = (1.0, 1.0) if flexural_rigidity is None else (traced.length, flexural_rigidity)
+        s = np.linspace(0.0, 1.0, _POINTS)
+        negligible = _NEGLIGIBLE * traced.deviation(s).min() / max(float(np.abs(traced.rest_curvature(s)).max()), 1.0)
+        curvature = along(
+            "rest_curvature",
+            lambda s: traced.rest_curvature(s / whole) / whole,
+            whole,
+            miss=max(float(negligible), MISS),
+        )
         return cls(
             whole,
             rigidity,
             diameter * whole / traced.length,
-            rest_curvature=lambda s: traced.rest_curvature(s / whole) / whole,
+            rest_curvature=curvature,
             taper=taper,
             rigidity_profile=rigidity_profile,
             rest_curvature_deviation=traced.deviation_of_mean / whole,
+            stem=stem * whole / traced.length,
         )
 
     def mirrored(self, side: ArrayLike) -> Rods:
         """Return the rods of contacts with the sides +1, or −1 where they are mirrored, shape (n,)."""
         side = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
-        return Rods(side * self.arc_curvature) if self.profile is None else Rods(side, self.profile)
+        curvature = side * self.arc_curvature if self.profile is None else side
+        return Rods(curvature, self.profile, self.stem / self.length)
 
     def in_lengths(self) -> Rod:
         """Return the rod in its own units, with a length and a flexural rigidity of 1."""
@@ -278,11 +304,12 @@ class Rod:
             taper=self.taper,
             rigidity_profile=rigidity,
             rest_curvature_deviation=self.rest_curvature_deviation / self.curvature_unit,
+            stem=self.stem / self.length_unit,
         )
 
     def shape_in_words(self, unit: str) -> list[str]:
-        """Return in what the rod differs from a straight, uniform one, given the unit of curvatures."""
-        words = []
+        """Return in what the rod differs from a straight, uniform one, given the unit of curvatures, such as 1/m."""
+        words = [f"stem {self.stem:.4g} {unit.removeprefix('1/')}"] if self.stem else []
         if isinstance(self.rest_curvature, Along):
             ends = self.rest_curvature([0.0, self.length])
             words.append(f"rest curvature {ends[0]:.4g} {unit} at the base to {ends[1]:.4g} {unit} at the tip")
@@ -294,11 +321,11 @@ class Rod:
             words.append(f"rigidity at the tip {float(self.rigidity_profile(self.length)):.4g} of that at the base")
         return words
 
-    def reshaped(self, mean_rest_curvature: float, taper: float) -> Rod:
-        """Return a rod of another mean rest curvature [1/m] and taper."""
+    def reshaped(self, mean_rest_curvature: float, taper: float, stem: float | None = None) -> Rod:
+        """Return a rod of another mean rest curvature [1/m], taper and, if given, stem [m]."""
         more, curvature = mean_rest_curvature - self.mean_rest_curvature, self.rest_curvature
         curvature = curvature.plus(more) if isinstance(curvature, Along) else mean_rest_curvature
-        return replace(self, rest_curvature=curvature, taper=taper)
+        return replace(self, rest_curvature=curvature, taper=taper, stem=self.stem if stem is None else stem)
 
     @property
     def is_uniform(self) -> bool:

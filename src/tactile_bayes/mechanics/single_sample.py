@@ -71,6 +71,7 @@ def descents(
     reading: Reading,
     curvature: Floats,
     varied: Varied | None,
+    stem: float,
     whitening: Floats,
     who: Index,
     free: Index,
@@ -87,7 +88,7 @@ def descents(
     Parameters
     ----------
     reading : Reading
-    curvature, varied
+    curvature, varied, stem
         As in `Rods`.
     whitening : ndarray, shape (n, 3, 3)
         Inverse of the lower triangular root of the covariance of the loads.
@@ -106,7 +107,7 @@ def descents(
     count, inverse, slopes, trial = free.size, workspace.inverse, workspace.slopes, workspace.trial
     for j in range(who.size):
         i = who[j]
-        beam = mirrored_by(curvature[i], varied)
+        beam = mirrored_by(curvature[i], varied, stem)
         for _ in range(max(steps, 1)):
             settled = steps == 0
             for k in range(4):
@@ -171,6 +172,7 @@ def raw_fits(
     delta: Floats,
     curvature: Floats,
     varied: Varied | None,
+    stem: float,
     out: RawFit,
     z: Floats,
     errors: Floats,
@@ -183,7 +185,7 @@ def raw_fits(
     for i in range(delta.size):
         angle, moment = reading.drive_angle[i], reading.loads[i, 0]
         force_x, force_y = reading.loads[i, 1], reading.loads[i, 2]
-        beam = mirrored_by(curvature[i], varied)
+        beam = mirrored_by(curvature[i], varied, stem)
         found = contact_of(beam, angle, moment, force_x, force_y, delta[i])
         for k in range(4):
             out.place[i, k] = found[k]

@@ -24,7 +24,7 @@ from tactile_bayes.mechanics.arc import (
     chord_direction_rate,
 )
 from tactile_bayes.mechanics.arc_states import Found, arc_contact
-from tactile_bayes.mechanics.beam import Beam, Varied, mirrored_by, with_sign
+from tactile_bayes.mechanics.beam import Beam, Varied, lever_of_stem, mirrored_by, with_sign
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.continuation import NOWHERE, Start, State, continued_state, unloaded_arc
@@ -175,7 +175,7 @@ def continued_wrenches(
     """
     for i in range(columns.shape[0]):
         x, y, alpha, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
-        beam = mirrored_by(columns[i, 4], varied)
+        beam = mirrored_by(columns[i, 4], varied, 0.0)
         sin, cos = math.sin(alpha + delta), math.cos(alpha + delta)
         u, v = x * cos + y * sin, y * cos - x * sin
         out[i] = math.nan
@@ -252,7 +252,15 @@ def contacts(columns: Floats, out: Floats) -> None:
 @compiled
 def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
     """Contact of any rod that follows from a base wrench, as `contact`."""
-    return _contact_of(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
+    h = beam.stem
+    if h == 0.0:
+        return _contact_of(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
+    moment -= lever_of_stem(h, phi0, fx, fy)
+    x, y, slope_angle, arclength, tip_angle, modulus = _contact_of(
+        beam.varied, beam.curvature, phi0, moment, fx, fy, delta
+    )
+    x, y = x + h * math.cos(phi0), y + h * math.sin(phi0)
+    return Found(x, y, slope_angle, arclength, tip_angle, modulus)
 
 
 @compiled
@@ -271,7 +279,7 @@ def _contact_of(
 def profile_contacts(columns: Floats, varied: Varied, out: Floats) -> None:
     """Write contacts of a rod with a profile as `contacts` does; the last column is −1 for the mirrored rod, else 1."""
     for i in range(columns.shape[0]):
-        beam = mirrored_by(columns[i, 5], varied)
+        beam = mirrored_by(columns[i, 5], varied, 0.0)
         found = contact_of(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
         for k in range(6):
             out[i, k] = found[k]

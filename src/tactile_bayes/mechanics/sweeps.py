@@ -81,6 +81,8 @@ class Sweeps(NamedTuple):
     """Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]; with a profile, what is added to its own."""
     taper: Floats
     """Taper, for rods with a profile."""
+    stem: Floats
+    """Rigid piece between pivot and rod [L]."""
     offset: Floats
     """Encoder offset in the laboratory frame [rad]."""
     rigidity: Floats
@@ -175,7 +177,8 @@ def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
     standoff = sweep.standoff / length
     half_angle = math.atan(standoff * sweep.taper)
     sin, cos = math.sin(half_angle), math.cos(half_angle)
-    outline = Outline(left, right, low, right.size, 1.0, x, y, standoff * cos, half_angle, sin, table)
+    reach = 1.0 + sweep.stem
+    outline = Outline(left, right, low, right.size, 1.0, x, y, standoff * cos, half_angle, sin, reach, table)
     return mirrored(outline) if sweep.backward else outline
 
 
@@ -194,7 +197,7 @@ def _scene(
     offset = sign * sweep.offset if line is None else 0.0  # it is in the lines
     rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, sweep.rigidity)
     outline = _outline(shapes, sweep, table)
-    beam = _beam(varied, known, sweep, sign, sweep.friction_angle - outline.half_angle)
+    beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
     return Scene(outline, beam, rig, exact, line)
 
 
@@ -210,14 +213,20 @@ def _place_lines(lines: Floats | None, sweep: Any, room: Floats | None) -> None:
 
 
 @compiled
-def _beam(varied: Varied | None, table: ForwardTable, sweep: Any, sign: float, lean: float) -> Beam:
-    """Rod of a sweep; −ψ1 in tangential contact is wanted from its table."""
+def _beam(
+    varied: Varied | None, table: ForwardTable, sweep: Any, sign: float, half_angle: float, may_slip_back: bool
+) -> Beam:
+    """Rod of a sweep, with coefficients for its friction, and for friction of the other sense if that may act."""
     if varied is None:
-        return beam_of(sign * sweep.rest_curvature, varied)
+        return beam_of(sign * sweep.rest_curvature, varied, sweep.stem)
     edges, curvature, rigidity, _, bend, _ = varied.profile
     room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
-    slenderness = table.slenderness if prepare(table, room, lean, varied.sheet) else 0.0
-    return beam_of(0.0, Varied(room, varied.work, varied.sheet, slenderness, sign))
+    angle, own, other = sweep.friction_angle, varied.sheet, varied.other_sheet
+    slenderness = table.slenderness if prepare(table, room, angle - half_angle, own) else 0.0
+    otherwise = 0.0
+    if may_slip_back and angle > 0.0 and slenderness > 0.0 and prepare(table, room, -angle - half_angle, other):
+        otherwise = table.slenderness
+    return beam_of(0.0, Varied(room, varied.work, own, slenderness, sign, other, otherwise), sweep.stem)
 
 
 @cached

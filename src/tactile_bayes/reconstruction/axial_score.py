@@ -12,6 +12,7 @@ from tactile_bayes.mechanics.contact_coordinates import (
     contact_states,
     contact_states_and_slopes,
 )
+from tactile_bayes.mechanics.elastica import lever_of_stem
 from tactile_bayes.mechanics.fitting import fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.reconstruction.constrained import principal_steps
@@ -40,17 +41,25 @@ def axial_score(samples: Samples, friction: float) -> float:
 
 
 def _of_arcs(samples: Samples, friction: float) -> tuple[Floats, Floats]:
-    """Difference by the first integral at the pivot, and its variance, shape (n,)."""
-    reading, rest = samples.reading, samples.rods.curvature
+    """Difference by the first integral where the rod begins, and its variance, shape (n,)."""
+    reading, rest, stem = samples.reading, samples.rods.curvature, samples.rods.stem
     moment, force_x, force_y = reading.loads.T
     cos, sin = np.cos(reading.drive_angle), np.sin(reading.drive_angle)
     force = np.hypot(force_x, force_y)
     drag = friction / np.hypot(1.0, friction)
     moment_variance = reading.covariance[:, 0, 0]
+    if stem:
+        moment = moment - lever_of_stem(stem, reading.drive_angle, force_x, force_y)
+        arm = np.stack([np.ones_like(cos), stem * sin, -stem * cos], axis=1)
+        moment_variance = np.einsum("ni,nij,nj->n", arm, reading.covariance, arm)
     surplus = force_x * cos + force_y * sin + drag * force - 0.5 * (moment**2 - moment_variance)
     surplus += rest * moment
     slopes = np.stack([rest - moment, cos + drag * force_x / force, sin + drag * force_y / force], axis=1)
-    by_angle = force_y * cos - force_x * sin + np.sum(slopes * reading.leaning, axis=1)
+    by_angle = force_y * cos - force_x * sin
+    if stem:
+        by_angle += stem * slopes[:, 0] * (force_y * sin + force_x * cos)
+        slopes = slopes + slopes[:, :1] * (arm - [1.0, 0.0, 0.0])
+    by_angle += np.sum(slopes * reading.leaning, axis=1)
     variance = np.einsum("ni,nij,nj->n", slopes, reading.covariance, slopes)
     variance += (by_angle * reading.angle_deviation) ** 2
     return surplus, variance

@@ -24,7 +24,7 @@ _QUANTITY = re.compile(
     r"(?:(?P<brackets>\[[^\[\]]*\])|(?P<unit>[^\W\d].*|°))?"
 )
 
-_SHAPE = ("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviation")
+_SHAPE = ("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviation", "stem")
 """What makes a rod another than a straight, uniform one."""
 
 _POINTS, _SAME = 101, 1e-9

@@ -169,6 +169,7 @@ ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
         "rod_rest_curvature_deviation": "1/m",
         "rod_taper": "1",
         "rod_rigidity_profile": "1",
+        "rod_stem": "m",
         **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
     }
 )

@@ -124,7 +124,8 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     slope = np.where(loaded, states.wrench.drive_angle, angle_in_sweep_frame)
     wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))
     sign = np.where(mirrored, -1.0, 1.0)
-    x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rod.mirrored(sign))
+    rods = rod.mirrored(sign)._replace(stem=rod.stem / rod.length + float(np.ravel(rig.stem)[0]))
+    x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rods)
     loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
     base_x, base_y = (record[name].values[samples] for name in ("base_x", "base_y"))
     of_sample = likelihood.segment_of_sample

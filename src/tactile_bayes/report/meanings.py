@@ -39,6 +39,7 @@ _MEANINGS = {
     "backlash": "encoder reading in forward motion less that in backward motion",
     "friction": "Coulomb's coefficient",
     "rest_curvature": "mean curvature of the unloaded rod",
+    "stem": "length of the rigid piece between pivot and rod",
     "taper": "part of its diameter that the rod loses toward its tip",
     "suspension_compliance": "rotation of the pivot per holding moment",
     "gap width": "width of the arc that no sweep touches",

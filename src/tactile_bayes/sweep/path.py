@@ -102,6 +102,7 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
             raise ReachError(
                 f"the contour is out of reach: its nearest point is {paths.distance[0] * rod.length:.6g} from the "
                 f"pivot at ({base[0]:g}, {base[1]:g}), and the rod is {rod.length:g} long"
+                + (f", on a stem of {rod.stem:g}" if rod.stem else "")
             )
         case Reachability.CUTS_PIVOT if paths.lines is not None:
             raise ContourError(f"{sweep} the contour cuts the way of the base: raise the contour or lower the drive")
@@ -114,8 +115,8 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
             of_drive = "way of the base" if paths.lines is not None else f"pivot at ({base[0]:g}, {base[1]:g})"
             raise ContourError(
                 f"the contour comes within {paths.distance[0] * rod.length:.6g} of the {of_drive}; a path can be "
-                f"followed from {CLEARANCE * rod.length:g} on ({CLEARANCE:.0%} of the rod's length): move one of them "
-                "away"
+                f"followed from {CLEARANCE * rod.length + rod.stem:g} on ({CLEARANCE:.0%} of the rod's length"
+                f"{', beyond the stem, on which contact is not modelled' if rod.stem else ''}): move one of them away"
             )
         case Reachability.ENDS:
             raise ContourError(
@@ -184,6 +185,7 @@ def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direc
         np.array([direction == "backward"]),
         rod.arc_curvature,
         rod.taper,
+        rod.stem / rod.length,
     )
 
 

@@ -181,6 +181,7 @@ def _wrench(locus: Locus, rod: Rod, friction: float, side: float) -> Wrench:
             alpha + surface.half_angle,
             surface.friction_angle(friction_angle_of(friction)),
             rest_curvature=side * rod.arc_curvature,
+            stem=rod.stem / rod.length,
             profile=None if rod.profile is None else rod.profile._replace(sign=side),
         )
         moved = np.abs(np.where(wrench.phase == NONE, arclength, wrench.contact_arclength) - arclength)

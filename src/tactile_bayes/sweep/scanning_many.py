@@ -112,6 +112,7 @@ def scan_many(
         backward,
         rod.arc_curvature,
         rod.taper,
+        rod.stem / rod.length,
     )
     in_sweep_frame = np.pi - angles if direction == "backward" else angles
     paths = trace(

@@ -21,7 +21,6 @@ from tactile_bayes.mechanics.contact_coordinates import (
     contact_states,
 )
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.profile import Rods
 from tactile_bayes.mechanics.surface import Surface
 from tactile_bayes.reconstruction import Samples
 from tactile_bayes.record import turned
@@ -129,9 +128,9 @@ class ContactDensity:
 
     def _states(self, coordinates: Floats) -> ContactStates:
         """Return contacts from coordinates, shape (..., n, 4), one after the other."""
-        curvature, profile = self.samples.rods
-        each = np.broadcast_to(curvature, coordinates.shape[:-1]).ravel()
-        return contact_states(coordinates.reshape(-1, 4), self.delta, Rods(each, profile))
+        rods = self.samples.rods
+        each = np.broadcast_to(rods.curvature, coordinates.shape[:-1]).ravel()
+        return contact_states(coordinates.reshape(-1, 4), self.delta, rods._replace(curvature=each))
 
     def to_lab_frame(self, contact: Floats) -> Floats:
         """Return contacts on the object's surface, in the laboratory frame and the record's units, (4, ..., n)."""
