@@ -20,7 +20,7 @@ _ROUNDING = 1e-6
 _SAMPLES_PER_PARAMETER = 2
 """Least number of loaded samples for each parameter."""
 
-_NOT_LINEAR = ("rest_curvature", "taper", "drift", "moment_curve")
+_NOT_LINEAR = ("rest_curvature", "taper", "stem", "drift", "moment_curve")
 """Parts of the names of parameters by which the axial force does not follow from a sample's moment in this form."""
 
 
@@ -28,8 +28,8 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
     """Return the rig for which the axial forces of tangential contacts agree with their moments.
 
     In tangential contact the axial component of the reaction follows from the moment, whatever the contour is:
-    fAx cos φ0 + fAy sin φ0 = m0²/(2 EI) − f sin δ, with the contact force f and the angle of friction δ; it is the first
-    integral of the elastica at the pivot and at the contact (Love 1927, A Treatise on the Mathematical Theory of
+    fAx cos φ0 + fAy sin φ0 = m0²/(2 EI) − f sin δ, with the contact force f and the angle of friction δ. This is the
+    first integral of the elastica at the pivot and at the contact (Love 1927, A Treatise on the Mathematical Theory of
     Elasticity, § 262). Of a sample's four numbers one is thus redundant, which determines stiffness, encoder, lever,
     zeros and friction where loads are large. Tip contacts deviate, and have little weight.
 
@@ -42,8 +42,8 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
     Returns
     -------
     dict of str to float, or None
-        Nuisance parameters by name, in the record's units. None if the rod is curved, tapered or carried, if a channel
-        is missing, or if few samples are loaded.
+        Nuisance parameters by name, in the record's units. None if the rod is curved, tapered, carried or has a stem,
+        if a channel is missing, or if few samples are loaded.
     """
     names, likelihood = model.nuisances.names, model.likelihood
     rod = likelihood.rod
@@ -54,6 +54,7 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
         or carried_sweeps(model.measured)
         or not rod.is_uniform
         or rod.mean_rest_curvature != 0.0
+        or rod.stem > 0.0
         or any(part in name for name in names for part in _NOT_LINEAR)
     ):
         return None
