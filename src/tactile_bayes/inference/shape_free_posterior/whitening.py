@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -52,6 +53,10 @@ class Whitening:
         arrays = (*self.approximation.arrays, self.scales, vanishing, self.mean, self.root)
         return hashlib.sha256(b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in arrays)).hexdigest()
 
+    @cached_property
+    def _log_volume(self) -> float:
+        return float(np.linalg.slogdet(self.root).logabsdet)
+
     @property
     def middle(self) -> Floats:
         """Approximate centre of the posterior, shape (coordinates,)."""
@@ -97,6 +102,6 @@ class Whitening:
         linear = np.linalg.solve(np.swapaxes(root, 1, 2), (pulled + normal)[..., None])[..., 0]
         linear[:, 0] = np.clip(linear[:, 0], -_LARGEST, _LARGEST)
         volume = np.log(scales).sum(axis=1) - np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1) + growth
-        volume += np.linalg.slogdet(self.root).logabsdet
+        volume += self._log_volume
         volume[(np.abs(away) > _FAR).any(axis=1)] = -np.inf
         return joined(self.approximation.model, scales, np.asarray(linear)), linear[:, 0] + volume
