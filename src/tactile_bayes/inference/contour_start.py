@@ -25,8 +25,8 @@ from tactile_bayes.inference.ensembles import (
     approximate,
     in_coordinates,
     learn_coordinates,
-    pilot_normal,
     scatter_walkers,
+    standardise,
 )
 from tactile_bayes.inference.flank_coordinates import FlankCoordinates
 from tactile_bayes.inference.misfit import what_to_try
@@ -56,10 +56,6 @@ _EFFICIENT = 0.35
 _FLANK_EFFICIENCY = 0.4
 """Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred:
 a ridge that bends beyond the draws of the importance sampling looks straight."""
-
-_MAX_PILOTS, _CENTRED = 5, 0.7
-"""Largest number of pilot runs that standardise whitened coordinates, and the distance of their mean from zero, in
-standard deviations, below which no further one is made if their covariance is one."""
 
 _PILOT_WALKERS = 6
 """Largest number of walkers per parameter in the pilot run that learns coordinates."""
@@ -166,18 +162,8 @@ def _whitened_around(
     )
     # If posteriors are standard normal in these coordinates, their evidences differ as their densities at the centre.
     log_evidence = float(log_probability(whitening.middle[None])[0])
-    positions = start[0]
-    for _ in range(_MAX_PILOTS):
-        if deadline.has_passed:
-            break
-        rest = slice(whitening.bent, None)
-        density = in_coordinates(model.log_probability, whitening)
-        mean, root, positions = pilot_normal(density, whitening.moves(), positions, rest, rng, deadline)
-        whitening = whitening.standardised(mean, root)
-        for points in (start, positions):
-            points[..., rest] = np.linalg.solve(root, (points[..., rest] - mean)[..., None])[..., 0]
-        if np.linalg.norm(mean) < _CENTRED and np.array_equal(root, np.eye(len(root))):
-            break
+    rest = slice(whitening.bent, None)
+    whitening, start = standardise(model.log_probability, whitening, start, rest, rng, deadline)
     return Walk(start, whitening, log_evidence)
 
 

@@ -26,7 +26,7 @@ from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithm
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.modes import Mode
 from tactile_bayes.inference.ensembles.moves import whitened_moves
-from tactile_bayes.inference.ensembles.pilot import learn_coordinates, pilot_normal
+from tactile_bayes.inference.ensembles.pilot import learn_coordinates, standardise
 from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends, Mixture, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
@@ -51,11 +51,11 @@ __all__ = [
     "approximate",
     "in_coordinates",
     "learn_coordinates",
-    "pilot_normal",
     "sample",
     "scatter_walkers",
     "seed_sequence",
     "settings_of",
     "spawn",
+    "standardise",
     "whitened_moves",
 ]

@@ -11,7 +11,7 @@ from tactile_bayes.inference.ensembles.moves import Moves, standard_moves
 from tactile_bayes.inference.ensembles.proposal import Mixture
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["Coordinates", "Logarithms", "Plain", "Proposing", "in_coordinates"]
+__all__ = ["Coordinates", "Logarithms", "Plain", "Proposing", "Standardising", "in_coordinates"]
 
 
 class Coordinates(Protocol):
@@ -39,6 +39,13 @@ class Proposing(Coordinates, Protocol):
 
     def with_proposal(self, proposal: Mixture) -> Self:
         """Return the same coordinates with another proposal."""
+
+
+class Standardising(Coordinates, Protocol):
+    """Coordinates, all but the first of which are nearly standard normal."""
+
+    def standardised(self, mean: Floats, root: Floats) -> Self:
+        """Return the coordinates in which these have been standardised by a mean, (k,), and a root, (k, k)."""
 
 
 class Plain:

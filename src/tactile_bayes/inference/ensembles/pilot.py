@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.block import Block, make_block
-from tactile_bayes.inference.ensembles.coordinates import Proposing, in_coordinates
+from tactile_bayes.inference.ensembles.coordinates import Proposing, Standardising, in_coordinates
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time
 from tactile_bayes.inference.ensembles.moves import Moves
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
@@ -18,16 +19,19 @@ from tactile_bayes.inference.ensembles.straightened import Straightened
 from tactile_bayes.inference.ensembles.target import LogProbability
 from tactile_bayes.inference.ensembles.walkers import RandomState, first_random_state
 
-__all__ = ["learn_coordinates", "pilot_normal"]
+__all__ = ["learn_coordinates", "standardise"]
+
+Base = TypeVar("Base", bound=Standardising)
 
 _STEPS = (60, 120, 240, 480, 960)
 """Number of steps of each stage, which samples in the best coordinates so far."""
 
-_STEPS_OF_NORMAL = 40
-"""Number of steps of a pilot run in coordinates that are nearly standard normal."""
+_STEPS_OF_NORMAL = (40, 80, 160, 320)
+"""Number of steps of each pilot run in coordinates that are nearly standard normal."""
 
-_MOVES_PER_DRAW = 4.0
-"""Number of accepted moves of a walker there after which its position is a draw of its own."""
+_GOOD_GAIN, _GOOD_MOVING = 0.3, 0.55
+"""Gain of mean log-density by a further change of these coordinates, and share of the steps that move a walker, below
+and above which no further run is made."""
 
 _MAX_DRAWS = 3000
 """Largest number of draws from each half of the walkers to which the coordinates of a stage are fitted."""
@@ -98,48 +102,98 @@ def learn_coordinates(
     return best
 
 
-def pilot_normal(
-    density: LogProbability,
-    moves: Moves,
+def standardise(
+    log_probability: LogProbability,
+    base: Base,
     start: Floats,
     columns: slice,
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
-) -> tuple[Floats, Floats, Floats]:
-    """Return mean, (k,), and root, (k, k), of the covariance of some coordinates, and last positions, (walkers, d).
+) -> tuple[Base, Floats]:
+    """Return coordinates that are nearer to standard normal ones than the base's nearly normal ones are, and the start.
 
-    These coordinates should be nearly standard normal: of the covariance only principal axes count whose variances
-    differ from one by more than the number of draws explains (Marchenko & Pastur 1967, doi
-    10.1070/SM1967v001n04ABEH001994), less the bias of their size (Baik & Silverstein 2006, doi
-    10.1016/j.jmva.2005.08.003).
+    Each of some pilot runs samples in the coordinates so far, and these are standardised by mean and covariance of its
+    second half.
 
     Parameters
     ----------
-    density : callable
-        Log-density of coordinates, (n, d) to (n,).
-    moves : sequence of moves with their shares
-    start : ndarray, shape (walkers, d)
-        Starting points of an even number of walkers, in coordinates.
+    log_probability : callable
+        Log-density of parameters, (n, d) to (n,).
+    base : Standardising coordinates
+    start : ndarray, shape (ensembles, walkers, d)
+        Starting points of even numbers of walkers, in the base's coordinates.
     columns : slice
-        The k coordinates.
+        The coordinates that are nearly standard normal.
     rng : np.random.Generator
     deadline : Deadline
-        After it, the walkers make one more step.
+        After it, the walkers make one more step, and there is no further run.
     """
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
-    block = _pilot(density, moves, start, _STEPS_OF_NORMAL, random, deadline)
-    late = block.samples[:, block.steps // 2 :, :, columns]
-    draws = late.reshape(-1, late.shape[-1])
-    variances, axes = np.linalg.eigh(np.cov(draws.T))
-    moves_of_walker = np.mean(np.any(np.diff(late[0], axis=0) != 0.0, axis=-1)) * late.shape[1]
-    independent = late.shape[2] * max(1.0, moves_of_walker / _MOVES_PER_DRAW)
-    ratio = variances.size / independent
-    unlike = np.abs(np.sqrt(variances) - 1.0) > np.sqrt(ratio)
-    variances, axes = variances[unlike], axes[:, unlike]
-    twice = variances + 1.0 - ratio
-    true = 0.5 * (twice + np.sign(variances - 1.0) * np.sqrt(np.maximum(twice**2 - 4.0 * variances, 0.0)))
-    root = np.eye(draws.shape[1]) + axes * (np.sqrt(true) - 1.0) @ axes.T
-    return draws.mean(axis=0), root, block.samples[0, -1]
+    best, start, points = base, start.copy(), start[0]
+    for steps in _STEPS_OF_NORMAL:
+        if deadline.has_passed:
+            break
+        density = in_coordinates(log_probability, best)
+        block = _pilot(density, best.moves(), points, steps, random, deadline)
+        (random,), points = block.random_states, block.samples[0, -1].copy()
+        late = np.swapaxes(block.samples[0, block.steps // 2 :], 0, 1)
+        normal, gain = _cross_validated(late[..., columns])
+        best = best.standardised(normal.mean, normal.root)
+        for each in (start, points):
+            each[..., columns] = normal.standard(each[..., columns])
+        moving = np.mean(np.any(np.diff(late, axis=1) != 0.0, axis=-1))
+        if moving > _GOOD_MOVING and gain < _GOOD_GAIN:
+            break
+    return best, start
+
+
+class _Normal(NamedTuple):
+    """Normal distribution of coordinates that should be nearly standard normal."""
+
+    mean: Floats
+    """Shape (k,)."""
+    root: Floats
+    """Root of the covariance, shape (k, k)."""
+
+    @classmethod
+    def fitted(cls, draws: Floats, independent: float) -> _Normal:
+        """Return the distribution fitted to draws, (n, k), as many of which as said are independent.
+
+        Of their covariance only principal axes count whose variances differ from one by more than the number of draws
+        explains (Marchenko & Pastur 1967, doi 10.1070/SM1967v001n04ABEH001994), less the bias of their size (Baik &
+        Silverstein 2006, doi 10.1016/j.jmva.2005.08.003).
+        """
+        variances, axes = np.linalg.eigh(np.cov(draws.T))
+        ratio = variances.size / independent
+        unlike = np.abs(np.sqrt(variances) - 1.0) > np.sqrt(ratio)
+        variances, axes = variances[unlike], axes[:, unlike]
+        twice = variances + 1.0 - ratio
+        true = 0.5 * (twice + np.sign(variances - 1.0) * np.sqrt(np.maximum(twice**2 - 4.0 * variances, 0.0)))
+        return cls(draws.mean(axis=0), np.eye(draws.shape[1]) + axes * (np.sqrt(true) - 1.0) @ axes.T)
+
+    def gain(self, draws: Floats) -> float:
+        """Return by how much the mean log-density of draws, (n, k), exceeds that of the standard normal one."""
+        squares = np.mean(np.sum(draws**2 - self.standard(draws) ** 2, axis=1))
+        return float(0.5 * squares - np.linalg.slogdet(self.root).logabsdet)
+
+    def standard(self, points: Floats) -> Floats:
+        """Return points, (…, k), standardised by this distribution."""
+        return np.asarray(np.linalg.solve(self.root, (points - self.mean)[..., None])[..., 0])
+
+
+def _cross_validated(draws: Floats) -> tuple[_Normal, float]:
+    """Return a normal distribution fitted to draws of walkers, (walkers, steps, k), and its gain for others than these.
+
+    How many of the draws are independent is the number with which a fit to each half of the walkers suits the other
+    half best.
+    """
+    halves = [half.reshape(-1, draws.shape[-1]) for half in np.array_split(draws, 2)]
+    gains = {}
+    for number in len(draws) * 2.0 ** np.arange(-1, 8):
+        fits = [_Normal.fitted(half, 0.5 * number) for half in halves]
+        gains[number] = float(np.mean([fit.gain(other) for fit, other in zip(fits, halves[::-1], strict=True)]))
+    best = max(gains, key=gains.__getitem__)
+    return _Normal.fitted(np.concatenate(halves), best), gains[best]
 
 
 def _pilot(

@@ -17,6 +17,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import certainly_loaded
 from tactile_bayes.inference.discrepancy import load_in_contact
 from tactile_bayes.inference.nuisances import MAY_VANISH
+from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
 from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import CHANNELS
 
@@ -188,7 +189,8 @@ class NormalApproximation:
     """Normal distribution of the linear parameters, given amplitude and length scale of the random radius, and noise.
 
     It is exact if loads and snap-offs are linear in the logarithms of the radii and in the rig, and priors are normal.
-    Its dependence on the length scale is tabulated at those of the random radius, and interpolated. Parameters that may
+    Loads are rather linear in parameters with the vertex moved by `bent`, if what the record touches is beside it. The
+    dependence on the length scale is tabulated at those of the random radius, and interpolated. Parameters that may
     vanish, like friction, have the positive part of the distribution alone.
 
     Parameters
@@ -209,7 +211,11 @@ class NormalApproximation:
         self._smooth = _SmoothNoise.at(observer, joined(observer.model, scales[None], linear[None]))
         known, self._count = family.radius.directions, family.radius.count
         self.vanishing = int(np.count_nonzero(observer.model.may_vanish))
-        slopes, self._observed, self._kinds, self._readings = _linearised(observer, family, prior, scales, linear)
+        self._radius = family.radius
+        centre = self._log_radius(scales[None], linear[None])[0]
+        slopes, self._observed, self._kinds, self._readings = _linearised(
+            observer, prior, scales, np.append(centre, linear[1 + self._count :])
+        )
         # The map from linear parameters to observations, at every length scale of the tabulated directions.
         nodes = known.values.shape[1]
         through = np.empty((len(known.values), linear.size, len(slopes)))
@@ -217,13 +223,36 @@ class NormalApproximation:
         through[:, 1 : 1 + self._count] = np.swapaxes(slopes[:, :nodes] @ known.values, 1, 2)
         through[:, 1 + self._count :] = slopes[:, nodes:].T
         self._through = CubicSpline(known.log_lengths, through)
+        _, root = self.conditional(scales[None])
+        deviations = solve_triangular(root[0], np.eye(linear.size), lower=True)  # a row for each direction
+        radii = self._log_radius(np.tile(scales, (linear.size, 1)), deviations)
+        self._anchor = Anchor.best(centre, radii, deviations[:, self._vertex])
+
+    @property
+    def _vertex(self) -> slice:
+        return slice(1 + self._count, 3 + self._count)
+
+    def _log_radius(self, scales: Floats, linear: Floats) -> Floats:
+        """Return log-radii at the nodes, (n, nodes), from scales (n, scales) and linear parameters (n, d)."""
+        return self._radius.log_radius(linear[:, 0], scales[:, 0], scales[:, 1], linear[:, 1 : 1 + self._count])
+
+    def bent(self, scales: Floats, linear: Floats, *, back: bool = False) -> Floats:
+        """Return linear parameters, (n, d), with the vertex where the contour's anchor is as a linear map has it.
+
+        With `back`, return those of which this makes the given ones.
+        """
+        beyond = self._anchor.beyond_line(self._log_radius(scales, linear))
+        bent = linear.copy()
+        bent[:, self._vertex] += beyond if back else -beyond
+        return bent
 
     @property
     def arrays(self) -> tuple[Floats, ...]:
-        """Arrays that determine `conditional`."""
+        """Arrays that determine `conditional` and `bent`."""
         size, step, longest = self._smooth
         smooth = [np.array([*size, step, longest])] if self.model.noise.of_discrepancy else []
-        return self._through.c, self._observed, *self.prior, *smooth
+        anchor = (np.array([self._anchor.slope_angle]), self._anchor.centre)
+        return self._through.c, self._observed, *self.prior, *smooth, *anchor
 
     def conditional(self, scales: Floats) -> tuple[Floats, Floats]:
         """Return L⁻¹b, (n, d), and L, (n, d, d), given scales (n, scales): precision L·Lᵀ and mean L⁻ᵀL⁻¹b."""
@@ -300,23 +329,21 @@ def _huber(residual: Floats) -> Floats:
 
 
 def _linearised(
-    observer: Observer, family: ShapeFreeFamily, prior: LinearPrior, scales: Floats, linear: Floats
+    observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats
 ) -> tuple[Floats, Floats, Index, Floats]:
     """Return the linearised observations: as few combinations of readings and snap-offs as carry all information.
 
-    These are their slopes over radii at the nodes and the other parameters, (observations, k); their values at zero
-    parameters, (observations,), with the noise of the scales; their kinds of noise, the last being that of snap-offs;
-    and the number of readings of each other kind.
+    The centre, (k,), has the logarithms of the radii at the nodes, and the other parameters. Returned are the slopes
+    over these, (observations, k); values at zero parameters, (observations,), with the noise of the scales; kinds of
+    noise, the last being that of snap-offs; and the number of readings of each other kind.
     """
-    model, radius = observer.model, family.radius
-    nodes, count = radius.nodes, radius.count
-    log_radius = radius.log_radius(linear[:1], scales[:1], scales[1:2], linear[None, 1 : 1 + count])[0]
-    centre = np.concatenate([log_radius, linear[1 + count :]])
-    units = np.append(np.ones(nodes), prior.precision[1 + count :] ** -0.5)
+    model = observer.model
+    rig = linear_names(model)[prior.mean.size - len(model.nuisances.names) :]
+    nodes = centre.size - 2 - len(rig)
+    units = np.append(np.ones(nodes), prior.precision[-2 - len(rig) :] ** -0.5)
     steps = _STEP * units
     points = np.concatenate([centre + np.diag(steps), centre - np.diag(steps), centre[None]])
     contours = Smooth(points[:, :nodes], q=points[:, nodes], x_c=points[:, nodes + 1])
-    rig = linear_names(model)[count + 3 :]
     residual, agree, late = observer(contours, dict(zip(rig, points[:, nodes + 2 :].T, strict=True)))
     # A sample that is loaded on one side of a difference only has no slope.
     smooth = agree[-1] & (agree == agree[-1]).all(axis=0)

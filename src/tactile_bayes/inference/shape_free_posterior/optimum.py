@@ -53,8 +53,9 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
     for _ in range(_ROUNDS):
         approximation = NormalApproximation(observer, prior, scales, linear)
         scales = _likeliest(model, approximation, scales)
-        tried = linear + _SHORTER[:, None] * (approximation.mean(scales) - linear)
-        density = observer.log_density(joined(model, np.tile(scales, (len(tried), 1)), tried))
+        several = np.tile(scales, (_SHORTER.size, 1))
+        tried = approximation.bent(several, linear + _SHORTER[:, None] * (approximation.mean(scales) - linear))
+        density = observer.log_density(joined(model, several, tried))
         density -= 0.5 * (np.square(tried - prior.mean) * prior.precision).sum(axis=1)
         linear, before, best = tried[np.argmax(density)], best, float(density.max())
         if best - before < _GAINED or deadline.has_passed:

@@ -77,6 +77,7 @@ class Whitening:
     def of(self, points: Floats) -> Floats:
         """Return the coordinates of the model's parameters, (n, parameters)."""
         scales, linear = split(self.approximation.model, points)
+        linear = self.approximation.bent(scales, linear, back=True)
         pulled, root = self.approximation.conditional(scales)
         normal = (np.swapaxes(root, 1, 2) @ linear[..., None])[..., 0] - pulled
         numbers = self.approximation.untruncated(pulled, root, normal)
@@ -99,9 +100,10 @@ class Whitening:
         pulled, root = self.approximation.conditional(scales)
         numbers = self.mean + coordinates[:, bent:] @ self.root.T
         normal, growth = self.approximation.truncated(pulled, root, numbers)
-        linear = np.linalg.solve(np.swapaxes(root, 1, 2), (pulled + normal)[..., None])[..., 0]
+        linear = np.asarray(np.linalg.solve(np.swapaxes(root, 1, 2), (pulled + normal)[..., None])[..., 0])
         linear[:, 0] = np.clip(linear[:, 0], -_LARGEST, _LARGEST)
+        linear = self.approximation.bent(scales, linear)
         volume = np.log(scales).sum(axis=1) - np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1) + growth
         volume += self._log_volume
         volume[(np.abs(away) > _FAR).any(axis=1)] = -np.inf
-        return joined(self.approximation.model, scales, np.asarray(linear)), linear[:, 0] + volume
+        return joined(self.approximation.model, scales, linear), linear[:, 0] + volume
