@@ -25,7 +25,7 @@ __all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_n
 
 _OF_ROUGHNESS = ("amplitude", "length_scale")
 
-_STEP = 1e-4
+_STEP = 1e-5
 """Step of the differences by which loads are linearised, over the scale of each coordinate."""
 
 _MIN_CHANGE = 0.03
@@ -33,9 +33,6 @@ _MIN_CHANGE = 0.03
 
 _MIN_WIDTH = 0.01
 """Smallest standard deviation of a snap-off, over half a step of the drive angle."""
-
-_RIDGE = 1e-12
-"""Share by which precisions are raised, so that they stay positive definite despite rounding."""
 
 _FAR_DOWN = -35.0
 """Standard normal number of which, and of all below, a truncation at less changes nothing."""
@@ -201,19 +198,26 @@ class NormalApproximation:
         Prior of the linear parameters.
     scales, linear : ndarray, shape (scales,), (d,)
         Point at which loads and snap-offs are linearised.
+
+    Attributes
+    ----------
+    white : slice
+        Place of the white noise among the scales.
+    scatter : ndarray, shape (white,)
+        Robust standard deviation of the readings from those at that point, in the unit of the white noise.
     """
 
     def __init__(self, observer: Observer, prior: LinearPrior, scales: Floats, linear: Floats) -> None:
         self.prior, self.model = prior, observer.model
         family = observer.model.family
         assert isinstance(family, ShapeFreeFamily)
-        self._white = _white_scales(observer.model)
+        self.white = _white_scales(observer.model)
         self._smooth = _SmoothNoise.at(observer, joined(observer.model, scales[None], linear[None]))
         known, self._count = family.radius.directions, family.radius.count
         self.vanishing = int(np.count_nonzero(observer.model.may_vanish))
         self._radius = family.radius
         centre = self._log_radius(scales[None], linear[None])[0]
-        slopes, self._observed, self._kinds, self._readings = _linearised(
+        slopes, self._observed, self._kinds, self._readings, self.scatter = _linearised(
             observer, prior, scales, np.append(centre, linear[1 + self._count :])
         )
         # The map from linear parameters to observations, at every length scale of the tabulated directions.
@@ -223,6 +227,8 @@ class NormalApproximation:
         through[:, 1 : 1 + self._count] = np.swapaxes(slopes[:, :nodes] @ known.values, 1, 2)
         through[:, 1 + self._count :] = slopes[:, nodes:].T
         self._through = CubicSpline(known.log_lengths, through)
+        self._centre = np.append(centre, linear[1 + self._count :])
+        self._at_centre = slopes @ self._centre
         _, root = self.conditional(scales[None])
         deviations = solve_triangular(root[0], np.eye(linear.size), lower=True)  # a row for each direction
         radii = self._log_radius(np.tile(scales, (linear.size, 1)), deviations)
@@ -254,21 +260,44 @@ class NormalApproximation:
         anchor = (np.array([self._anchor.slope_angle]), self._anchor.centre)
         return self._through.c, self._observed, *self.prior, *smooth, *anchor
 
-    def conditional(self, scales: Floats) -> tuple[Floats, Floats]:
-        """Return L⁻¹b, (n, d), and L, (n, d, d), given scales (n, scales): precision L·Lᵀ and mean L⁻ᵀL⁻¹b."""
+    def _information(self, scales: Floats) -> tuple[Floats, Floats]:
+        """Return slopes of the observations over the linear parameters, (n, observations, d), in units of their noise,
+        and one over that noise, (n, observations); that of the snap-offs is known."""
         at = np.clip(np.log(scales[:, 1]), self._through.x[0], self._through.x[-1])
-        # One over the noise of the observations; that of the snap-offs is known.
-        noise = self._smooth.beside(scales[:, self._white], scales[:, self._white.stop :])
+        noise = self._smooth.beside(scales[:, self.white], scales[:, self.white.stop :])
         certainty = np.hstack([1.0 / noise, np.ones((len(scales), 1))])[:, self._kinds]
         through = self._through(at) * certainty[:, None, :]
         through[:, 1 : 1 + self._count] *= scales[:, :1, None]
-        precision = through @ np.swapaxes(through, 1, 2)
-        diagonal = np.arange(self.prior.mean.size)
-        precision[:, diagonal, diagonal] += self.prior.precision
-        precision[:, diagonal, diagonal] *= 1.0 + _RIDGE
-        root = np.linalg.cholesky(precision)
-        pull = through @ (certainty * self._observed)[..., None] + (self.prior.precision * self.prior.mean)[:, None]
-        return np.linalg.solve(root, pull)[..., 0], np.asarray(root)
+        return np.swapaxes(through, 1, 2), certainty
+
+    def nearest(self, scales: Floats) -> Floats:
+        """Return the linear parameters, (d,), with which a contour of other scales, (scales,), is nearest the centre:
+        first of all in what is observed, then in the logarithms of the radii."""
+        (through,), (certainty,) = self._information(scales[None])
+        alone = np.diag(self.prior.precision**0.5)[1 + self._count :]
+        radii = self._log_radius(np.tile(scales, (len(self.prior.mean), 1)), np.eye(len(self.prior.mean))).T
+        of_centre = self._centre.copy()
+        of_centre[len(radii) :] *= self.prior.precision[1 + self._count :] ** 0.5
+        rows = np.vstack([through, radii, alone])
+        return np.asarray(np.linalg.lstsq(rows, np.append(certainty * self._at_centre, of_centre))[0])
+
+    def conditional(self, scales: Floats) -> tuple[Floats, Floats]:
+        """Return L⁻¹b, (n, d), and L, (n, d, d), given scales (n, scales): precision L·Lᵀ and mean L⁻ᵀL⁻¹b."""
+        upper = self._triangular(scales)
+        return upper[:, :-1, -1], np.swapaxes(upper[:, :-1, :-1], 1, 2)
+
+    def _triangular(self, scales: Floats) -> Floats:
+        """Return Lᵀ with L⁻¹b as its last column, and below that the root of the least sum of squares, up to its sign.
+
+        Orthogonal transformations keep the digits that squares lose, as precisions differ by factors of up to 1e15.
+        """
+        through, certainty = self._information(scales)
+        size, root = self.prior.mean.size, np.sqrt(self.prior.precision)
+        rows = np.zeros((len(scales), size + through.shape[1], size + 1))
+        rows[:, :size] = np.column_stack([np.diag(root), root * self.prior.mean])
+        rows[:, size:, :size], rows[:, size:, size] = through, certainty * self._observed
+        upper = np.asarray(np.linalg.qr(rows, mode="r"))
+        return upper * np.copysign(1.0, np.diagonal(upper, axis1=1, axis2=2))[..., None]
 
     def mean(self, scales: Floats) -> Floats:
         """Return the mean of the linear parameters, shape (d,), given scales of shape (scales,).
@@ -278,6 +307,22 @@ class NormalApproximation:
         pulled, root = self.conditional(scales[None])
         pulled += self.truncated(pulled, root, np.zeros(pulled.shape))[0]
         return np.asarray(solve_triangular(root[0].T, pulled[0]))
+
+    def damped(self, scales: Floats, start: Floats, damping: Floats) -> Floats:
+        """Return linear parameters, (n, d), after Levenberg–Marquardt steps from a start, (d,), with dampings (n,).
+
+        A damping adds to the prior's precision, around the start: large ones hold all that a record hardly determines.
+        Parameters that may vanish keep at least half of their values.
+        """
+        (through,), (certainty,) = self._information(scales[None])
+        root = np.sqrt(self.prior.precision)
+        _, sizes, axes = np.linalg.svd(slopes := through / root)
+        pull = axes @ (slopes.T @ (certainty * self._observed - through @ start) + root * (self.prior.mean - start))
+        precision = 1.0 + damping[:, None] + np.pad(sizes**2, (0, start.size - sizes.size))
+        there = start + (pull / precision) @ axes / root
+        vanishing = slice(start.size - self.vanishing, None)
+        there[:, vanishing] = np.maximum(there[:, vanishing], 0.5 * start[vanishing])
+        return np.asarray(there)
 
     def truncated(self, pulled: Floats, root: Floats, normal: Floats) -> tuple[Floats, Floats]:
         """Return standard normal numbers, (n, d), as those by which parameters that may vanish are positive, and the
@@ -313,14 +358,10 @@ class NormalApproximation:
     def log_evidence(self, scales: Floats) -> float:
         """Return the log-density of readings and snap-offs given scales of shape (scales,), up to a constant."""
         known = scales.copy()
-        known[self._white.stop :] = (
-            0.0  # a discrepancy is no white noise, from which the size of the residuals tells it
-        )
-        pulled, root = (of_one[0] for of_one in self.conditional(known[None]))
-        noise = scales[self._white]
-        certainty = np.append(1.0 / noise, 1.0)[self._kinds]
-        volume = np.sum(self._readings * np.log(noise)) + np.log(np.diag(root)).sum()
-        return float(0.5 * (pulled @ pulled - np.sum(np.square(certainty * self._observed))) - volume)
+        known[self.white.stop :] = 0.0  # a discrepancy is no white noise, from which the size of the residuals tells it
+        upper, noise = self._triangular(known[None])[0], scales[self.white]
+        volume = np.sum(self._readings * np.log(noise)) + np.log(np.diag(upper)[:-1]).sum()
+        return float(-0.5 * upper[-1, -1] ** 2 - volume)
 
 
 def _huber(residual: Floats) -> Floats:
@@ -330,12 +371,12 @@ def _huber(residual: Floats) -> Floats:
 
 def _linearised(
     observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats
-) -> tuple[Floats, Floats, Index, Floats]:
+) -> tuple[Floats, Floats, Index, Floats, Floats]:
     """Return the linearised observations: as few combinations of readings and snap-offs as carry all information.
 
     The centre, (k,), has the logarithms of the radii at the nodes, and the other parameters. Returned are the slopes
     over these, (observations, k); values at zero parameters, (observations,), with the noise of the scales; kinds of
-    noise, the last being that of snap-offs; and the number of readings of each other kind.
+    noise, the last being that of snap-offs; and the number of readings of each other kind, and their scatter.
     """
     model = observer.model
     rig = linear_names(model)[prior.mean.size - len(model.nuisances.names) :]
@@ -347,10 +388,11 @@ def _linearised(
     residual, agree, late = observer(contours, dict(zip(rig, points[:, nodes + 2 :].T, strict=True)))
     # A sample that is loaded on one side of a difference only has no slope.
     smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
-    observed, counts = [], []
+    observed, counts, scatter = [], [], []
     for channels, scale in zip(model.noise.channels, scales[_white_scales(model)], strict=True):
         chosen = [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]]
         of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
+        scatter.append(1.4826 * np.median(np.abs(of_kind[-1])) if of_kind.size else 0.0)
         of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * scale / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
         counts.append(float(of_kind.shape[1]))
         observed.append(_condensed(of_kind, centre, units))
@@ -362,6 +404,7 @@ def _linearised(
         np.concatenate([values for _, values in observed]),
         kinds,
         readings,
+        np.array(scatter),
     )
 
 

@@ -27,8 +27,8 @@ _ROUNDS = 20
 _GAINED = 0.5
 """Smallest gain in log-density of a round for another one to follow."""
 
-_SHORTER = np.append(0.0, 0.5 ** np.arange(8))
-"""Step lengths that are tried, over the full Gauss-Newton step."""
+_DAMPINGS: Floats = np.power(10.0, np.arange(15))
+"""Dampings of steps that are tried beside the full one."""
 
 _MAX_LOG_STEP = 0.7
 """Largest change of the logarithm of a scale in a round."""
@@ -43,7 +43,7 @@ _DRAWS = 4000
 def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, deadline: Deadline = NEVER) -> Whitening:
     """Return whitening coordinates at the posterior's mode, which is sought from a point, shape (parameters,).
 
-    Gauss-Newton steps, shortened until the density rises, alternate with the most probable scales, whose evidence has a
+    Gauss–Newton steps, damped until the density rises, alternate with the most probable scales, whose evidence has a
     closed form for linearised loads. The widths of snap-offs that the point misses are reduced. After the deadline, the
     best point so far is taken.
     """
@@ -53,8 +53,10 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
     for _ in range(_ROUNDS):
         approximation = NormalApproximation(observer, prior, scales, linear)
         scales = _likeliest(model, approximation, scales)
-        several = np.tile(scales, (_SHORTER.size, 1))
-        tried = approximation.bent(several, linear + _SHORTER[:, None] * (approximation.mean(scales) - linear))
+        here = approximation.nearest(scales)
+        steps = np.vstack([here, approximation.mean(scales), approximation.damped(scales, here, _DAMPINGS)])
+        several = np.tile(scales, (len(steps), 1))
+        tried = approximation.bent(several, steps)
         density = observer.log_density(joined(model, several, tried))
         density -= 0.5 * (np.square(tried - prior.mean) * prior.precision).sum(axis=1)
         linear, before, best = tried[np.argmax(density)], best, float(density.max())
@@ -72,7 +74,11 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
 
 
 def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: Floats) -> Floats:
-    """Return the most probable scales in the vicinity of the given ones."""
+    """Return the most probable scales in the vicinity of the given ones.
+
+    White noise is at least half the scatter of the readings: far from the mode, less would stop a search at the first
+    bend of the ridge that it follows.
+    """
     names = scale_names(model)
     columns = [model.names.index(name) for name in names]
 
@@ -85,6 +91,8 @@ def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: 
     with np.errstate(divide="ignore"):
         least = np.maximum(np.log(model.low[columns]) + _MIN_BOUND_DISTANCE, here - _MAX_LOG_STEP)
         most = np.minimum(np.log(model.high[columns]) - _MIN_BOUND_DISTANCE, here + _MAX_LOG_STEP)
+        noise = approximation.white
+        least[noise] = np.clip(np.log(0.5 * approximation.scatter), least[noise], most[noise])
     return np.exp(
         minimize(cost, here, method="L-BFGS-B", bounds=list(zip(least.tolist(), most.tolist(), strict=True))).x
     )
