@@ -30,6 +30,7 @@ from tactile_bayes.inference.ensembles import (
 )
 from tactile_bayes.inference.flank_coordinates import FlankCoordinates
 from tactile_bayes.inference.misfit import what_to_try
+from tactile_bayes.inference.shape_free_posterior.normal_approximation import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 from tactile_bayes.inference.start import Cloud, gather
@@ -72,6 +73,9 @@ _MODE_RADIUS = 3.0
 _MAX_LOG_MASS_RATIO = 9.0
 """Logarithm of the ratio of two masses from which the smaller mode is left out: one draw in ten thousand."""
 
+_LIKELIEST = 3
+"""Number of draws of the prior from which a mode is sought, if the record's contact points do not lead to one."""
+
 _POOR_MISFIT = 2.0
 """Mean square of the standardised residuals above which a further search is made."""
 
@@ -109,17 +113,7 @@ def _whitened(
     deadline: Deadline,
 ) -> Walk:
     """Return the start in nearly standard normal coordinates, with no more walkers than span them."""
-    by_contacts = contact_fit(model)
-    of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
-    noise = np.append(of_white, model.prior_medians(model.noise.of_discrepancy))
-    whitening = None
-    if by_contacts is not None:
-        rig = model.prior_medians(model.nuisances.names)
-        whitening = whitening_at(model, np.concatenate([by_contacts, rig, noise]), rng, deadline)
-    if whitening is None or (_misfit(model, whitening.centre) > _POOR_MISFIT and not deadline.has_passed):
-        other = whitening_at(model, optimum_of(model, rng, deadline).point, rng, deadline)
-        if whitening is None or _misfit(model, other.centre) < _misfit(model, whitening.centre):
-            whitening = other
+    whitening = _best_whitening(model, rng, deadline)
     try:
         return _whitened_around(model, whitening, whitening.middle, seed, rng, settings, deadline)
     except InferenceError as error:
@@ -130,6 +124,31 @@ def _whitened(
     point = drawn[np.argmax(model.log_probability(drawn))]
     whitening = whitening_at(model, point, rng, deadline)
     return _whitened_around(model, whitening, whitening.of(point[None])[0], seed, rng, settings, deadline)
+
+
+def _best_whitening(model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> Whitening:
+    """Return coordinates at the best mode that Step 2, else the likeliest draws of the prior, else a search lead to."""
+    found: list[tuple[float, float, Whitening]] = []
+
+    def explains_after(*points: Floats) -> bool:
+        """Return whether the best mode that is found from these and all points before explains the record."""
+        for point in points:
+            if not found or not deadline.has_passed:
+                whitening = whitening_at(model, point, rng, deadline)
+                density = float(model.log_probability(whitening.centre[None])[0])
+                found.append((density, -_misfit(model, whitening.centre), whitening))
+        found.sort(key=lambda one: one[:2], reverse=True)
+        return bool(found) and (-found[0][1] < _POOR_MISFIT or deadline.has_passed)
+
+    by_contacts = contact_fit(model)
+    of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
+    rest = (model.prior_medians(model.nuisances.names), of_white, model.prior_medians(model.noise.of_discrepancy))
+    if not explains_after(*([] if by_contacts is None else [np.concatenate([by_contacts, *rest])])):
+        drawn, _ = model.draw_prior(rng, _SCALE_DRAWS, deadline)
+        likeliest = np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]
+        if not explains_after(*drawn[likeliest]):
+            explains_after(optimum_of(model, rng, deadline).point)
+    return found[0][2]
 
 
 def _whitened_around(
