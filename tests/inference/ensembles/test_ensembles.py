@@ -85,19 +85,39 @@ def test_moments_of_a_truncated_gaussian():
     assert np.all(np.abs(((values - mean) ** 2).mean(axis=0) - sd**2) < 4.0 * np.sqrt((fourth - sd**4) / ess))
 
 
-@pytest.mark.slow
-def test_a_lost_walker_is_noticed():
-    """One of 128 sits in a mode of weight e⁻⁵⁰ that it cannot leave: R̂ alone would let it pass."""
+def _with_a_mode_of_no_weight(count):
+    """Return a log-density and a start of 192 walkers, the first of which cannot leave a mode of weight e⁻⁵⁰."""
 
     def log_probability(x):
         return np.logaddexp(standard(x), standard(x - 1000.0) - 50.0)
 
     start = normal_start(1, SamplerSettings())
-    start[0, 0] += 1000.0
-    draws = sample(log_probability, start, names=["a"], seed=1, settings=SamplerSettings(max_steps=400))
-    assert np.all(draws.r_hat < 1.01)
-    assert not draws.converged
+    start[0, :count] += 1000.0
+    return log_probability, start
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_lost_walkers_are_taken_back(count):
+    """R̂ alone would let them pass; the draws kept are those after they came back."""
+    log_probability, start = _with_a_mode_of_no_weight(count)
+    draws = sample(log_probability, start, names=["a"], seed=1)
+    assert draws.converged
+    assert draws.samples.max() < 10.0
+
+
+def test_walkers_that_stay_lost_are_counted():
+    log_probability, start = _with_a_mode_of_no_weight(1)
+    draws = sample(log_probability, start, names=["a"], seed=1, settings=SamplerSettings(max_steps=20))
     assert "1 of 192 walkers are lost" in draws.message
+
+
+def test_a_run_that_took_walkers_back_resumes_as_if_uninterrupted(tmp_path):
+    log_probability, start = _with_a_mode_of_no_weight(1)
+    whole = sample(log_probability, start, names=["a"], seed=1, checkpoint=tmp_path / "whole")
+    for steps in (25, 60, 6000):
+        settings = SamplerSettings(max_steps=steps)
+        parts = sample(log_probability, start, names=["a"], seed=1, settings=settings, checkpoint=tmp_path / "parts")
+    np.testing.assert_array_equal(parts.samples, whole.samples)
 
 
 def test_same_seed_same_draws():

@@ -100,3 +100,20 @@ def test_a_thinned_run_is_the_same_run(monkeypatch, tmp_path):
     resumed = drawn(checkpoint=tmp_path)
     np.testing.assert_array_equal(resumed.samples, thinned.samples)
     np.testing.assert_array_equal(resumed.acceptance, thinned.acceptance)
+
+
+@pytest.mark.parametrize(("count", "stay"), [(4, 0), (5, 5)])
+def test_few_lost_walkers_are_taken_back_and_many_stay(count, stay):
+    """An ensemble has 48 walkers, of which a tenth counts as few; the others are where they were."""
+    rng = np.random.default_rng(1)
+    samples = rng.normal(size=(2, 20, 48, 1))
+    samples[0, :, :count] += 1000.0
+    values = np.where(samples[..., 0] > 500.0, -50.0, -0.5 * samples[..., 0] ** 2)
+    start = Block(samples[:, :1], values[:, :1], ())
+    state, _ = RunState.begin(Plain(), start).append(Block(samples, values, ())).diagnose()
+    last = state.recovered().last
+    assert np.count_nonzero(last.samples[:, -1] > 500.0) == stay
+    np.testing.assert_array_equal(last.samples[:, -1, count:], samples[:, -1, count:])
+    np.testing.assert_array_equal(last.samples[:, :-1], samples[:, :-1])
+    if not stay:
+        np.testing.assert_array_equal(last.log_probability[0, -1], -0.5 * last.samples[0, -1, :, 0] ** 2)

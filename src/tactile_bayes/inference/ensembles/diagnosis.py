@@ -8,7 +8,7 @@ import emcee
 import numpy as np
 from arviz_stats.base.array import array_stats
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 
 __all__ = ["Diagnosis", "autocorrelation_time", "lost_walkers", "walker_major"]
 
@@ -21,16 +21,20 @@ _LOST_BELOW = 10.0
 """Distance of a lost walker's largest log-probability below the median of all walkers."""
 
 
-def lost_walkers(values: Floats) -> int:
-    """Count walkers far less probable than the rest, from log-probabilities of shape (chain, step, walker).
+def lost_walkers(values: Floats) -> Flags:
+    """Return True for walkers far less probable than the rest, shape (chain, walker), from their log-probabilities.
 
     R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails of the
     result. Fewer than one in thousands of draws from a posterior is so improbable, and practically never the most
     probable of a walker's many draws.
+
+    Parameters
+    ----------
+    values : ndarray, shape (chain, step, walker)
     """
     if not values.shape[1]:
-        return 0
-    return int(np.count_nonzero(values.max(axis=1) < np.median(values) - _LOST_BELOW))
+        return np.zeros((len(values), values.shape[2]), dtype=bool)
+    return np.asarray(values.max(axis=1) < np.median(values) - _LOST_BELOW)
 
 
 _WINDOW = 5.0

@@ -33,6 +33,9 @@ _GOOD_GAIN, _GOOD_MOVING = 0.3, 0.55
 """Gain of mean log-density by a further change of these coordinates, and share of the steps that move a walker, below
 and above which no further run is made."""
 
+_MIN_VARIANCE = 1e-3
+"""Smallest variance of these coordinates that is believed."""
+
 _MAX_DRAWS = 3000
 """Largest number of draws from each half of the walkers to which the coordinates of a stage are fitted."""
 
@@ -164,12 +167,14 @@ class _Normal(NamedTuple):
         Silverstein 2006, doi 10.1016/j.jmva.2005.08.003).
         """
         variances, axes = np.linalg.eigh(np.cov(draws.T))
+        variances = np.maximum(variances, _MIN_VARIANCE)  # if few walkers have moved
         ratio = variances.size / independent
         unlike = np.abs(np.sqrt(variances) - 1.0) > np.sqrt(ratio)
         variances, axes = variances[unlike], axes[:, unlike]
         twice = variances + 1.0 - ratio
         true = 0.5 * (twice + np.sign(variances - 1.0) * np.sqrt(np.maximum(twice**2 - 4.0 * variances, 0.0)))
-        return cls(draws.mean(axis=0), np.eye(draws.shape[1]) + axes * (np.sqrt(true) - 1.0) @ axes.T)
+        root = np.sqrt(np.maximum(true, _MIN_VARIANCE))
+        return cls(draws.mean(axis=0), np.eye(draws.shape[1]) + axes * (root - 1.0) @ axes.T)
 
     def gain(self, draws: Floats) -> float:
         """Return by how much the mean log-density of draws, (n, k), exceeds that of the standard normal one."""

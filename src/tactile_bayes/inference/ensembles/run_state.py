@@ -10,13 +10,16 @@ import numpy as np
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
-from tactile_bayes.inference.ensembles.diagnosis import Diagnosis
+from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, lost_walkers
 
 __all__ = ["RunState", "StoredSteps"]
 
 
 _MAX_STORED = 4_000_000
 """Largest count of stored numbers of all ensembles, beyond which steps are thinned: 32 MB, and 6 s for a diagnosis."""
+
+_MAX_LOST = 0.1
+"""Largest share of the walkers of an ensemble that are taken back."""
 
 
 class StoredSteps(NamedTuple):
@@ -102,6 +105,29 @@ class RunState:
         joined = (np.concatenate(column, axis=1) for column in columns)
         half = StoredSteps(parts[0].first, np.concatenate(numbers), *joined)
         return replace(self, every=every, half=half, recent=()), Diagnosis(half.samples)
+
+    def lost(self) -> tuple[Flags, Flags]:
+        """Return True for walkers lost in the earlier and in the later half of the steps kept, (chain, walker) each."""
+        middle = self.half.values.shape[1] // 2
+        return lost_walkers(self.half.values[:, :middle]), lost_walkers(self.half.values[:, middle:])
+
+    def recovered(self) -> RunState:
+        """Return the state with lost walkers where others of their ensemble were in the first of the steps kept.
+
+        Where many are lost, they stay: that may be a mode.
+        """
+        _, lost = self.lost()
+        few = lost & (lost.mean(axis=1, keepdims=True) <= _MAX_LOST)
+        if not few.any():
+            return self
+        last = replace(self.last, samples=self.last.samples.copy(), log_probability=self.last.log_probability.copy())
+        for chain, walkers in enumerate(few):
+            missing = np.flatnonzero(walkers)
+            others = np.flatnonzero(~lost[chain])[: missing.size]
+            there = self.coordinates.of(self.half.samples[chain, 0, others])
+            values = self.half.values[chain, 0, others] + self.coordinates.parameters(there)[1]
+            last.samples[chain, -1, missing], last.log_probability[chain, -1, missing] = there, values
+        return replace(self, last=last)
 
     @property
     def moved(self) -> Flags:

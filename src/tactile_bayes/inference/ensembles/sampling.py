@@ -74,7 +74,7 @@ def sample(
     half of the steps so far is diagnosed: rank-normalised R̂ across ensembles, each split in early and late steps, and
     effective sample size in bulk and tails (Vehtari et al. 2021, doi 10.1214/20-BA1221). The run stops when every
     parameter satisfies the settings, the walkers have given five effective draws each on average, and none is lost
-    where nothing is probable.
+    where nothing is probable. A few that are lost are taken back to where others of their ensemble were.
 
     Parameters
     ----------
@@ -177,12 +177,14 @@ def sample(
                 if not ending:
                     enough = diagnosis.satisfies(settings.max_r_hat, settings.min_ess)
                     spent = _OUT_OF_TIME if late else _OUT_OF_STEPS if state.steps >= settings.max_steps else ""
-                    ending = _CONVERGED if enough and not lost_walkers(state.half.values) else spent
+                    ending = _CONVERGED if enough and not np.any(state.lost()) else spent
                 if stored is not None and ending not in ("", _INTERRUPTED):
                     stored.note_end()
                 if progress is not None:
                     worst = float(diagnosis.r_hat[diagnosis.worst_r_hat]), float(diagnosis.ess[diagnosis.worst_ess])
                     progress(Progress(state.steps, settings.max_steps, *worst, time.monotonic() - began))
+                if state.steps == next_diagnosis(state.steps - 1, settings.block_steps):  # not where a budget ended
+                    state = state.recovered()
                 due = next_diagnosis(state.steps, settings.block_steps)
             except KeyboardInterrupt:
                 if not state.steps:
@@ -227,7 +229,7 @@ def _draws(
     chains, _, walkers, _ = state.last.samples.shape
     converged, half, moved = ending == _CONVERGED, state.half, state.moved
     stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
-    lost = lost_walkers(half.values)
+    lost = int(np.count_nonzero(lost_walkers(half.values)))
     modes = () if converged else modes_of(half.samples, half.values, names)
     message = f"{ending} after {state.steps} steps: {diagnosis.message(names)}"
     if not converged:
