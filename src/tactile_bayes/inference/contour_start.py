@@ -128,7 +128,7 @@ def _whitened(
 
 def _best_whitening(model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> Whitening:
     """Return coordinates at the best mode that Step 2, else the likeliest draws of the prior, else a search lead to."""
-    found: list[tuple[float, float, Whitening]] = []
+    found: list[tuple[bool, float, float, Whitening]] = []
 
     def explains_after(*points: Floats) -> bool:
         """Return whether the best mode that is found from these and all points before explains the record."""
@@ -136,9 +136,10 @@ def _best_whitening(model: ContourModel, rng: np.random.Generator, deadline: Dea
             if not found or not deadline.has_passed:
                 whitening = whitening_at(model, point, rng, deadline)
                 density = float(model.log_probability(whitening.centre[None])[0])
-                found.append((density, -_misfit(model, whitening.centre), whitening))
-        found.sort(key=lambda one: one[:2], reverse=True)
-        return bool(found) and (-found[0][1] < _POOR_MISFIT or deadline.has_passed)
+                misfit = _misfit(model, whitening.centre)
+                found.append((misfit < _POOR_MISFIT, density, -misfit, whitening))
+        found.sort(key=lambda one: one[:-1], reverse=True)
+        return bool(found) and (found[0][0] or deadline.has_passed)
 
     by_contacts = contact_fit(model)
     of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
@@ -148,7 +149,7 @@ def _best_whitening(model: ContourModel, rng: np.random.Generator, deadline: Dea
         likeliest = np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]
         if not explains_after(*drawn[likeliest]):
             explains_after(optimum_of(model, rng, deadline).point)
-    return found[0][2]
+    return found[0][-1]
 
 
 def _whitened_around(

@@ -121,8 +121,8 @@ class RunState:
         if not few.any():
             return self
         last = replace(self.last, samples=self.last.samples.copy(), log_probability=self.last.log_probability.copy())
-        for chain, walkers in enumerate(few):
-            missing = np.flatnonzero(walkers)
+        for chain in np.flatnonzero(few.any(axis=1)):
+            missing = np.flatnonzero(few[chain])
             others = np.flatnonzero(~lost[chain])[: missing.size]
             there = self.coordinates.of(self.half.samples[chain, 0, others])
             values = self.half.values[chain, 0, others] + self.coordinates.parameters(there)[1]
