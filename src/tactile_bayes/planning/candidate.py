@@ -218,12 +218,8 @@ def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) ->
 
 def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats:
     """Return widths of central intervals at each grid point, from weighted draws, shape (grid points,)."""
-    order = np.argsort(heights, axis=0)
-    share = np.cumsum(weights[order], axis=0)
-    ends = []
-    for level in (0.5 - 0.5 * probability, 0.5 + 0.5 * probability):
-        row = np.minimum((share < level).sum(axis=0), len(heights) - 1)
-        ends.append(np.take_along_axis(heights, np.take_along_axis(order, row[None], axis=0), axis=0)[0])
+    levels = (0.5 - 0.5 * probability, 0.5 + 0.5 * probability)
+    ends = np.quantile(heights, levels, axis=0, weights=weights, method="inverted_cdf")
     return np.asarray(ends[1] - ends[0])
 
 

@@ -31,7 +31,8 @@ def _sentences(tree: xr.DataTree, si: bool) -> Iterator[str]:
                 yield f"First order holds for no {method} contact point at this noise."
                 continue
             along, across = (
-                _length(_median(of[name].values[ok], weight[ok]), si) for name in ("sd_along", "sd_across")
+                _length(float(np.quantile(of[name].values[ok], 0.5, weights=weight[ok], method="inverted_cdf")), si)
+                for name in ("sd_along", "sd_across")
             )
             yield (
                 f"A {method} contact point is off by {along} along the contour and {across} across it (medians of "
@@ -91,12 +92,6 @@ def _spacing(grown: xr.Dataset) -> Floats:
         travel = grown.after_first_contact.values[here]
         spacing[here] = np.abs(np.gradient(travel)) if here.size > 1 else 1.0
     return spacing
-
-
-def _median(values: Floats, weights: Floats) -> float:
-    order = np.argsort(values)
-    share = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(share, 0.5 * share[-1])])
 
 
 def _length(value: float, si: bool) -> str:
