@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from scipy.special import logsumexp, softmax
 from threadpoolctl import threadpool_limits
 
-from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_function, check_numbers, check_path, check_whole_number
 from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
@@ -33,6 +33,7 @@ from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
 from tactile_bayes.inference.stream_state import StreamState, read_state, write_state
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import carried_sweeps, validate
 
 __all__ = ["Stream"]
@@ -217,7 +218,7 @@ class Stream:
             raise InferenceError("the stream has no samples yet: call update with some first")
         model, random = state.experiment.model, self._random(1, state.updates)
         left = _effective(state.log_weights)
-        picked = random.permutation(_systematic(np.exp(state.log_weights), random))
+        picked = random.permutation(resampled(np.exp(state.log_weights), len(state.log_weights), random))
         unknown = np.full(len(model.names), np.nan)
         draws = Draws(
             samples=state.points[picked][None],
@@ -444,7 +445,7 @@ class _Advance:
             else:
                 power = 1.0
             self._weigh(step * ratio)
-            picked = _systematic(np.exp(self.log_weights), self._generator)
+            picked = resampled(np.exp(self.log_weights), len(self.log_weights), self._generator)
             self.points, self.values, self._old = self.points[picked], self.values[picked], self._old[picked]
             self.log_weights = np.full(len(picked), -np.log(len(picked)))
             self._move(power)
@@ -500,13 +501,6 @@ def _between(new: Floats, old: Floats, power: float) -> Floats:
 def _effective(log_weights: Floats) -> float:
     """Return the effective number of particles, for weights that need not be normalised."""
     return effective(softmax(log_weights))
-
-
-def _systematic(weights: Floats, random: np.random.Generator) -> Index:
-    """Return as many indices as weights, each as often as its weight demands, rounded up or down."""
-    count = len(weights)
-    places = np.cumsum(weights)
-    return np.searchsorted(places / places[-1], (random.random() + np.arange(count)) / count).clip(max=count - 1)
 
 
 def _correlation(before: Floats, after: Floats) -> float:

@@ -1,12 +1,12 @@
-"""Selections: some of many points, evenly spread."""
+"""Selections: some of many points, evenly spread or as often as their weights say."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tactile_bayes.arrays import Index
+from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["evenly_spread"]
+__all__ = ["evenly_spread", "resampled"]
 
 
 def evenly_spread(points: int, most: int) -> Index:
@@ -18,3 +18,18 @@ def evenly_spread(points: int, most: int) -> Index:
     (array([0, 2, 4, 6, 8]), array([0, 1, 2]))
     """
     return np.unique(np.linspace(0, points - 1, min(points, most)).astype(np.intp))
+
+
+def resampled(weights: Floats, count: int, rng: np.random.Generator | np.random.RandomState) -> Index:
+    """Return `count` indices, increasing, each as often as its weight demands, rounded up or down at random.
+
+    This is systematic resampling (Kitagawa 1996, doi 10.2307/1390750); weights need not add up to one.
+
+    Examples
+    --------
+    >>> resampled(np.array([2.0, 0.0, 1.0, 1.0]), 4, np.random.default_rng(1))
+    array([0, 0, 2, 3])
+    """
+    level = np.cumsum(weights)
+    picked = np.searchsorted(level / level[-1], (np.arange(count) + rng.random()) / count)
+    return np.minimum(picked, len(weights) - 1)

@@ -13,6 +13,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.importance import ContactWeights, weigh_contacts
 from tactile_bayes.inference.ensembles import SamplerSettings, sample, scatter_walkers, spawn
+from tactile_bayes.numerics.selection import resampled
 
 __all__ = ["CHAINS", "EMCEE", "EMCEE_SETTINGS", "IMPORTANCE", "ContactDraws", "Method", "draw_contacts"]
 
@@ -126,12 +127,9 @@ def _resampled(weights: ContactWeights, draws: int, rng: np.random.Generator) ->
     points = np.empty((CHAINS, each, *weights.points.shape[1:]))
     for chain in range(CHAINS):
         part = slice(chain, None, CHAINS)  # proposals are in the order of their phases
-        count = len(weights.points[part])
         for i in range(points.shape[2]):
             weight = np.exp(weights.log_weight[part, i] - weights.log_weight[part, i].max())
-            level = np.cumsum(weight)
-            picks = np.searchsorted(level / level[-1], (np.arange(each) + rng.random()) / each)
-            points[chain, :, i] = weights.points[part, i][rng.permutation(np.minimum(picks, count - 1))]
+            points[chain, :, i] = weights.points[part, i][rng.permutation(resampled(weight, each, rng))]
     return points
 
 
