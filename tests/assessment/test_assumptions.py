@@ -61,6 +61,7 @@ def test_priors_of_what_remains_are_kept():
     assert set(found["family circle"].experiment.priors) == {"friction"}
 
 
+@pytest.mark.slow
 def test_bands_are_compared_and_errors_are_outcomes(monkeypatch, tmp_path):
     experiment = experiment_of(posterior())
     several = {each.name: each for each in alternatives_of(experiment)}

@@ -35,6 +35,7 @@ def test_a_zero_that_moves_between_sweeps_shows_though_zeros_are_not_inferred():
     assert found_of(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND)).attrs["passed"] == 0
 
 
+@pytest.mark.slow
 def test_noise_that_is_known_and_larger_than_stated_shows():
     from scipy import stats
 

@@ -53,6 +53,7 @@ def test_words_come_first_then_the_table_then_the_files(calibrated):
     assert (folder / "summary.txt").read_text(encoding="utf-8").startswith(words)
 
 
+@pytest.mark.slow
 def test_several_records_add_up(records, calibrated, tmp_path):
     """At once, or one after the other with --rig: the same numbers."""
     asked = ("calibrate-rig", records / "pin.nc", records / "again.nc", *PIN, *ONE, "--json")
@@ -89,6 +90,7 @@ def test_infer_takes_the_rig_over(records, calibrated, tmp_path):
     assert "Priors of your own" not in text
 
 
+@pytest.mark.slow
 def test_a_wrong_gauge_is_the_first_thing_said(records, tmp_path):
     wrong = ("--family", "circle", "--parameter", "r=0.3", "--parameter", "q=0.5")
     result = call("calibrate-rig", records / "pin.nc", *wrong, "--out", tmp_path, *ONE)

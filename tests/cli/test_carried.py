@@ -134,6 +134,7 @@ def test_a_check_knows_where_a_carried_rod_is_loaded(carried):
     assert np.isfinite(check.p_value.sel(discrepancy="loaded")).all()
 
 
+@pytest.mark.slow
 def test_a_misfit_of_a_carried_sweep_is_placed_by_its_travel(carried, tmp_path):
     measured, _ = carried
     record = tb.read_record(measured)

@@ -30,6 +30,7 @@ def test_of_a_good_result_all_is_well():
     assert found[0].startswith("All is well: the ensembles agree, and the record agrees with their predictions (p = 0.")
 
 
+@pytest.mark.slow
 def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
     found = verdicts(taken_for_a_parabola("IV"))
     assert re.match(

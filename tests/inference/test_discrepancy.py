@@ -152,6 +152,7 @@ def test_what_has_no_closed_form_is_refused():
         model_of(record, ["hysteresis"])
 
 
+@pytest.mark.slow
 def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
     """By bands that are wider, as the readings are less certain."""
     record = disturbed(0.02, cell=LoadCell(force_noise=0.01, moment_noise=0.004))

@@ -181,6 +181,7 @@ def test_rods_that_vary_cost_no_accuracy_where_all_of_the_rig_is_inferred():
     assert np.count_nonzero(~close) <= 4  # samples so near snap-off that they are on the other side of it
 
 
+@pytest.mark.slow
 def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
     """First contact decides in which sense friction acts: here both occur, on a bent rod with a stem."""
     rod = Rod(rest_curvature=lambda s: -3.4 / (1.0 + np.exp(-(s - 0.55) / 0.08)), stem=0.03)

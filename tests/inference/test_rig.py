@@ -207,6 +207,7 @@ def test_a_stored_posterior_has_the_same_prior():
     np.testing.assert_allclose(model.log_prior(points), given.log_prior(points), atol=0.02)  # six digits of priors
 
 
+@pytest.mark.slow
 def test_families_are_compared_with_the_rig():
     """One parameter has no correlations: its prior given by hand has the same evidence, up to the error of bridges."""
     record, alone = read(OBJECT, 2), drawn(("rigidity_scale",))
@@ -312,6 +313,7 @@ def counts(gain):
     return ((gain, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
+@pytest.mark.slow
 def test_a_stream_takes_it_as_prior(tmp_path):
     """Its posterior is that of the whole record, within their Monte-Carlo errors: a quarter of a deviation."""
     record, known = read(OBJECT, 2), {"load_cell": CELL, "nuisances": [], "seed": 1, "rig": rig()}

@@ -123,6 +123,7 @@ def test_step_2_takes_the_side_that_fits_and_says_so():
     assert "doubtful_sides" not in reconstruct(in_contact_throughout(0.3), load_cell=CELL).attrs
 
 
+@pytest.mark.slow
 def test_in_doubt_evidence_decides_which_side_it_was():
     """A sweep whose moment speaks against its direction by a zero that is off: its angles and forces know better."""
     record = scan(Parabola(0.5, 0.5), direction="forward", drive_step=0.03).record

@@ -93,8 +93,7 @@ def simultaneous_band(count: int, top: int, probability: float) -> tuple[Floats,
     null = _null(count, top)
     # The largest level below which no more sets of uniform ranks fall than the probability allows.
     level = float(null[min(int((1.0 - probability) * null.size), null.size - 1)])
-    counts = np.arange(count + 1)
-    inside = _tails(counts[:, None], count, expected_shares(top)) >= level
+    inside = _tails(count, top) >= level
     return np.argmax(inside, axis=0) / count, (count - np.argmax(inside[::-1], axis=0)) / count
 
 
@@ -166,7 +165,7 @@ def _power(count: int, probabilities: Floats, level: float) -> float:
     if fewest < 0:  # no p-value is so small
         return 0.0
     counts = np.arange(count + 1)
-    inside = _tails(counts[:, None], count, expected_shares(top)) >= null[fewest]
+    inside = _tails(count, top) >= null[fewest]
     first, reached = 0, np.ones(1)  # the least possible number, and the probabilities from it on
     for rank in range(top):
         allowed = np.flatnonzero(inside[first:, rank]) + first
@@ -177,16 +176,18 @@ def _power(count: int, probabilities: Floats, level: float) -> float:
     return float(1.0 - reached @ rest / stats.poisson.pmf(count, count))
 
 
-def _tails(below: Index, count: int, shares: Floats) -> Floats:
-    """Return twice the smaller binomial tail of numbers of ranks up to each rank."""
-    at_most = bdtr(below, count, shares)
-    at_least = 1.0 - np.where(below > 0, bdtr(np.maximum(below - 1, 0), count, shares), 0.0)
+@lru_cache(maxsize=8)
+def _tails(count: int, top: int) -> Floats:
+    """Return twice the smaller binomial tail of 0, 1, …, `count` ranks up to each rank, shape (count + 1, top)."""
+    at_most = bdtr(np.arange(count + 1)[:, None], count, expected_shares(top))
+    at_least = 1.0 - np.vstack([np.zeros(top), at_most[:-1]])
     return np.asarray(2.0 * np.minimum(at_most, at_least))
 
 
 def _least_probability(below: Index, count: int) -> Floats:
     """Return twice the least tail over all ranks, shape (rows,), from numbers of ranks, shape (rows, top)."""
-    return np.asarray(_tails(below, count, expected_shares(below.shape[1])).min(axis=1))
+    top = below.shape[1]
+    return np.asarray(_tails(count, top)[below, np.arange(top)].min(axis=1))
 
 
 @lru_cache(maxsize=8)
