@@ -140,7 +140,9 @@ def test_commands_and_options_that_are_shown_exist(path: Path) -> None:
             assert used <= options, f"{' '.join(known)} has no option {used - options}"
 
 
-@pytest.mark.parametrize(("noise", "page"), [("usual", ROOT / "README.md")])
+@pytest.mark.parametrize(
+    ("noise", "page"), [("usual", ROOT / "README.md"), ("tenth", DOCS / "trust.md"), ("threefold", DOCS / "trust.md")]
+)
 def test_a_table_of_calibrations_is_that_of_the_published_replicates(noise: str, page: Path) -> None:
     assert table(noise, published(noise)) in TEXTS[page]
 
