@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -127,29 +128,32 @@ def _whitened(
 
 
 def _best_whitening(model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> Whitening:
-    """Return coordinates at the best mode that Step 2, else the likeliest draws of the prior, else a search lead to."""
-    found: list[tuple[bool, float, float, Whitening]] = []
-
-    def explains_after(*points: Floats) -> bool:
-        """Return whether the best mode that is found from these and all points before explains the record."""
+    """Return coordinates at the best mode that the first starting points lead to of which one explains the record."""
+    best: tuple[tuple[bool, float, float], Whitening] | None = None
+    for points in _starting_points(model, rng, deadline):
         for point in points:
-            if not found or not deadline.has_passed:
+            if best is None or not deadline.has_passed:
                 whitening = whitening_at(model, point, rng, deadline)
-                density = float(model.log_probability(whitening.centre[None])[0])
                 misfit = _misfit(model, whitening.centre)
-                found.append((misfit < _POOR_MISFIT, density, -misfit, whitening))
-        found.sort(key=lambda one: one[:-1], reverse=True)
-        return bool(found) and (found[0][0] or deadline.has_passed)
+                rank = misfit < _POOR_MISFIT, float(model.log_probability(whitening.centre[None])[0]), -misfit
+                if best is None or rank > best[0]:
+                    best = rank, whitening
+        if best is not None and (best[0][0] or deadline.has_passed):
+            break
+    assert best is not None  # a search has a result, or raises
+    return best[1]
 
+
+def _starting_points(model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> Iterator[Iterable[Floats]]:
+    """Yield parameters fitted to Step 2's contacts, the likeliest of some draws of the prior, and those of a search."""
     by_contacts = contact_fit(model)
-    of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
-    rest = (model.prior_medians(model.nuisances.names), of_white, model.prior_medians(model.noise.of_discrepancy))
-    if not explains_after(*([] if by_contacts is None else [np.concatenate([by_contacts, *rest])])):
-        drawn, _ = model.draw_prior(rng, _SCALE_DRAWS, deadline)
-        likeliest = np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]
-        if not explains_after(*drawn[likeliest]):
-            explains_after(optimum_of(model, rng, deadline).point)
-    return found[0][-1]
+    if by_contacts is not None:
+        of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
+        rest = (model.prior_medians(model.nuisances.names), of_white, model.prior_medians(model.noise.of_discrepancy))
+        yield [np.concatenate([by_contacts, *rest])]
+    drawn, _ = model.draw_prior(rng, _SCALE_DRAWS, deadline)
+    yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
+    yield [optimum_of(model, rng, deadline).point]
 
 
 def _whitened_around(

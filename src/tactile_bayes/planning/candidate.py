@@ -20,6 +20,7 @@ from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge
 from tactile_bayes.planning.record_information import parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Carried, Drive, Rotation
+from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
 
@@ -218,9 +219,9 @@ def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) ->
 
 def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats:
     """Return widths of central intervals at each grid point, from weighted draws, shape (grid points,)."""
-    levels = (0.5 - 0.5 * probability, 0.5 + 0.5 * probability)
-    ends = np.quantile(heights, levels, axis=0, weights=weights, method="inverted_cdf")
-    return np.asarray(ends[1] - ends[0])
+    levels = central_levels(probability)
+    lower, _, upper = np.quantile(heights, levels, axis=0, weights=weights, method="inverted_cdf")
+    return np.asarray(upper - lower)
 
 
 def _gaps(known: Knowledge, candidate: Candidate, usable: Flags) -> Floats:

@@ -182,6 +182,21 @@ class Observer:
         return np.nan_to_num(-cost - volume - 0.5 * np.square(late).sum(axis=1), nan=-np.inf)
 
 
+class _Observations(NamedTuple):
+    """Linearised observations: as few combinations of readings and snap-offs as carry all information."""
+
+    slopes: Floats
+    """Over the log-radii at the nodes and the other parameters, shape (observations, k)."""
+    values: Floats
+    """At zero parameters, with the noise of the scales, shape (observations,)."""
+    kinds: Index
+    """Kinds of noise, the last of which is that of snap-offs, shape (observations,)."""
+    readings: Floats
+    """Number of readings of each other kind."""
+    scatter: Floats
+    """Robust standard deviation of these readings from those at the centre."""
+
+
 class NormalApproximation:
     """Normal distribution of the linear parameters, given amplitude and length scale of the random radius, and noise.
 
@@ -203,8 +218,6 @@ class NormalApproximation:
     ----------
     white : slice
         Place of the white noise among the scales.
-    scatter : ndarray, shape (white,)
-        Robust standard deviation of the readings from those at that point, in the unit of the white noise.
     """
 
     def __init__(self, observer: Observer, prior: LinearPrior, scales: Floats, linear: Floats) -> None:
@@ -216,10 +229,10 @@ class NormalApproximation:
         known, self._count = family.radius.directions, family.radius.count
         self.vanishing = int(np.count_nonzero(observer.model.may_vanish))
         self._radius = family.radius
-        centre = self._log_radius(scales[None], linear[None])[0]
-        slopes, self._observed, self._kinds, self._readings, self.scatter = _linearised(
-            observer, prior, scales, np.append(centre, linear[1 + self._count :])
-        )
+        log_radius = self._log_radius(scales[None], linear[None])[0]
+        self._centre = np.append(log_radius, linear[1 + self._count :])
+        self._observations = _linearised(observer, prior, scales, self._centre)
+        slopes = self._observations.slopes
         # The map from linear parameters to observations, at every length scale of the tabulated directions.
         nodes = known.values.shape[1]
         through = np.empty((len(known.values), linear.size, len(slopes)))
@@ -227,12 +240,15 @@ class NormalApproximation:
         through[:, 1 : 1 + self._count] = np.swapaxes(slopes[:, :nodes] @ known.values, 1, 2)
         through[:, 1 + self._count :] = slopes[:, nodes:].T
         self._through = CubicSpline(known.log_lengths, through)
-        self._centre = np.append(centre, linear[1 + self._count :])
-        self._at_centre = slopes @ self._centre
         _, root = self.conditional(scales[None])
         deviations = solve_triangular(root[0], np.eye(linear.size), lower=True)  # a row for each direction
         radii = self._log_radius(np.tile(scales, (linear.size, 1)), deviations)
-        self._anchor = Anchor.best(centre, radii, deviations[:, self._vertex])
+        self._anchor = Anchor.best(log_radius, radii, deviations[:, self._vertex])
+
+    @property
+    def scatter(self) -> Floats:
+        """Robust standard deviation of the readings from those at that point, in the unit of the white noise."""
+        return self._observations.scatter
 
     @property
     def _vertex(self) -> slice:
@@ -258,14 +274,14 @@ class NormalApproximation:
         size, step, longest = self._smooth
         smooth = [np.array([*size, step, longest])] if self.model.noise.of_discrepancy else []
         anchor = (np.array([self._anchor.slope_angle]), self._anchor.centre)
-        return self._through.c, self._observed, *self.prior, *smooth, *anchor
+        return self._through.c, self._observations.values, *self.prior, *smooth, *anchor
 
     def _information(self, scales: Floats) -> tuple[Floats, Floats]:
         """Return slopes of the observations over the linear parameters, (n, observations, d), in units of their noise,
         and one over that noise, (n, observations); that of the snap-offs is known."""
         at = np.clip(np.log(scales[:, 1]), self._through.x[0], self._through.x[-1])
         noise = self._smooth.beside(scales[:, self.white], scales[:, self.white.stop :])
-        certainty = np.hstack([1.0 / noise, np.ones((len(scales), 1))])[:, self._kinds]
+        certainty = np.hstack([1.0 / noise, np.ones((len(scales), 1))])[:, self._observations.kinds]
         through = self._through(at) * certainty[:, None, :]
         through[:, 1 : 1 + self._count] *= scales[:, :1, None]
         return np.swapaxes(through, 1, 2), certainty
@@ -274,12 +290,12 @@ class NormalApproximation:
         """Return the linear parameters, (d,), with which a contour of other scales, (scales,), is nearest the centre:
         first of all in what is observed, then in the logarithms of the radii."""
         (through,), (certainty,) = self._information(scales[None])
-        alone = np.diag(self.prior.precision**0.5)[1 + self._count :]
-        radii = self._log_radius(np.tile(scales, (len(self.prior.mean), 1)), np.eye(len(self.prior.mean))).T
-        of_centre = self._centre.copy()
-        of_centre[len(radii) :] *= self.prior.precision[1 + self._count :] ** 0.5
-        rows = np.vstack([through, radii, alone])
-        return np.asarray(np.linalg.lstsq(rows, np.append(certainty * self._at_centre, of_centre))[0])
+        each = np.eye(self.prior.mean.size)
+        radii = self._log_radius(np.tile(scales, (len(each), 1)), each).T
+        units = np.append(np.ones(len(radii)), np.sqrt(self.prior.precision[1 + self._count :]))
+        rows = np.vstack([through, radii, each[1 + self._count :] * units[len(radii) :, None]])
+        observed = certainty * (self._observations.slopes @ self._centre)
+        return np.asarray(np.linalg.lstsq(rows, np.append(observed, units * self._centre))[0])
 
     def conditional(self, scales: Floats) -> tuple[Floats, Floats]:
         """Return L⁻¹b, (n, d), and L, (n, d, d), given scales (n, scales): precision L·Lᵀ and mean L⁻ᵀL⁻¹b."""
@@ -295,7 +311,7 @@ class NormalApproximation:
         size, root = self.prior.mean.size, np.sqrt(self.prior.precision)
         rows = np.zeros((len(scales), size + through.shape[1], size + 1))
         rows[:, :size] = np.column_stack([np.diag(root), root * self.prior.mean])
-        rows[:, size:, :size], rows[:, size:, size] = through, certainty * self._observed
+        rows[:, size:, :size], rows[:, size:, size] = through, certainty * self._observations.values
         upper = np.asarray(np.linalg.qr(rows, mode="r"))
         return upper * np.copysign(1.0, np.diagonal(upper, axis1=1, axis2=2))[..., None]
 
@@ -317,7 +333,9 @@ class NormalApproximation:
         (through,), (certainty,) = self._information(scales[None])
         root = np.sqrt(self.prior.precision)
         _, sizes, axes = np.linalg.svd(slopes := through / root)
-        pull = axes @ (slopes.T @ (certainty * self._observed - through @ start) + root * (self.prior.mean - start))
+        pull = axes @ (
+            slopes.T @ (certainty * self._observations.values - through @ start) + root * (self.prior.mean - start)
+        )
         precision = 1.0 + damping[:, None] + np.pad(sizes**2, (0, start.size - sizes.size))
         there = start + (pull / precision) @ axes / root
         vanishing = slice(start.size - self.vanishing, None)
@@ -360,7 +378,7 @@ class NormalApproximation:
         known = scales.copy()
         known[self.white.stop :] = 0.0  # a discrepancy is no white noise, from which the size of the residuals tells it
         upper, noise = self._triangular(known[None])[0], scales[self.white]
-        volume = np.sum(self._readings * np.log(noise)) + np.log(np.diag(upper)[:-1]).sum()
+        volume = np.sum(self._observations.readings * np.log(noise)) + np.log(np.diag(upper)[:-1]).sum()
         return float(-0.5 * upper[-1, -1] ** 2 - volume)
 
 
@@ -369,15 +387,8 @@ def _huber(residual: Floats) -> Floats:
     return np.where(size < _HUBER_THRESHOLD, 0.5 * size**2, _HUBER_THRESHOLD * (size - 0.5 * _HUBER_THRESHOLD))
 
 
-def _linearised(
-    observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats
-) -> tuple[Floats, Floats, Index, Floats, Floats]:
-    """Return the linearised observations: as few combinations of readings and snap-offs as carry all information.
-
-    The centre, (k,), has the logarithms of the radii at the nodes, and the other parameters. Returned are the slopes
-    over these, (observations, k); values at zero parameters, (observations,), with the noise of the scales; kinds of
-    noise, the last being that of snap-offs; and the number of readings of each other kind, and their scatter.
-    """
+def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> _Observations:
+    """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters."""
     model = observer.model
     rig = linear_names(model)[prior.mean.size - len(model.nuisances.names) :]
     nodes = centre.size - 2 - len(rig)
@@ -396,16 +407,10 @@ def _linearised(
         of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * scale / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
         counts.append(float(of_kind.shape[1]))
         observed.append(_condensed(of_kind, centre, units))
-    readings = np.array(counts)
     observed.append(_condensed(late, centre, units))
     kinds = np.repeat(np.arange(len(observed)), [len(values) for _, values in observed])
-    return (
-        np.concatenate([slopes for slopes, _ in observed]),
-        np.concatenate([values for _, values in observed]),
-        kinds,
-        readings,
-        np.array(scatter),
-    )
+    slopes, values = (np.concatenate(parts) for parts in zip(*observed, strict=True))
+    return _Observations(slopes, values, kinds, np.array(counts), np.array(scatter))
 
 
 def _condensed(residual: Floats, centre: Floats, units: Floats) -> tuple[Floats, Floats]:
