@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tactile_bayes.calibration.calibrate import calibration_replicate
+from tactile_bayes.calibration.calibrate import calibration_replicate, experiment_of
+from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Ellipse, PowerLaw
 from tactile_bayes.inference.ensembles import Logarithms
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
@@ -81,12 +82,43 @@ def test_a_checkpoint_distinguishes_them():
     assert len({one.digest for one in several} | {BASES["power-law"].digest}) == 6
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_flank_of_joined_contours_is_that_of_its_own_parameters(side):
+    """Beside parameters of the other flank, which stay as they are."""
+    points = points_of("ellipse", side)
+    other = np.linspace(0.5, 2.0, len(points))
+    alone = flank("ellipse", side)
+    columns = (1, 2, 3, 4) if side > 0.0 else (0, 1, 3, 4)
+    base = Logarithms(np.array([True, True, True, False, False, True]))
+    joined = FlankCoordinates("ellipse", base, PLACE, side, columns)
+    at = 0 if side > 0.0 else 2
+    both = np.insert(points, at, other, axis=1)
+    np.testing.assert_allclose(joined.of(both), np.insert(alone.of(points), at, np.log(other), axis=1))
+    there, growth = joined.parameters(joined.of(both))
+    np.testing.assert_allclose(there, both, rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(growth, alone.parameters(alone.of(points))[1] + np.log(other))
+
+
+@pytest.mark.parametrize(("contour", "flank"), [("parabola/power-law", "power-law"), ("ellipse/parabola", None)])
+def test_of_joined_contours_the_flank_that_was_touched_counts(contour, flank):
+    """A record of the right flank alone, which is none of an ellipse where that is on the left."""
+    replicate = experiment_of(family=contour, seed=2026)
+    measured = simulate(replicate, np.random.default_rng(1)).measured
+    model = replicate.problem_of(measured).model
+    point = np.concatenate([[0.7, 1.3, 1.6][: len(model.family.parameters) - 2], [0.3, -0.9]])
+    found = FlankCoordinates.at_contacts(model, np.append(point, model.prior_medians(model.names[point.size :])))
+    assert found is None if flank is None else (found.flank, found.side) == (flank, 1.0)
+    if found is not None:
+        assert [model.names[k] for k in found.columns] == ["right_w", "right_n", "q", "x_c"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("family", "number"),
     [
         *(("power-law", number) for number in (15, 25, 43, 65, 373, 420)),
         *(("ellipse", number) for number in (39, 51, 53)),
+        ("parabola/power-law", 54),
     ],
 )
 def test_a_flank_known_to_a_hundred_thousandth_is_found_and_sampled(family, number):

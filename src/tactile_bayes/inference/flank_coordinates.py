@@ -1,4 +1,4 @@
-"""Coordinates of power laws and ellipses with contacts on one flank only."""
+"""Coordinates of power laws and ellipses, or such flanks of joined contours, with contacts on one flank only."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.families import FLANKS, sides_of
+from tactile_bayes.contours.family import VERTEX
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import Logarithms, Mixture
@@ -15,9 +17,6 @@ from tactile_bayes.inference.ensembles.moves import Moves, standard_moves
 from tactile_bayes.numerics.differences import central_slopes
 
 __all__ = ["FlankCoordinates"]
-
-_PARAMETERS, _X_C = 4, 3
-"""Number of parameters of a contour, and the column of x_c among them."""
 
 _MAX_SHARE, _NEAR = 0.01, 0.1
 """Share of the draws, and distance of the vertex from x over its median: if a larger share is nearer, the vertex may
@@ -105,63 +104,71 @@ class FlankCoordinates:
 
     Parameters
     ----------
-    family : str
+    flank : str
         "power-law" or "ellipse".
     base : Logarithms
-        Coordinates of all parameters, of which those of the contour are the first four.
+        Coordinates of all parameters.
     x : float
         Position at which the coordinates are taken [length].
     side : float
         1 if the vertex lies at smaller x, −1 if it lies at larger x.
+    columns : tuple of int
+        Places of the flank's two sizes, q and x_c among the parameters.
     proposal : Mixture, optional
         Distribution of coordinates that approximates the posterior.
     """
 
-    family: str
+    flank: str
     base: Logarithms
     x: float
     side: float
+    columns: tuple[int, ...] = (0, 1, 2, 3)
     proposal: Mixture | None = None
 
     @classmethod
     def at_contacts(cls, model: ContourModel, point: Floats) -> FlankCoordinates | None:
         """Return coordinates at the middle of the contacts predicted at a point, shape (parameters,).
 
-        There are none at the vertex, nor for families other than power law and ellipse.
+        There are none at the vertex, nor for flanks other than those of a power law or an ellipse.
         """
-        if model.family.name not in _FLANKS:
+        sides = sides_of(model.family.name)
+        if not set(sides.values()) & set(_FLANKS):
             return None
         at = point[None]
         events = events_of(model.likelihood, model.contours(at), model.rig(at), exact=False)
         x = float(np.mean([events["first_contact_x"], events["snap_off_contact_x"]]))
-        side = float(np.sign(x - point[_X_C]))
-        return cls(model.family.name, model.coordinates, x, side) if abs(side) == 1.0 else None
+        side = float(np.sign(x - point[model.names.index("x_c")]))
+        prefix = "" if len(sides) == 1 else "right_" if side > 0.0 else "left_"
+        if abs(side) != 1.0 or sides[prefix] not in _FLANKS:
+            return None
+        names = [*(f"{prefix}{name}" for name in FLANKS[sides[prefix]].table), *VERTEX]
+        return cls(sides[prefix], model.coordinates, x, side, tuple(map(model.names.index, names)))
 
     @property
     def digest(self) -> str:
         """Identity of the coordinates, as text."""
         proposal = "" if self.proposal is None else self.proposal.digest
-        return f"flank of a {self.family}, side {self.side:g} at {self.x!r}, {self.base.digest}, proposal {proposal}"
+        return f"flank of a {self.flank}, side {self.side:g} at {self.x!r}, {self.base.digest}, proposal {proposal}"
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Return parameters, shape (n, parameters), and the logarithm of the Jacobian determinant, shape (n,)."""
-        log_slope, log_shape, height, log_ratio = coordinates[:, :_PARAMETERS].T
+        log_slope, log_shape, height, log_ratio = coordinates[:, self.columns].T
         based = coordinates.copy()
         with np.errstate(over="ignore", invalid="ignore"):  # infinite parameters are impossible
-            found = _FLANKS[self.family].vertex(log_slope, log_shape, log_ratio)
-            based[:, 0], based[:, 1] = found.first, found.second
-            based[:, 2], based[:, 3] = height - found.rise, self.x - self.side * found.u
+            found = _FLANKS[self.flank].vertex(log_slope, log_shape, log_ratio)
+            contour = found.first, found.second, height - found.rise, self.x - self.side * found.u
+        based[:, self.columns] = np.stack(contour, axis=1)
         points, log_jacobian = self.base.parameters(based)
         return points, log_jacobian + found.log_jacobian
 
     def of(self, points: Floats) -> Floats:
         """Return coordinates of points, shape (..., parameters); NaN if the vertex is on the other side."""
         coordinates = self.base.of(points)
-        first, second, q, x_c = np.moveaxis(points[..., :_PARAMETERS], -1, 0)
+        first, second, q, x_c = np.moveaxis(points[..., self.columns], -1, 0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            found = _FLANKS[self.family].at(first, second, self.side * (self.x - x_c))
-        coordinates[..., 0], coordinates[..., 1] = found.log_slope, found.log_shape
-        coordinates[..., 2], coordinates[..., 3] = q + found.rise, found.log_ratio
+            found = _FLANKS[self.flank].at(first, second, self.side * (self.x - x_c))
+        flank = found.log_slope, found.log_shape, q + found.rise, found.log_ratio
+        coordinates[..., self.columns] = np.stack(flank, axis=-1)
         return coordinates
 
     def covariance(self, point: Floats, covariance: Floats) -> Floats:
@@ -172,7 +179,7 @@ class FlankCoordinates:
 
     def reach_vertex(self, coordinates: Floats) -> bool:
         """Return True if the vertex may lie on the other side as well, according to draws, shape (n, parameters)."""
-        distances = np.abs(self.parameters(coordinates)[0][:, _X_C] - self.x)
+        distances = np.abs(self.parameters(coordinates)[0][:, self.columns[-1]] - self.x)
         return bool(np.quantile(distances, _MAX_SHARE) < _NEAR * np.median(distances))
 
     def with_proposal(self, proposal: Mixture) -> FlankCoordinates:

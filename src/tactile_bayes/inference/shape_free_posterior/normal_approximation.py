@@ -25,8 +25,12 @@ __all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_n
 
 _OF_ROUGHNESS = ("amplitude", "length_scale")
 
-_STEP = 1e-5
-"""Step of the differences by which loads are linearised, over the scale of each coordinate."""
+_STEP, _LARGEST_STEP = 1e-5, 0.01
+"""Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
+of the further ones."""
+
+_DIFFERENCES = 3
+"""Number of times that differences are taken."""
 
 _MIN_CHANGE = 0.03
 """Smallest significant singular value of the linearised residuals, in standard deviations per prior scale."""
@@ -388,46 +392,71 @@ def _huber(residual: Floats) -> Floats:
 
 
 def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> _Observations:
-    """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters."""
+    """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
+
+    Differences along the parameters give rough slopes: loads may exceed the noise so far that a step which is small for
+    one direction leaves another one to rounding errors. Their singular vectors are directions in which steps of about
+    a standard deviation give better ones.
+    """
     model = observer.model
     rig = linear_names(model)[prior.mean.size - len(model.nuisances.names) :]
     nodes = centre.size - 2 - len(rig)
     units = np.append(np.ones(nodes), prior.precision[-2 - len(rig) :] ** -0.5)
-    steps = _STEP * units
-    points = np.concatenate([centre + np.diag(steps), centre - np.diag(steps), centre[None]])
-    contours = Smooth(points[:, :nodes], q=points[:, nodes], x_c=points[:, nodes + 1])
-    residual, agree, late = observer(contours, dict(zip(rig, points[:, nodes + 2 :].T, strict=True)))
-    # A sample that is loaded on one side of a difference only has no slope.
-    smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
-    observed, counts, scatter = [], [], []
-    for channels, scale in zip(model.noise.channels, scales[_white_scales(model)], strict=True):
-        chosen = [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]]
-        of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
-        scatter.append(1.4826 * np.median(np.abs(of_kind[-1])) if of_kind.size else 0.0)
-        of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * scale / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
-        counts.append(float(of_kind.shape[1]))
-        observed.append(_condensed(of_kind, centre, units))
-    observed.append(_condensed(late, centre, units))
-    kinds = np.repeat(np.arange(len(observed)), [len(values) for _, values in observed])
-    slopes, values = (np.concatenate(parts) for parts in zip(*observed, strict=True))
+    columns = [
+        [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]] for channels in model.noise.channels
+    ]
+    noises = scales[_white_scales(model)]
+    axes, steps = np.eye(centre.size), np.full(centre.size, _STEP)
+    for _ in range(_DIFFERENCES):
+        moves = steps[:, None] * axes * units
+        points = np.concatenate([centre + moves, centre - moves, centre[None]])
+        contours = Smooth(points[:, :nodes], q=points[:, nodes], x_c=points[:, nodes + 1])
+        residual, agree, late = observer(contours, dict(zip(rig, points[:, nodes + 2 :].T, strict=True)))
+        # A sample that is loaded on one side of a difference only has no slope.
+        smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
+        lines, scatter = [], []
+        for chosen, noise in zip(columns, noises, strict=True):
+            of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
+            scatter.append(1.4826 * np.median(np.abs(of_kind[-1])) if of_kind.size else 0.0)
+            of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * noise / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
+            lines.append(_Lines.of(of_kind, steps, axes))
+        lines.append(_Lines.of(late, steps, axes))
+        every = [line.slopes / noise for line, noise in zip(lines, (*noises, 1.0), strict=True)]
+        upper = np.linalg.qr(np.concatenate([*every, np.zeros(axes.shape)]), mode="r")
+        _, sizes, axes = np.linalg.svd(upper)
+        steps = 1.0 / np.maximum(sizes, 1.0 / _LARGEST_STEP)
+    observed = [line.condensed() for line in lines]
+    kinds = np.repeat(np.arange(len(observed)), [len(line.values) for line in observed])
+    slopes = np.concatenate([line.slopes for line in observed]) / units
+    values = slopes @ centre + np.concatenate([line.values for line in observed])
+    counts = [float(line.values.size) for line in lines[:-1]]
     return _Observations(slopes, values, kinds, np.array(counts), np.array(scatter))
 
 
-def _condensed(residual: Floats, centre: Floats, units: Floats) -> tuple[Floats, Floats]:
-    """Return combinations of unit-noise residuals that carry all information, by singular value decomposition.
+class _Lines(NamedTuple):
+    """Linearised residuals with unit noise, whose signs are those of measured less expected values."""
 
-    Residuals are those at points on either side of a centre, and last at the centre. Residuals that are not finite at
-    one of the points, like a snap-off that the rod does not reach, are left out.
-    """
-    size = centre.size
-    finite = np.isfinite(residual).all(axis=0)
-    residual = residual if finite.all() else residual[:, finite]
-    slopes = (residual[:size] - residual[size:-1]).T / (2.0 * _STEP)
-    axes, sizes, across = np.linalg.svd(slopes, full_matrices=False)
-    significant = sizes > _MIN_CHANGE
-    combined = sizes[significant, None] * across[significant] / units
-    left = -residual[-1]
-    explained = axes[:, significant].T @ left
-    # The norm of the unexplained residual, with slopes of zero, informs the noise scale.
-    rest = np.sqrt(max(float(left @ left - explained @ explained), 0.0))
-    return np.vstack([combined, np.zeros(size)]), np.append(combined @ centre + explained, rest)
+    slopes: Floats
+    """Of the expected values, over changes of the parameters in prior scales, shape (n, k)."""
+    values: Floats
+    """At the centre, shape (n,)."""
+
+    @classmethod
+    def of(cls, residual: Floats, steps: Floats, axes: Floats) -> _Lines:
+        """Return the lines through residuals, (2 k + 1, n), at points a step along each axis to either side of the
+        centre, and at the centre. Those that are not finite at one of the points, like a snap-off that the rod does not
+        reach, are zero."""
+        size = steps.size
+        finite = np.isfinite(residual).all(axis=0)
+        change = np.where(finite, residual[:size] - residual[size:-1], 0.0) / (2.0 * steps[:, None])
+        return cls(change.T @ axes, -np.where(finite, residual[-1], 0.0))
+
+    def condensed(self) -> _Lines:
+        """Return combinations that carry all information, by singular value decomposition."""
+        axes, sizes, across = np.linalg.svd(self.slopes, full_matrices=False)
+        significant = sizes > _MIN_CHANGE
+        explained = axes[:, significant].T @ self.values
+        # The norm of the unexplained residual, with slopes of zero, informs the noise scale.
+        rest = np.sqrt(max(float(self.values @ self.values - explained @ explained), 0.0))
+        combined = sizes[significant, None] * across[significant]
+        return _Lines(np.vstack([combined, np.zeros(across.shape[1])]), np.append(explained, rest))
