@@ -16,6 +16,7 @@ from tactile_bayes.contours.base import Contour, refuse_unless
 from tactile_bayes.contours.family import VERTEX, DefaultPrior, Family, FamilyParameter, log_normal, parabola_through
 from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.contours.smooth import Smooth
+from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.numerics.selection import evenly_spread
 
 __all__ = ["SHAPE_FREE", "ShapeFreeFamily"]
@@ -117,7 +118,7 @@ class ShapeFreeFamily(Family):
             found = least_squares(of_one, point, jacobian, loss="soft_l1", f_scale=_HUBER, args=(scatter,), max_nfev=40)
             point = found.x
             left = residuals(point[None], 1.0)[0, : x.size]
-            scatter = max(1.4826 * float(np.median(np.abs(left))), 0.1 * _SCATTER)
+            scatter = max(robust_deviation(left), 0.1 * _SCATTER)
         weights = dict(zip(self.directions, point[1:-2].tolist(), strict=True))
         sizes = {"r": float(np.exp(point[0])), "amplitude": amplitude, "length_scale": length}
         return {**sizes, **weights, "q": float(point[-2]), "x_c": float(point[-1])}

@@ -13,7 +13,8 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.discrepancy import PARAMETERS
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import record_of, refuse_no_contour
-from tactile_bayes.load_cell import LoadCell, rough_noise
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import carried_sweeps, travels_of
 
 __all__ = ["DISCREPANCIES", "Residuals", "check_record", "residuals_of"]

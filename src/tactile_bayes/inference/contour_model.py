@@ -20,9 +20,10 @@ from tactile_bayes.inference.noise import Noise
 from tactile_bayes.inference.nuisances import MAY_VANISH, Nuisances
 from tactile_bayes.inference.prior_density import log_density_of
 from tactile_bayes.inference.priors import Prior, support_of
-from tactile_bayes.load_cell import rough_noise, zero_load
+from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.numerics.blocks import blocks
+from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["ContourModel"]

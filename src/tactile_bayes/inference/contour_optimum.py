@@ -20,6 +20,7 @@ from tactile_bayes.inference.found_rig import rig_with
 from tactile_bayes.inference.nuisances import BIASES
 from tactile_bayes.inference.start import Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 from tactile_bayes.record import CHANNELS, present_channels
 
 __all__ = [
@@ -320,7 +321,7 @@ def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
     Beside a discrepancy the noise is that of unloaded or neighbouring samples.
     """
     known = model.likelihood.load_cell.noise
-    sizes = np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
+    sizes = np.maximum(DEVIATION_OVER_MEDIAN * np.median(np.abs(residuals), axis=0), 1e-3)
     fitted = model.deviation[model.present] * (1.0 if model.noise.of_discrepancy else sizes)
     measured = np.flatnonzero(model.present)
     ratio = {CHANNELS[i]: value / (known[i] or 1.0) for i, value in zip(measured, fitted, strict=True)}

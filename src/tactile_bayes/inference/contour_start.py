@@ -35,6 +35,7 @@ from tactile_bayes.inference.shape_free_posterior.normal_approximation import Ob
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 from tactile_bayes.inference.start import Cloud, gather
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
 __all__ = ["Walk", "walk_of"]
 
@@ -148,7 +149,7 @@ def _starting_points(model: ContourModel, rng: np.random.Generator, deadline: De
     """Yield parameters fitted to Step 2's contacts, the likeliest of some draws of the prior, and those of a search."""
     by_contacts = contact_fit(model)
     if by_contacts is not None:
-        of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
+        of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
         rest = (model.prior_medians(model.nuisances.names), of_white, model.prior_medians(model.noise.of_discrepancy))
         yield [np.concatenate([by_contacts, *rest])]
     drawn, _ = model.draw_prior(rng, _SCALE_DRAWS, deadline)

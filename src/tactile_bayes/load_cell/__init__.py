@@ -3,7 +3,6 @@
 from tactile_bayes.load_cell.cell import LoadCell
 from tactile_bayes.load_cell.drift import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.load_cell.lone_samples import LoneSamples
-from tactile_bayes.load_cell.roughness import rough_noise
 from tactile_bayes.load_cell.zero_load import zero_load
 
-__all__ = ["LoadCell", "LoneSamples", "OrnsteinUhlenbeck", "RandomWalk", "rough_noise", "zero_load"]
+__all__ = ["LoadCell", "LoneSamples", "OrnsteinUhlenbeck", "RandomWalk", "zero_load"]

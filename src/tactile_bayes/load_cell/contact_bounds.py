@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import betainc, betaln, fdtri, stdtrit
 
 from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
 __all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
 
@@ -124,7 +125,7 @@ def _clipped(readings: Floats, floor: Floats) -> Floats:
     Nothing is clipped where half of the readings are equal.
     """
     off = readings - np.median(readings, axis=0)
-    deviation = 1.4826 * np.median(np.abs(off), axis=0)
+    deviation = DEVIATION_OVER_MEDIAN * np.median(np.abs(off), axis=0)
     limit = np.where(deviation > 0.0, _CLIP * np.sqrt(deviation**2 + floor), np.inf)
     padded = np.concatenate([off[:1] * 0.0, off, off[:1] * 0.0])
     least, most = np.minimum(padded[:-2], padded[2:]), np.maximum(padded[:-2], padded[2:])

@@ -11,8 +11,9 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.load_cell import LoadCell, rough_noise
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.contact_bounds import FEWEST, contact_bounds
+from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
 
 __all__ = [

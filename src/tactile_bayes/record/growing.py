@@ -16,6 +16,7 @@ import xarray as xr
 from tactile_bayes.checks import check_path
 from tactile_bayes.errors import RecordError
 from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record.csv_format import read_csv_content
 from tactile_bayes.record.files import record_in
 from tactile_bayes.record.schema import Frame
@@ -220,6 +221,6 @@ def _is_behind(angle: float, before: list[float], noise: float) -> bool:
     """Return whether an angle is behind the last ones by more than the scatter, or twice the step, of the encoder."""
     if len(before) < _ENOUGH or angle >= (middle := median(before[-3:])):
         return False
-    scatter = max(noise, 1.4826 * float(np.median(np.abs(np.diff(before, 2)))) / 6.0**0.5)
+    scatter = max(noise, rough_noise(np.array(before)))
     step = min((abs(b - a) for a, b in pairwise(before) if b != a), default=0.0)
     return angle < middle - max(_WIDTHS * scatter, 2.0 * step) - 1e-9

@@ -9,6 +9,7 @@ from scipy import stats
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.diagnostics.inspection.stretches import centred
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, robust_deviation
 
 __all__ = ["outliers", "repeat_chance", "repeated", "runs_of_equals", "stuck", "uneven_steps"]
 
@@ -54,7 +55,7 @@ def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step:
     residual, spread = centred(reading, stretches)
     if residual.size < _FEWEST:
         return flags
-    spread += 1.4826 * 0.5 * step
+    spread += DEVIATION_OVER_MEDIAN * 0.5 * step
     level = 0.5 * false_alarm / reading.size
     most = float(stats.t.isf(level, max(_EFFICIENCY * (residual.size - len(stretches)), 1.0))) * spread
     unloaded = np.concatenate(stretches)
@@ -119,7 +120,7 @@ def uneven_steps(angle: Floats, rows: Index, sense: int) -> Flags:
     if step.size < _FEWEST:
         return flags
     usual = float(np.median(step))
-    spread = 1.4826 * float(np.median(np.abs(step - usual)))
+    spread = robust_deviation(step - usual)
     differs = np.abs(step - usual) > max(_WIDER * abs(usual), 6.0 * spread)
     if np.mean(differs) <= _USUAL:
         flags[1:] = differs

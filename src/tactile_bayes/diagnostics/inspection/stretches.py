@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.numerics.scatter import robust_deviation
 
 __all__ = ["Autocorrelation", "autocorrelation", "centred", "rows_of_sweeps", "unloaded_stretches"]
 
@@ -44,8 +45,7 @@ def centred(reading: Floats, stretches: list[Index]) -> tuple[Floats, float]:
     """Return unloaded readings less the median of their stretch, shape (n,), and their robust standard deviation."""
     residuals = [reading[rows] - np.median(reading[rows]) for rows in stretches]
     together = np.concatenate(residuals) if residuals else np.zeros(0)
-    spread = 1.4826 * float(np.median(np.abs(together))) if together.size else 0.0
-    return together, spread
+    return together, robust_deviation(together)
 
 
 def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:

@@ -18,6 +18,7 @@ from tactile_bayes.inference.contour_optimum import certainly_loaded
 from tactile_bayes.inference.discrepancy import load_in_contact
 from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
+from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import CHANNELS
 
@@ -417,7 +418,7 @@ def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: 
         lines, scatter = [], []
         for chosen, noise in zip(columns, noises, strict=True):
             of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
-            scatter.append(1.4826 * np.median(np.abs(of_kind[-1])) if of_kind.size else 0.0)
+            scatter.append(robust_deviation(of_kind[-1]))
             of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * noise / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
             lines.append(_Lines.of(of_kind, steps, axes))
         lines.append(_Lines.of(late, steps, axes))
