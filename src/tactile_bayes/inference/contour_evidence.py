@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,6 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import in_coordinates
 from tactile_bayes.inference.evidence import bridge_evidence
 from tactile_bayes.inference.matched_priors import widened
-from tactile_bayes.inference.priors import Prior
 
 __all__ = ["WIDTHS", "ContourEvidence", "contour_evidence"]
 
@@ -77,19 +75,8 @@ def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Gener
             if prior is not own[name]:
                 values = points[:, model.names.index(name)]
                 change += prior.logpdf(values) - own[name].logpdf(values)
-        reached = _share_within_reach(model, others, rng, _PRIOR_DRAWS if width == 1.0 else _OTHER_DRAWS)
+        reached = model.share_within_reach(rng, _PRIOR_DRAWS if width == 1.0 else _OTHER_DRAWS, others)
         share = reached if width == 1.0 else share
         logs.append(bridge.log_evidence + logsumexp(change) - np.log(change.size) - np.log(reached))
     error = np.hypot(bridge.standard_error, np.sqrt((1.0 - share) / (share * _PRIOR_DRAWS)))
     return ContourEvidence(np.array(logs), float(error), bridge.overlap)
-
-
-def _share_within_reach(
-    model: ContourModel, priors: Mapping[str, Prior], rng: np.random.Generator, count: int
-) -> float:
-    """Return the share of the prior's contours that are within reach, at least 1/count."""
-    every = {**model.priors, **priors}
-    points = np.stack([every[name].rvs(count, random_state=rng) for name in model.names], axis=1)
-    points = points[((points > model.low) & (points < model.high)).all(axis=1)]
-    usable = model.likelihood.usable(model.contours(points), model.rig(points))
-    return max(int(usable.sum()), 1) / count

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 import xarray as xr
@@ -246,9 +247,13 @@ class ContourModel:
             values[inside[block]] += self.log_likelihood(points[inside[block]])
         return values
 
-    def prior_points(self, rng: np.random.Generator, count: int) -> Floats:
-        """Draw from the prior of all contours, within reach or not; shape (count, d)."""
-        points = np.stack([self.priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
+    def prior_points(
+        self, rng: np.random.Generator, count: int, others: Mapping[str, Prior] = MappingProxyType({})
+    ) -> Floats:
+        """Draw from the prior of all contours, within reach or not, with other priors of some parameters; shape
+        (count, d)."""
+        priors = {**self.priors, **others}
+        points = np.stack([priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
         if self.nuisances.joint is not None:
             points[:, self._jointly] = self.nuisances.joint.draw(rng, count)
         return points
@@ -291,6 +296,15 @@ class ContourModel:
                 "units, and give priors in the record's units"
             )
         return points[:count], len(points) / drawn
+
+    def share_within_reach(
+        self, rng: np.random.Generator, count: int, others: Mapping[str, Prior] = MappingProxyType({})
+    ) -> float:
+        """Return the share of so many draws of `prior_points` that are within reach, at least 1/count."""
+        points = self.prior_points(rng, count, others)
+        points = points[((points > self.low) & (points < self.high)).all(axis=1)]
+        usable = self.likelihood.usable(self.contours(points), self.rig(points)) if len(points) else np.zeros(0)
+        return max(int(usable.sum()), 1) / count
 
     def _zero_load(self) -> xr.Dataset:
         with warnings.catch_warnings():

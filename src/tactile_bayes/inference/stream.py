@@ -176,7 +176,7 @@ class Stream:
         random = self._random(0, updates)
         with threadpool_limits(1):
             advance = _Advance(experiment.model, old, self._particles, random)
-            share = _share_within_reach(experiment.model, random)
+            share = experiment.model.share_within_reach(random, _PRIOR_DRAWS)
             weights = np.exp(advance.log_weights)
             result = self._brief(experiment.model, advance, weights)
         result["samples"] = record.sizes["sample"]
@@ -514,14 +514,6 @@ def _weighted_quantiles(values: Floats, weights: Floats) -> Floats:
     """Return quantiles of every column, shape (levels, columns); NaN where a value is."""
     found = np.quantile(values, _LEVELS, axis=0, weights=weights, method="inverted_cdf")
     return np.where(np.isfinite(values).all(axis=0), found, np.nan)
-
-
-def _share_within_reach(model: ContourModel, random: np.random.Generator) -> float:
-    """Return the share of the prior's contours that are within reach, at least 1/count."""
-    points = model.prior_points(random, _PRIOR_DRAWS)
-    points = points[np.isfinite(model.log_prior(points))]
-    usable = int(model.likelihood.usable(model.contours(points), model.rig(points)).sum()) if len(points) else 0
-    return max(usable, 1) / _PRIOR_DRAWS
 
 
 def _continued(record: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
