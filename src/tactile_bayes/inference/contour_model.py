@@ -119,6 +119,12 @@ class ContourModel:
         return ~np.isnan(self.likelihood.measured).all(axis=0)
 
     @property
+    def noise_columns(self) -> list[list[int]]:
+        """Columns of the channels that were measured and whose white noise each of its parameters scales."""
+        present = self.present
+        return [[i for i in map(CHANNELS.index, channels) if present[i]] for channels in self.noise.channels]
+
+    @property
     def coordinates(self) -> Logarithms:
         """Coordinates of optimisation and sampling: logarithms of the parameters that are strictly positive."""
         return Logarithms((self.low == 0.0) & ~self.may_vanish)
@@ -233,8 +239,11 @@ class ContourModel:
             values += log_density(points[:, columns]).sum(axis=1)
         if self.nuisances.joint is not None:
             values += self.nuisances.joint.log_dependence(points[:, self._jointly])
-        values[~((points > self.low) & (points < self.high)).all(axis=1)] = -np.inf
+        values[~self._between_bounds(points)] = -np.inf
         return values
+
+    def _between_bounds(self, points: Floats) -> Flags:
+        return np.asarray(((points > self.low) & (points < self.high)).all(axis=1))
 
     def log_probability(self, points: Floats) -> Floats:
         """Return the logarithm of prior times likelihood, shape (n,); −inf outside support or reach.
@@ -284,11 +293,8 @@ class ContourModel:
         while (had := sum(map(len, found))) < count and drawn < most:
             if had and deadline.has_passed:
                 break
-            points = self.prior_points(rng, count)
+            found.append(self._within_reach(self.prior_points(rng, count)))
             drawn += count
-            points = points[np.isfinite(self.log_prior(points))]
-            if len(points):
-                found.append(points[self.likelihood.usable(self.contours(points), self.rig(points))])
         points = np.concatenate(found)
         if not len(points):
             raise ReachError(
@@ -301,10 +307,12 @@ class ContourModel:
         self, rng: np.random.Generator, count: int, others: Mapping[str, Prior] = MappingProxyType({})
     ) -> float:
         """Return the share of so many draws of `prior_points` that are within reach, at least 1/count."""
-        points = self.prior_points(rng, count, others)
-        points = points[((points > self.low) & (points < self.high)).all(axis=1)]
-        usable = self.likelihood.usable(self.contours(points), self.rig(points)) if len(points) else np.zeros(0)
-        return max(int(usable.sum()), 1) / count
+        return max(len(self._within_reach(self.prior_points(rng, count, others))), 1) / count
+
+    def _within_reach(self, points: Floats) -> Floats:
+        """Return those of the points, (n, d), of which the rod reaches the contour in every sweep."""
+        points = points[self._between_bounds(points)]
+        return points[self.likelihood.usable(self.contours(points), self.rig(points))] if len(points) else points
 
     def _zero_load(self) -> xr.Dataset:
         with warnings.catch_warnings():

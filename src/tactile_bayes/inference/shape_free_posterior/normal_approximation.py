@@ -20,7 +20,6 @@ from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.reconstruction import loaded_samples
-from tactile_bayes.record import CHANNELS
 
 __all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_names", "scale_names", "split"]
 
@@ -30,8 +29,8 @@ _STEP, _LARGEST_STEP = 1e-5, 0.01
 """Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
 of the further ones."""
 
-_DIFFERENCES = 3
-"""Number of times that differences are taken."""
+_FURTHER_DIFFERENCES = 2
+"""Number of times that differences are taken again."""
 
 _MIN_CHANGE = 0.03
 """Smallest significant singular value of the linearised residuals, in standard deviations per prior scale."""
@@ -111,10 +110,7 @@ class _SmoothNoise(NamedTuple):
         in_contact = largest.any(axis=1)
         if not in_contact.any():
             return nothing
-        sizes = []
-        for channels in model.noise.channels:
-            chosen = [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]]
-            sizes.append(np.sqrt(np.mean(np.square(largest[in_contact][:, chosen]))))
+        sizes = [np.sqrt(np.mean(np.square(largest[in_contact][:, chosen]))) for chosen in model.noise_columns]
         step = float(np.mean(course.step[np.isfinite(course.step)]))
         sweeps = np.count_nonzero(np.isinf(course.step))
         return cls(np.array(sizes), step, step * np.count_nonzero(in_contact) / sweeps)
@@ -403,12 +399,10 @@ def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: 
     rig = linear_names(model)[prior.mean.size - len(model.nuisances.names) :]
     nodes = centre.size - 2 - len(rig)
     units = np.append(np.ones(nodes), prior.precision[-2 - len(rig) :] ** -0.5)
-    columns = [
-        [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]] for channels in model.noise.channels
-    ]
     noises = scales[_white_scales(model)]
-    axes, steps = np.eye(centre.size), np.full(centre.size, _STEP)
-    for _ in range(_DIFFERENCES):
+
+    def differences(axes: Floats, steps: Floats) -> tuple[list[_Lines], list[float]]:
+        """Return the lines along axes, for each kind of noise and for snap-offs, and the scatter of each kind."""
         moves = steps[:, None] * axes * units
         points = np.concatenate([centre + moves, centre - moves, centre[None]])
         contours = Smooth(points[:, :nodes], q=points[:, nodes], x_c=points[:, nodes + 1])
@@ -416,16 +410,20 @@ def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: 
         # A sample that is loaded on one side of a difference only has no slope.
         smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
         lines, scatter = [], []
-        for chosen, noise in zip(columns, noises, strict=True):
+        for chosen, noise in zip(model.noise_columns, noises, strict=True):
             of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
             scatter.append(robust_deviation(of_kind[-1]))
             of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * noise / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
             lines.append(_Lines.of(of_kind, steps, axes))
-        lines.append(_Lines.of(late, steps, axes))
+        return [*lines, _Lines.of(late, steps, axes)], scatter
+
+    axes = np.eye(centre.size)
+    lines, scatter = differences(axes, np.full(centre.size, _STEP))
+    for _ in range(_FURTHER_DIFFERENCES):
         every = [line.slopes / noise for line, noise in zip(lines, (*noises, 1.0), strict=True)]
         upper = np.linalg.qr(np.concatenate([*every, np.zeros(axes.shape)]), mode="r")
         _, sizes, axes = np.linalg.svd(upper)
-        steps = 1.0 / np.maximum(sizes, 1.0 / _LARGEST_STEP)
+        lines, scatter = differences(axes, 1.0 / np.maximum(sizes, 1.0 / _LARGEST_STEP))
     observed = [line.condensed() for line in lines]
     kinds = np.repeat(np.arange(len(observed)), [len(line.values) for line in observed])
     slopes = np.concatenate([line.slopes for line in observed]) / units
