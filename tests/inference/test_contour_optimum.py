@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.contours import Parabola
-from tactile_bayes.inference.contour_optimum import event_brackets, optima_of
+from tactile_bayes.inference.contour_optimum import contact_fit, event_brackets, optima_of
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.load_cell import LoadCell
@@ -44,3 +44,9 @@ def test_searches_find_what_explains_contact_of_a_few_samples(brief):
     truth = np.array([[TRUTH.get(name, usual.get(name, 0.0)) for name in model.names]])
     found = np.concatenate([one.point[None] for one in islice(optima_of(model, np.random.default_rng(1)), 6)])
     assert model.log_probability(found).max() > model.log_probability(truth)[0] - 5.0
+
+
+def test_a_rig_that_corrects_the_record_to_none_fits_no_contour(brief):
+    """As a search may try, from a prior draw that is far out."""
+    _, model = brief
+    assert contact_fit(model, {"drive_angle_offset": -9.0}) is None

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +12,7 @@ from scipy import stats
 from helpers.load_cells import CELL, SHARED, UNKNOWN, WALK, WANDER, cell, moments
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
+from tactile_bayes.load_cell.discrepancy_filter import innovations
 
 N = 40
 SWEEPS = (np.arange(0, 18), np.arange(18, N))
@@ -118,6 +120,40 @@ def test_the_density_is_finite_and_decreases_with_the_residual(length, size, noi
     logs = [sheet.log_likelihood(share * shape, np.zeros((N, 3)), discrepancy=discrepancy) for share in (0.0, 0.5, 1.0)]
     assert np.isfinite(logs).all()
     assert size > 1e6 * noise or logs[0] > logs[1] > logs[2]
+
+
+@pytest.mark.parametrize("length", [0.5, 1e4, 1e7])
+@pytest.mark.parametrize("size", [1.0, 1e6, 1e10])
+def test_it_is_exact_where_loads_are_far_above_the_noise(size, length):
+    """Against Cholesky's decomposition with 80 digits."""
+    count, step, noise = 20, 0.03, 2e-3
+    residual = np.random.default_rng(1).standard_normal(count)
+    deviation = np.repeat([0.0, size, 3.0 * size], [3, 10, 7])
+    steps = np.append(np.inf, np.full(count - 1, step))
+    found, variance = innovations(
+        residual[None, :, None],
+        np.full((1, count, 1), noise),
+        deviation[None, :, None],
+        np.array([np.sqrt(3.0) / length]),
+        np.arange(count),
+        steps,
+        np.zeros((3, 1)),
+        1.0,
+    )
+    with mpmath.workdps(80):
+        a = [mpmath.mpf(np.sqrt(3.0) / length) * mpmath.mpf(step) * k for k in range(count)]
+        fading = [(1 + each) * mpmath.exp(-each) for each in a]
+        covariance = mpmath.matrix(count, count)
+        for i in range(count):
+            for j in range(count):
+                both = mpmath.mpf(deviation[i]) * mpmath.mpf(deviation[j])
+                covariance[i, j] = both * fading[abs(i - j)] + (mpmath.mpf(noise) if i == j else 0)
+        root = mpmath.cholesky(covariance)
+        scaled = mpmath.lu_solve(root, mpmath.matrix(residual.tolist()))
+        expected = np.array([float(scaled[i] * root[i, i]) for i in range(count)])
+        expected_variance = np.array([float(root[i, i] ** 2) for i in range(count)])
+    np.testing.assert_allclose(variance[0, :, 0], expected_variance, rtol=1e-8)
+    np.testing.assert_allclose(found[0, :, 0], expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
 
 
 def test_the_covariance_of_a_record_is_written_out():

@@ -368,6 +368,19 @@ def test_first_contact_is_not_sought_where_directions_are_rounding():
     assert joined == pytest.approx(alone, rel=1e-14)
 
 
+def test_a_tolerance_below_the_rounding_of_loads_loses_no_path():
+    """As of a plan of a sweep, whose loads are not known before: near the pivot they are 1e3 EI/L² and more."""
+    contour = Parabola(
+        np.array([8.36544, 0.171775, 0.5]), np.array([-0.692716, 0.00330950, 0.03]), [0.323473, -0.476722, 0.0]
+    )
+    frame, angles = sweep_frame_of(contour), np.linspace(0.0, 3.5, 50)
+    close = trace(frame, tolerance=np.full(3, 1e-10))
+    exact = trace(frame).observables(angles)
+    assert np.all(close.reach == Reachability.TOUCHES)
+    assert np.abs(exact).max() > 500.0
+    np.testing.assert_allclose(close.observables(angles), exact, rtol=0.0, atol=1e-7 * np.abs(exact).max())
+
+
 def test_own_angles_for_every_contour():
     contour = Parabola(np.array([0.5, 0.7, 0.6]), np.array([0.5, 0.3, 1.5]), 0.0)
     paths = trace(sweep_frame_of(contour))

@@ -149,6 +149,13 @@ def test_a_drive_at_rest_has_either_direction(samples):
         make_record(table, missing=("force_x", "force_y"))
 
 
+def test_a_whole_turn_may_be_read_by_an_encoder_whose_zero_is_off():
+    table = columns(drive_angle=[6.0, 6.2, 6.5, 1.2, 1.1, 1.0])
+    assert make_record(table).drive_angle.values.max() == 6.5
+    with refused(RecordError, "sample 2, column 'drive_angle'", "more than a turn"):
+        make_record(table | {"drive_angle": [6.0, 6.2, 6.9, 1.2, 1.1, 1.0]})
+
+
 def test_sweeps_may_be_interleaved():
     order = [0, 3, 1, 4, 2, 5]
     make_record({name: np.asarray(values)[order] for name, values in columns().items()})

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.errors import InferenceError
+from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.axial_rig import axial_rig
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -347,7 +347,8 @@ def fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, dr
 def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:
     """Return the contour parameters fitted to Step 2's contact points, or None if too few are usable.
 
-    Step 2 takes a given rig, by default one with the zeros of the unloaded samples.
+    Step 2 takes a given rig, by default one with the zeros of the unloaded samples. None stands also for a rig that
+    is so far from the stated one that a record corrected for it is refused.
     """
     if len(present_channels(model.measured)) < len(CHANNELS):
         return None
@@ -355,7 +356,10 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
     moment, *forces = model.deviation * rod.load_units
     cell = replace(model.noise.cell, moment_noise=float(moment), force_noise=float(max(forces)))
     rig = rig_with(model.measured, cell, _zeros(model) if found is None else found, model.nuisances.friction)
-    contacts = rig.contacts()
+    try:
+        contacts = rig.contacts()
+    except (ParameterError, RecordError):
+        return None
     usable = contacts.status.values == "ok"
     if usable.any():
         usable &= contacts.normal_sd.values <= _MAX_RELATIVE_SD * np.median(contacts.normal_sd.values[usable])

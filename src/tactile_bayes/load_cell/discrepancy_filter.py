@@ -87,12 +87,23 @@ def _advance(covariance: Floats, a: float) -> None:
         p0, p1 = covariance[0, k], covariance[1, k]
         covariance[0, k] = covariance[k, 0] = t00 * p0 + t01 * p1
         covariance[1, k] = covariance[k, 1] = t10 * p0 + t11 * p1
-    # What the data know, 1 − P, decays: the process is stationary.
-    d00, d01, d11 = 1.0 - covariance[0, 0], -covariance[0, 1], 1.0 - covariance[1, 1]
-    covariance[0, 0] = 1.0 - (t00 * t00 * d00 + 2.0 * t00 * t01 * d01 + t01 * t01 * d11)
-    covariance[1, 1] = 1.0 - (t10 * t10 * d00 + 2.0 * t10 * t11 * d01 + t11 * t11 * d11)
-    between = -(t00 * t10 * d00 + (t00 * t11 + t01 * t10) * d01 + t01 * t11 * d11)
+    p00, p01, p11 = covariance[0, 0], covariance[0, 1], covariance[1, 1]
+    covariance[0, 0] = t00 * t00 * p00 + 2.0 * t00 * t01 * p01 + t01 * t01 * p11 + _new_variance(2.0 * a)
+    covariance[1, 1] = t10 * t10 * p00 + 2.0 * t10 * t11 * p01 + t11 * t11 * p11
+    covariance[1, 1] += 2.0 * a * (1.0 - a) * e * e - math.expm1(-2.0 * a)
+    between = t00 * t10 * p00 + (t00 * t11 + t01 * t10) * p01 + t01 * t11 * p11 + 2.0 * t01 * t01
     covariance[0, 1] = covariance[1, 0] = between
+
+
+@compiled
+def _new_variance(x: float) -> float:
+    """Return 1 − exp(−x) (1 + x + x²/2), the variance of the process given its state x/2 before."""
+    if x > 1.0:
+        return 1.0 - math.exp(-x) * (1.0 + x * (1.0 + 0.5 * x))
+    series = 1.0
+    for k in range(18, 3, -1):
+        series = 1.0 + x / k * series
+    return math.exp(-x) * x * x * x / 6.0 * series
 
 
 @compiled
@@ -108,6 +119,17 @@ def _pull_back(vector: Floats, a: float) -> None:
     e = math.exp(-a)
     v0, v1 = vector[0], vector[1]
     vector[0], vector[1] = e * ((1.0 + a) * v0 - a * v1), e * (a * v0 + (1.0 - a) * v1)
+
+
+@compiled
+def _bound(covariance: Floats, states: int) -> None:
+    """Keep variances ≥ 0 and correlations within ±1, of which rounding leaves less where the noise is next to none."""
+    for k in range(states):
+        covariance[k, k] = max(covariance[k, k], 0.0)
+        for j in range(k):
+            largest = covariance[k, k] * covariance[j, j]
+            if covariance[k, j] * covariance[k, j] > largest:
+                covariance[k, j] = covariance[j, k] = math.copysign(math.sqrt(largest), covariance[k, j])
 
 
 @compiled
@@ -176,6 +198,10 @@ def _filter_channel(
             mean[k] += seen[k] * error / variance
             for j in range(states):
                 covariance[k, j] -= seen[k] * seen[j] / variance
+        if not wanders:
+            covariance[0, 0] = seen[0] / w * noise[sample] / variance
+            covariance[0, 1] = covariance[1, 0] = seen[1] / w * noise[sample] / variance
+        _bound(covariance, states)
         if gains.size:
             gains[i, :] = 0.0
             for k in range(states):

@@ -14,6 +14,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
 from tactile_bayes.load_cell.data_sheet import CERTAIN, DataSheet
 from tactile_bayes.record import CHANNELS, column_of, frame_of, in_frame, present_channels, validate
+from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 
 __all__ = ["corrected", "measured", "stated_entries"]
 
@@ -41,7 +42,7 @@ def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator) -> 
         _put(made, channel, readings[:, index])
     if any(getattr(sheet, f"drive_angle_{flaw}") for flaw in ("offset", "backlash", "noise", "resolution")):
         angles = corrupted_angles(sheet, made["drive_angle"].values, made["direction"].values, rng)
-        beyond = np.abs(angles) > 2.0 * math.pi
+        beyond = np.abs(angles) > LARGEST_DRIVE_ANGLE
         if beyond.any():
             sample = int(np.argmax(beyond))
             raise ParameterError(

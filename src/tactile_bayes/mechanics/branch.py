@@ -138,6 +138,9 @@ _NO_MOMENT = 1e-7
 _ROUNDING = 1e-14
 """Tail of the series of a drive angle that its rounding leaves [rad]."""
 
+_RESOLVED_LOADS = 1e-10
+"""Error of loads that no tolerance is below, over the loads: rounding may leave it where the rod bears on its base."""
+
 _TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_OUT), int(Reachability.GRAZES)
 _TOUCHES_TWICE, _SLIPS_OFF = int(Reachability.TOUCHES_TWICE), int(Reachability.SLIPS_OFF)
 _STICKS, _TOO_CLOSE, _CLEARANCE = int(Reachability.STICKS), int(Reachability.TOO_CLOSE), CLEARANCE
@@ -229,7 +232,8 @@ def _excess(accuracy: Accuracy, tolerance: Floats, dips: bool, work: LegCurves) 
     found = max(angle / max(accuracy.resolved * change, _ROUNDING), angle / accuracy.sharp)
     for c in range(3):
         loads = curves.series[c]
-        found = max(found, (tail(loads) + angle * change_of(loads) / change) / tolerance[c])
+        tolerated = max(tolerance[c], _RESOLVED_LOADS * (abs(loads[0]) + change_of(loads)))
+        found = max(found, (tail(loads) + angle * change_of(loads) / change) / tolerated)
     if not accuracy.polished:
         for c in range(ANGLE):
             found = max(found, tail(curves.series[c]) / (accuracy.resolved * max(change_of(curves.series[c]), 1.0)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from collections.abc import Mapping
@@ -19,6 +20,7 @@ __all__ = [
     "COLUMNS",
     "DIRECTIONS",
     "FRAMES",
+    "LARGEST_DRIVE_ANGLE",
     "LOAD_CELL_UNITS",
     "MEASURED",
     "REQUIRED",
@@ -36,6 +38,9 @@ __all__ = [
 Frame = Literal["fixed", "turning"]
 Kind = Literal["integer", "number", "text"]
 Scale = Literal["length_unit", "moment_unit", "force_unit"]
+
+LARGEST_DRIVE_ANGLE = 2.0 * math.pi + 0.5
+"""Largest drive angle of a record in radians: a turn, and what the zero of an encoder may be off by."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.record.schema import DIRECTIONS
+from tactile_bayes.record.schema import DIRECTIONS, LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source
 
 __all__ = ["base_of_sample", "bases_of", "carried_sweeps", "refuse_impossible_sweeps", "travels_of"]
@@ -34,7 +34,7 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
             "direction",
             f"{str(direction[sample])!r} is no direction: write 'forward' or 'backward'",
         )
-    beyond = (angle > 2 * math.pi) | (angle < -2 * math.pi)
+    beyond = (angle > LARGEST_DRIVE_ANGLE) | (angle < -LARGEST_DRIVE_ANGLE)
     if beyond.any():
         sample = int(np.argmax(beyond))
         what = (

@@ -41,7 +41,7 @@ def validate(record: xr.Dataset) -> xr.Dataset:
     RecordError
         If a column is missing or misspelt; a cell of a measured column is text, NaN or infinite (a channel that
         is NaN throughout is a missing channel, and allowed); every channel is missing; a direction is neither
-        "forward" nor "backward"; drive angles look like degrees (more than a turn, 2π); one sweep has two
+        "forward" nor "backward"; drive angles look like degrees (more than a turn); one sweep has two
         directions or two pivots, or turns about one with a drive angle that runs against its direction; units are unknown, or differ
         from column to column; the rod is not stated; the frame of the load cell is neither "fixed" nor "turning";
         there are no samples.
