@@ -92,7 +92,9 @@ def test_an_inspection_and_contacts_of_a_carried_rod(carried, tmp_path):
     assert call("reconstruct", measured, "--out", tmp_path / "contacts").exit_code == 0
 
 
-@pytest.mark.parametrize(("name", "kind"), [("carried", "travel"), ("mixed", "sample")])
+@pytest.mark.parametrize(
+    ("name", "kind"), [("carried", "travel"), pytest.param("mixed", "sample", marks=pytest.mark.slow)]
+)
 def test_a_run_draws_every_figure_over_what_moves(request, name, kind):
     measured, run = request.getfixturevalue(name)
     assert drive_axis(tb.read_record(measured)).kind == kind
