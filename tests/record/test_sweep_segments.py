@@ -133,6 +133,7 @@ def test_a_file_without_sweeps_is_split(tmp_path, suffix):
             "do: unwrap them (numpy.unwrap), so that none is beyond a turn (±2π), or, if the drive was reset there, "
             "give columns 'sweep' and 'direction'",
         ),
+        ([6.2, 6.3, 6.4, 0.2, 0.3], "the drive angle jumps by about a turn, from 6.4 rad (line 4) to 0.2 rad (line 5)"),
         ([-3.0, -3.1, 3.1, 3.0], "the drive angle jumps by about a turn, from -3.1 rad (line 3) to 3.1 rad (line 4)"),
         (
             [60.0, 66.3, 72.6],

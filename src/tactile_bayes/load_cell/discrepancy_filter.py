@@ -183,7 +183,7 @@ def _filter_channel(
             _advance_mean(mean, rate * away)
         away = 0.0
         seen[0], seen[1] = w * covariance[0, 0], w * covariance[1, 0]
-        # Rounding may leave a negative variance if the discrepancy is 1e8 times the noise.
+        # Rounding may leave a negative variance.
         variance = max(w * seen[0], 0.0) + noise[sample]
         at = w * mean[0]
         if wanders:
@@ -196,11 +196,16 @@ def _filter_channel(
         states = _STATES if wanders else 2
         for k in range(states):
             mean[k] += seen[k] * error / variance
-            for j in range(states):
-                covariance[k, j] -= seen[k] * seen[j] / variance
-        if not wanders:
-            covariance[0, 0] = seen[0] / w * noise[sample] / variance
-            covariance[0, 1] = covariance[1, 0] = seen[1] / w * noise[sample] / variance
+        if wanders:
+            for k in range(_STATES):
+                for j in range(_STATES):
+                    covariance[k, j] -= seen[k] * seen[j] / variance
+        else:
+            left = noise[sample] / variance  # a factor keeps the digits that a difference loses
+            covariance[0, 0] *= left
+            covariance[0, 1] *= left
+            covariance[1, 0] *= left
+            covariance[1, 1] -= seen[1] * seen[1] / variance
         _bound(covariance, states)
         if gains.size:
             gains[i, :] = 0.0

@@ -195,8 +195,8 @@ def trace(
     profile : Profile, optional
         Rod whose rest curvature or rigidity varies along it; by default it is uniform and a circular arc at rest.
     tolerance : ndarray, shape (3,), optional
-        Tolerated errors of the loads [EI/L and EI/L²], for likelihoods, which is several times faster; by default
-        events are computed to rounding.
+        Tolerated errors of the loads [EI/L and EI/L²], for likelihoods, which is several times faster; at least 1e-10
+        of the loads. By default events are computed to rounding.
     drive_angles : ndarray, shape (k,) or (n, k), optional
         Drive angles of states, in the sweep frame [rad].
     relative : bool

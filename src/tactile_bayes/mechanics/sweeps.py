@@ -388,8 +388,8 @@ def solve_sweeps(
     table : ForwardTable, optional
         Table of the profile, for loads with errors of some 1e-6 of the largest.
     tolerance : ndarray, shape (3,), optional
-        Tolerated errors of moment and forces [EI/L and EI/L²]; by default events are exact, and loads have errors of
-        some 1e-8 of the largest.
+        Tolerated errors of moment and forces [EI/L and EI/L²], at least 1e-10 of the loads; by default events are
+        exact, and loads have errors of some 1e-8 of the largest.
     states : bool
         Whether states are computed.
     polished : bool

@@ -9,6 +9,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.record.parsing import parsed_column
+from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source, Table
 
 __all__ = ["split_at_turns", "turning_points"]
@@ -197,7 +198,7 @@ def _refuse_wrapped(angle: Floats, moved: Flags, source: Source) -> None:
     It is an angle modulo a turn, or a drive that was reset after a sweep of a whole turn, which begins a new sweep.
     Only the user knows which, so that the angle is not unwrapped here.
     """
-    if np.abs(angle).max() > 2.0 * math.pi:  # probably degrees, which are refused later
+    if np.abs(angle).max() > LARGEST_DRIVE_ANGLE:  # probably degrees, which are refused later
         return
     step = np.diff(angle)
     wrapped = (np.abs(np.abs(step) - 2.0 * math.pi) < _WIDEST) & ~moved[1:]

@@ -355,7 +355,7 @@ def _angles(grid: Floats | None, step: float | None, sweep: SweepEvents) -> Floa
         step = _STEP if step is None else step
         first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
         angles = np.arange(np.floor(first / step) - _MARGIN, np.ceil(snap / step) + _MARGIN + 1) * step
-        angles = angles[np.abs(angles) <= 2.0 * np.pi]  # the limit of a record
+        angles = angles[np.abs(angles) <= 2.0 * np.pi]  # a drive turns by no more
     else:
         angles = grid
     if not sweep.clear:

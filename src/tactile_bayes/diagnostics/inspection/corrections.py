@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 
 __all__ = ["OTHER_ANGLE", "Correction", "as_it_is", "corrections_for"]
 
@@ -89,7 +90,7 @@ def _counted(sense: int, turns: float) -> Transform:
             drive_angle=(drive.dims, angles, drive.attrs),
             direction=(way.dims, way.values if sense > 0 else others, way.attrs),
         )
-        return counted.isel(sample=np.abs(angles) < 2.0 * np.pi)  # no record has larger ones, and they carry no load
+        return counted.isel(sample=np.abs(angles) < LARGEST_DRIVE_ANGLE)  # those beyond carry no load
 
     return counted_anew
 
