@@ -38,7 +38,7 @@ def inferred_without(problem, sample):
     rest = problem._replace(model=problem.without(~kept), loaded=problem.loaded[kept])
     draws = sampled(rest, seed=5, settings=SETTINGS).draws.samples
     points = draws[:, :: max(1, draws.shape[1] // 1000)].reshape(-1, draws.shape[-1])
-    logs = model.likelihood.score(*model.loads_with_errors(points), model.noise_scale(points), pointwise=True)
+    logs = model.likelihood.score(*model.loads_and_discrepancy(points)[:2], model.noise_scale(points), pointwise=True)
     of_sample = logs[:, sample]
     weights = np.exp(of_sample - of_sample.max())
     return logsumexp(of_sample) - np.log(of_sample.size), 3.0 * np.std(weights) / np.mean(weights) / weights.size**0.5

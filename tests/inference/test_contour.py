@@ -437,8 +437,8 @@ def test_blocks_of_points_make_no_difference(cell, monkeypatch):
         sizes.append(len(points))
         return together(model, points)
 
-    together = ContourModel.loads_with_errors
-    monkeypatch.setattr(ContourModel, "loads_with_errors", few)
+    together = ContourModel.felt
+    monkeypatch.setattr(ContourModel, "felt", few)
     monkeypatch.setattr(blocks, "_MOST", 3 * 3 * measured().sizes["sample"])
     parts = infer_as_stated(measured(), **draw)
     assert max(sizes) <= 3

@@ -37,7 +37,7 @@ def test_evidence_is_the_mean_likelihood_over_the_prior(family):
     priors = {width: stats.lognorm(s=0.02 * width, scale=model.priors[size].median()) for width in WIDTHS}
     widest = {**model.priors, size: priors[2.0]}
     points = np.stack([widest[name].rvs(count, random_state=rng) for name in model.names], axis=1)
-    likelihood = model.likelihood.score(*model.loads_with_errors(points), model.noise_scale(points))
+    likelihood = model.likelihood.score(*model.loads_and_discrepancy(points)[:2], model.noise_scale(points))
     for log_evidence, prior in zip(found.log_evidence, priors.values(), strict=True):
         logs = likelihood + prior.logpdf(points[:, 0]) - priors[2.0].logpdf(points[:, 0])
         weights = np.exp(logs - logs.max())

@@ -185,10 +185,17 @@ class ContourModel:
         sensed = self.nuisances.sensed(loads[path], self.values(points), self.likelihood.load_cell)
         return sensed, events[path]
 
-    def loads_with_errors(self, points: Floats) -> tuple[Floats, Flags]:
-        """Return `loads` for every encoder error, shape (n, errors, samples, 3), and which points are usable, (n,)."""
-        loads, reached = self.likelihood.predict_with_errors(self.contours(points), self.rig(points))
-        return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell), reached
+    def felt(self, points: Floats) -> tuple[Floats, Flags]:
+        """Return the loads of contour and rig alone for every encoder error, and which points are usable.
+
+        Shapes are (n, errors, samples, 3) and (n,).
+        """
+        return self.likelihood.predict_with_errors(self.contours(points), self.rig(points))
+
+    def sensed(self, points: Floats, felt: Floats) -> tuple[Floats, Discrepancy | None]:
+        """Return the loads that the load cell senses, from those of `felt` and in their place, and the discrepancy."""
+        discrepancy = self.discrepancy(points, felt[:, 0])
+        return self.nuisances.sensed(felt, self.values(points), self.likelihood.load_cell), discrepancy
 
     def noise_scale(self, points: Floats) -> Floats:
         """Return the factors on the load cell's standard deviations, shape (n, 3)."""
@@ -219,18 +226,19 @@ class ContourModel:
 
     def log_likelihood(self, points: Floats, *, pointwise: bool = False) -> Floats:
         """Return the log-likelihood of points, shape (n,), or of each sample, (n, samples); −inf out of reach."""
-        loads, reached, discrepancy = self.loads_and_discrepancy(points)
+        return self.log_likelihood_of(points, *self.felt(points), pointwise=pointwise)
+
+    def log_likelihood_of(self, points: Floats, felt: Floats, usable: Flags, *, pointwise: bool = False) -> Floats:
+        """Return the `log_likelihood` of points from the results of `felt`, whose loads are lost."""
+        loads, discrepancy = self.sensed(points, felt)
         scale = self.noise_scale(points)
-        return self.likelihood.score(loads, reached, scale, pointwise=pointwise, discrepancy=discrepancy)
+        return self.likelihood.score(loads, usable, scale, pointwise=pointwise, discrepancy=discrepancy)
 
     def loads_and_discrepancy(self, points: Floats) -> tuple[Floats, Flags, Discrepancy | None]:
-        """Return the results of `loads_with_errors`, and the discrepancy."""
-        if not self.noise.of_discrepancy:
-            return *self.loads_with_errors(points), None
-        loads, reached = self.likelihood.predict_with_errors(self.contours(points), self.rig(points))
-        discrepancy = self.discrepancy(points, loads[:, 0])
-        sensed = self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell)
-        return sensed, reached, discrepancy
+        """Return the results of `sensed`, and which points are usable between them."""
+        felt, usable = self.felt(points)
+        loads, discrepancy = self.sensed(points, felt)
+        return loads, usable, discrepancy
 
     def log_prior(self, points: Floats) -> Floats:
         """Return the logarithm of the prior density, shape (n,), without the exclusion of contours out of reach."""

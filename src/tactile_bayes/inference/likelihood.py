@@ -214,6 +214,16 @@ class RecordLikelihood:
         return lines
 
     @property
+    def contacts(self) -> list[tuple[tuple[float, float], bool, float]]:
+        """Pivot [length], whether contact is on the side of a backward sweep, and sense of the drive, by segment."""
+        return [(segment.base, segment.backward, segment.sense) for segment in self.segments]
+
+    @property
+    def is_carried(self) -> bool:
+        """True if a drive carries the base in any sweep."""
+        return self._lines is not None
+
+    @property
     def noise(self) -> Floats:
         """Approximate standard deviation of each channel, to which tolerances are relative, shape (3,)."""
         return self._noise

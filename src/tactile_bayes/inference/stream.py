@@ -11,8 +11,6 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
-from scipy.special import logsumexp, softmax
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
@@ -21,12 +19,11 @@ from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import identity_of
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, in_coordinates, seed_sequence
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, seed_sequence
 from tactile_bayes.inference.ensembles.identity import changes, seed_as_text
-from tactile_bayes.inference.ensembles.moves import step_ensembles
-from tactile_bayes.inference.ensembles.proposal import effective
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.particles import DECORRELATED, Particles, effective_number
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
@@ -40,18 +37,6 @@ __all__ = ["Stream"]
 
 _LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
 """Levels of the quantiles of parameters and of the band."""
-
-_LEAST_SHARE = 0.5
-"""Effective number of particles over their number below which they are resampled and moved."""
-
-_DECORRELATED = 0.2
-"""Largest correlation of a parameter before and after the moves at which these end."""
-
-_MOST_STEPS, _BRIDGE_STEPS = 40, 3
-"""Largest number of steps after the last stage of an update, and number of steps after each stage before it."""
-
-_MOST_STAGES = 200
-"""Largest number of stages of an update."""
 
 _PRIOR_DRAWS = 4000
 """Number of draws from the prior for the share of contours within reach."""
@@ -175,8 +160,8 @@ class Stream:
         updates = 0 if old is None else old.updates + 1
         random = self._random(0, updates)
         with threadpool_limits(1):
-            advance = _Advance(experiment.model, old, self._particles, random)
-            share = experiment.model.share_within_reach(random, _PRIOR_DRAWS)
+            advance = Particles(experiment.model, old, self._particles, random)
+            share = _share_within_reach(experiment.model, old, random)
             weights = np.exp(advance.log_weights)
             result = self._brief(experiment.model, advance, weights)
         result["samples"] = record.sizes["sample"]
@@ -217,7 +202,7 @@ class Stream:
         if state is None:
             raise InferenceError("the stream has no samples yet: call update with some first")
         model, random = state.experiment.model, self._random(1, state.updates)
-        left = _effective(state.log_weights)
+        left = effective_number(state.log_weights)
         picked = random.permutation(resampled(np.exp(state.log_weights), len(state.log_weights), random))
         unknown = np.full(len(model.names), np.nan)
         draws = Draws(
@@ -234,7 +219,7 @@ class Stream:
             autocorrelation_time=unknown,
             evaluations=state.evaluations,
             seconds=state.seconds,
-            converged=not state.correlation >= _DECORRELATED,
+            converged=not state.correlation >= DECORRELATED,
             message=f"sequential Monte Carlo, {left:.0f} effective of {len(picked)} particles",
             stuck=0,
         )
@@ -348,12 +333,12 @@ class Stream:
         key = (*self._entropy.spawn_key, purpose, updates)
         return np.random.default_rng(np.random.SeedSequence(self._entropy.entropy, spawn_key=key))
 
-    def _brief(self, model: ContourModel, advance: _Advance, weights: Floats) -> xr.Dataset:
+    def _brief(self, model: ContourModel, advance: Particles, weights: Floats) -> xr.Dataset:
         quantiles = _weighted_quantiles(advance.points, weights)
         units = [unit_of(model, name) for name in model.names]
         result = xr.Dataset(
             {
-                "effective_number": _effective(advance.log_weights),
+                "effective_number": effective_number(advance.log_weights),
                 "stages": advance.stages,
                 "steps": advance.steps,
                 "correlation": advance.correlation,
@@ -368,146 +353,13 @@ class Stream:
         return result
 
 
-class _Advance:
-    """Particles of the record so far, from those of the record before."""
-
-    def __init__(self, model: ContourModel, old: StreamState | None, count: int, random: np.random.Generator) -> None:
-        self.model = model
-        self.stages, self.steps, self.correlation, self.evaluations = 0, 0, np.nan, 0
-        self._random = np.random.RandomState(random.integers(2**32))
-        self._generator = random
-        self._before, self._added = _model_of(old), []
-        if old is None:
-            self.points, share = self._first(count, random)
-            self.log_weights, self.log_integral = np.full(count, -np.log(count)), float(np.log(share))
-        else:
-            self._added = [name for name in model.names if name not in old.experiment.model.names]
-            self.points = self._extended(old, random)
-            self.log_weights, self.log_integral = old.log_weights, old.log_integral
-        self._coordinates = model.coordinates
-        self.values, self._old = self._both(self.points)
-        self._run()
-
-    def _first(self, count: int, random: np.random.Generator) -> tuple[Floats, float]:
-        points, share = self.model.draw_prior(random, count)
-        return points[np.arange(count) % len(points)], share
-
-    def _extended(self, old: StreamState, random: np.random.Generator) -> Floats:
-        """Return the particles with new parameters drawn from their priors."""
-        names, count = old.experiment.model.names, len(old.points)
-        columns = [
-            old.points[:, names.index(name)]
-            if name in names
-            else self.model.priors[name].rvs(count, random_state=random)
-            for name in self.model.names
-        ]
-        return np.stack(columns, axis=1)
-
-    def _both(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the log-density of points with the new samples, and that without them, both with all parameters."""
-        self.evaluations += len(points)
-        new = self.model.log_probability(points)
-        if self._before is None:
-            return new, self.model.log_prior(points)
-        own = points[:, [self.model.names.index(name) for name in self._before.names]]
-        old = self._before.log_probability(own)
-        for name in self._added:
-            old = old + self.model.priors[name].logpdf(points[:, self.model.names.index(name)])
-        return new, old
-
-    def _run(self) -> None:
-        power = 0.0
-        while power < 1.0:
-            with np.errstate(invalid="ignore"):
-                ratio = self.values - self._old
-            ratio[np.isnan(ratio)] = -np.inf
-            if not np.any(np.isfinite(ratio)):
-                raise InferenceError(
-                    "no particle explains the new samples: check them, or begin a stream with more particles"
-                )
-            target, step = _LEAST_SHARE * len(ratio), 1.0 - power
-
-            def excess(part: float, ratio: Floats = ratio, target: float = target) -> float:
-                return _effective(self.log_weights + part * ratio) - target
-
-            if not self.stages and excess(step) >= 0.0:
-                self._weigh(ratio)
-                return
-            self.stages += 1
-            if excess(step) < 0.0:
-                low = 1e-12 * step
-                step = brentq(excess, low, step, xtol=1e-14) if excess(low) > 0.0 else max(low, 1e-3 * step)
-                if self.stages > _MOST_STAGES:
-                    raise InferenceError(
-                        f"the new samples took more than {_MOST_STAGES} stages: give more particles, or smaller blocks"
-                    )
-                power += step
-            else:
-                power = 1.0
-            self._weigh(step * ratio)
-            picked = resampled(np.exp(self.log_weights), len(self.log_weights), self._generator)
-            self.points, self.values, self._old = self.points[picked], self.values[picked], self._old[picked]
-            self.log_weights = np.full(len(picked), -np.log(len(picked)))
-            self._move(power)
-
-    def _weigh(self, logs: Floats) -> None:
-        weighted = self.log_weights + logs
-        total = float(logsumexp(weighted))
-        self.log_weights, self.log_integral = weighted - total, self.log_integral + total
-
-    def _move(self, power: float) -> None:
-        """Move the particles by the steps of an ensemble, after the last stage until they have lost their places."""
-        coordinates, last = self._coordinates, power == 1.0
-
-        def target(points: Floats) -> Floats:
-            if last:
-                self.evaluations += len(points)
-                return self.model.log_probability(points)
-            new, old = self._both(points)
-            return _between(new, old, power)
-
-        at = coordinates.of(self.points)
-        began = at
-        ensemble = at[None]
-        _, growth = coordinates.parameters(at)
-        density = (_between(self.values, self._old, power) + growth)[None]
-        transformed, moves = in_coordinates(target, coordinates), coordinates.moves()
-        for step in range(_MOST_STEPS if last else _BRIDGE_STEPS):
-            ensemble, density = step_ensembles(transformed, moves, [self._random], ensemble, density)
-            self.steps += 1
-            self.correlation = _correlation(began, ensemble[0])
-            if last and step and self.correlation < _DECORRELATED:
-                break
-        self.points, growth = coordinates.parameters(ensemble[0])
-        if last:
-            self.values = density[0] - growth
-        else:
-            self.values, self._old = self._both(self.points)
-
-
-def _model_of(state: StreamState | None) -> ContourModel | None:
-    return None if state is None else state.experiment.model
-
-
-def _between(new: Floats, old: Floats, power: float) -> Floats:
-    """Return the log-density between two, −inf where either is."""
-    if power == 1.0:
-        return new
-    with np.errstate(invalid="ignore"):
-        values = power * new + (1.0 - power) * old
-    return np.where(np.isnan(values), -np.inf, values)
-
-
-def _effective(log_weights: Floats) -> float:
-    """Return the effective number of particles, for weights that need not be normalised."""
-    return effective(softmax(log_weights))
-
-
-def _correlation(before: Floats, after: Floats) -> float:
-    """Return the largest correlation of a column with itself, before and after, in absolute value."""
-    one, two = before - before.mean(axis=0), after - after.mean(axis=0)
-    norm = np.sqrt((one**2).sum(axis=0) * (two**2).sum(axis=0))
-    return float(np.max(np.abs((one * two).sum(axis=0)) / np.where(norm > 0.0, norm, np.inf)))
+def _share_within_reach(model: ContourModel, old: StreamState | None, random: np.random.Generator) -> float:
+    """Return the share of the prior within reach, which only a new sweep or parameter changes."""
+    before = None if old is None else old.experiment.model
+    if old is None or before is None or model.likelihood.is_carried or before.names != model.names:
+        return model.share_within_reach(random, _PRIOR_DRAWS)
+    is_same = before.likelihood.contacts == model.likelihood.contacts
+    return old.share if is_same else model.share_within_reach(random, _PRIOR_DRAWS)
 
 
 def _weighted_quantiles(values: Floats, weights: Floats) -> Floats:

@@ -1,0 +1,135 @@
+"""Prints how far the posterior of a growing record can be trusted, how late it is, and what a stopping rule saves.
+
+Parabolas and rigs are drawn from the default priors of `infer`, swept forward and backward in steps of 2° and measured,
+as in `benchmarks.calibration`. `tb.Stream` takes each record in blocks. At a quarter, half, three quarters and all of
+it the truth has a rank among draws, and the band of 95 % is compared with it at nine positions within 0.1 L of the
+vertex, all of them at once. The last update is compared with the posterior that `infer_contour` has of the whole
+record. A rule asks for a band that is nowhere wider than a tolerance. Records are kept in results/stream, from which a
+stopped run resumes.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import tactile_bayes as tb
+from tactile_bayes.calibration.calibrate import calibration_replicate
+from tactile_bayes.calibration.ranks import uniformity_p_value
+from tactile_bayes.errors import StudyError, TactileBayesError
+from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
+
+OUT = Path("results/stream")
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+SEED, BLOCKS, PARTICLES, DRAWS = 2033, 12, 1000, 99
+QUARTERS = ("a quarter", "half", "three quarters", "all")
+AROUND = np.linspace(-0.1, 0.1, 9)
+"""Positions, relative to the vertex as the whole record shows it [L]."""
+TOLERANCES = (0.02, 0.01, 0.005)
+"""Largest widths of the band [L] at which a rule stops."""
+
+Row = Mapping[str, Any]
+RECORDS = Kind("records", StudyError, dict, lambda row: {name: v for name, v in row.items() if name != "number"})
+
+
+def main(records: int = 100) -> None:
+    identity = {"particles": str(PARTICLES), "blocks": str(BLOCKS), "seed": str(SEED)}
+    with open_results_store(identity, OUT, RECORDS) as store:
+        kept = keep_outcomes(store, one, (), records, workers=None, scheduler=None, progress=None)
+    every = [kept[number] for number in range(records)]
+    report([row for row in every if "error" not in row], [row["error"] for row in every if "error" in row])
+
+
+def one(task: tuple[tuple[()], int]) -> Row:
+    """Return ranks, bands and times of one record."""
+    _, number = task
+    try:
+        replicate = calibration_replicate(number, seed=SEED, load_cell=CELL)
+    except TactileBayesError as error:
+        return {"error": f"{number}: {error}"}
+    assert replicate.measured is not None
+    assert replicate.posterior is not None
+    try:
+        return compared(replicate.measured, replicate.truth, replicate.posterior, number)
+    except TactileBayesError as error:
+        return {"error": f"{number}: {error}"}
+
+
+def compared(measured: xr.Dataset, truth: Mapping[str, float], posterior: xr.DataTree, number: int) -> Row:
+    x = float(posterior["posterior"]["x_c"].median()) + AROUND
+    stream = tb.Stream(load_cell=CELL, seed=number, particles=PARTICLES, x=x)
+    height = tb.contours.Parabola(truth["a"], truth["q"], truth["x_c"]).height(x)
+    row: dict[str, Any] = {"ranks": [], "held": [], "width": [], "seconds": []}
+    for k, block in enumerate(np.array_split(np.arange(measured.sizes["sample"]), BLOCKS), start=1):
+        now = stream.update(measured.isel(sample=block))
+        row["seconds"].append(float(now.seconds))
+        low, high = now.height.sel(level=0.025).values, now.height.sel(level=0.975).values
+        row["width"].append(float(np.max(high - low)))
+        row["held"].append(bool(np.all((low <= height) & (height <= high))))
+        if k * len(QUARTERS) % BLOCKS == 0:
+            row["ranks"].append(ranks(stream.posterior(), truth, number))
+    draws = np.stack([posterior["posterior"][name].values.ravel() for name in now.parameter.values])
+    expected, deviation = np.quantile(draws, now.level.values, axis=1), draws.std(axis=1)
+    off = (now.parameters.values - expected) / deviation
+    row["off"] = dict(zip(map(str, now.parameter.values), np.abs(off).max(axis=0).tolist(), strict=True))
+    row["off_median"] = float(np.abs(off[now.level.values == 0.5]).max())
+    band = tb.contour_band(posterior, x)
+    row["wider"] = float(np.mean((high - low) / (band["upper"] - band["lower"]).values))
+    row["converged"] = bool(posterior.attrs["converged"])
+    return row
+
+
+def ranks(posterior: xr.DataTree, truth: Mapping[str, float], number: int) -> dict[str, int]:
+    """Return ranks of the truth among as many draws, without replacement."""
+    drawn = posterior["posterior"].isel(chain=0)
+    picked = np.random.default_rng(number).choice(drawn.sizes["draw"], DRAWS, replace=False)
+    return {name: int(np.sum(drawn[name].values[picked] < truth[name])) for name in truth if name in drawn}
+
+
+def report(rows: list[Row], errors: list[str]) -> None:
+    print(f"{len(rows)} records; {len(errors)} ended with an error {'; '.join(errors)}")
+    seconds = np.array([row["seconds"] for row in rows])
+    print(f"an update takes {np.median(seconds):.2f} s (median), 5 to 95 %: {_range(seconds)}, the longest of a record")
+    print(f"{np.median(seconds.max(axis=1)):.2f} s (median)\n")
+    print(f"{'of the record':<18}{'smallest p':>12}{'band holds':>12}{'width [L]':>12}")
+    for k, (name, at) in enumerate(zip(QUARTERS, range(BLOCKS // 4 - 1, BLOCKS, BLOCKS // 4), strict=True)):
+        names = sorted({one for row in rows for one in row["ranks"][k]})
+        of = [[row["ranks"][k][one] for row in rows if one in row["ranks"][k]] for one in names]
+        values = [uniformity_p_value(each, DRAWS) for each in of]
+        held, width = (np.array([row[what][at] for row in rows]) for what in ("held", "width"))
+        smallest = f"{min(values):.2g} of {len(values)}"
+        print(f"{name:<18}{smallest:>12}{_share(held):>12}{np.median(width):>12.4f}")
+    sure = [row for row in rows if row["converged"]]
+    off = np.array([max(row["off"].values()) for row in sure])
+    median = np.array([row["off_median"] for row in sure])
+    print(f"\nagainst infer_contour, {len(sure)} records on which it converged, in its standard deviations: largest")
+    print(f"difference of a quantile {np.median(off):.2f} (median of records), {off.max():.2f} (largest), of a median")
+    wider = _range([row["wider"] for row in sure])
+    print(f"{np.median(median):.2f}, {median.max():.2f}; width of the band over its width, 5 to 95 %: {wider}\n")
+    print(f"{'band at most':<18}{'stops before':>12}{'samples saved':>14}{'band holds then':>16}{'at the end':>12}")
+    for tolerance in TOLERANCES:
+        enough = np.array([row["width"] for row in rows]) <= tolerance
+        first = np.where(enough.any(axis=1), enough.argmax(axis=1), BLOCKS - 1)
+        held = np.array([row["held"] for row in rows])
+        saved = 1.0 - (first + 1) / BLOCKS
+        before = first < BLOCKS - 1
+        then = [f"{held[before, at].mean():.0%}" if before.any() else "" for at in (first[before], -1)]
+        print(f"{tolerance:<18}{before.mean():>12.0%}{saved.mean():>14.0%}{then[0]:>16}{then[1]:>12}")
+
+
+def _range(values: Any) -> str:
+    low, high = np.quantile(values, [0.05, 0.95])
+    return f"{low:.2f} to {high:.2f}"
+
+
+def _share(held: Any) -> str:
+    return f"{np.mean(held):.0%} ± {np.sqrt(np.mean(held) * (1.0 - np.mean(held)) / len(held)):.0%}"
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
