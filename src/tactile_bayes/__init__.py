@@ -30,6 +30,7 @@ _HOMES = {
     "Rotation": "sweep",
     "SamplerSettings": "inference.ensembles",
     "Stream": "inference.stream",
+    "StreamComparison": "comparison.streams",
     "Translation": "sweep",
     "calibrate": "calibration.calibrate",
     "calibration_replicate": "calibration.calibrate",
@@ -84,6 +85,7 @@ if TYPE_CHECKING:
     from tactile_bayes.calibration.calibrate import calibration_replicate as calibration_replicate
     from tactile_bayes.calibration.misspecification import Misspecification as Misspecification
     from tactile_bayes.comparison.families import compare_families as compare_families
+    from tactile_bayes.comparison.streams import StreamComparison as StreamComparison
     from tactile_bayes.diagnostics.inspection import inspect_record as inspect_record
     from tactile_bayes.diagnostics.record_check import check_record as check_record
     from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs as check_units_and_signs

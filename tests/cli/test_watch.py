@@ -192,6 +192,22 @@ def test_it_ends_when_the_band_is_narrow(path, lines, follow):
     assert end["reason"] == "the band is narrow enough"
 
 
+def test_of_several_families_the_probabilities_are_told(path, lines, follow):
+    head, rows = lines
+    write(path, head, rows[:60])
+    options = ("--family", "circle", "--family", "parabola", "--until-probability", 0.9)
+    one, end = objects(follow(*options, json=True, then=[lambda: pytest.fail("goes on")]))
+    assert list(one["probabilities"]) == ["circle", "parabola"]
+    assert sum(one["probabilities"].values()) == pytest.approx(1.0)
+    assert one["probabilities"]["parabola"] > 0.9
+    assert {row["quantity"] for row in one["quantities"]} == {"a", "q", "x_c", "noise_scale"}
+    assert end["reason"] == "parabola is probable enough"
+    said = follow(*options).stdout.splitlines()
+    assert said[0].startswith("60 samples, resumed; band up to ")
+    assert said[1].startswith("    Probability of the shapes: parabola ")
+    assert "Probability of the shapes" in (path.parent / "run" / "watch.html").read_text(encoding="utf-8")
+
+
 def test_control_c_ends_it_with_the_answer(path, lines, monkeypatch):
     head, rows = lines
     write(path, head, rows[:30])
@@ -222,6 +238,7 @@ def test_quiet_prints_the_answer_alone_and_warns_of_few_particles(path, lines, f
         (["--between", "0.1"], "--between is '0.1': give 2 numbers"),
         (["--between", "0.1,-0.1"], "give the smaller one first"),
         (["--family", "star"], "star"),
+        (["--until-probability", 0.9], "until_probability is for several families"),
         (["--nuisance", "leaver"], "--as-stated and --nuisance contradict"),
         (["--column", "force_x"], "--column force_x: write"),
         (["--column", "force_x=Fx"], "Fx"),

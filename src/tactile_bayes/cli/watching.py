@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_bayes.cli.analysis import Family, answer_of, decimals
+from tactile_bayes.cli.analysis import answer_of, decimals
 from tactile_bayes.cli.answer import Answer, columns_of, print_object
 from tactile_bayes.cli.command import Out, Output, Seed
 from tactile_bayes.cli.interrupts import acknowledge_interrupt
@@ -30,6 +30,9 @@ _STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl
 
 _PAGE = "watch.html"
 
+_RARE = 0.001
+"""Smallest probability of a shape that is written out."""
+
 _PER_PARAMETER = 30
 """Number of particles for each parameter below which quantiles can be off by several standard deviations."""
 
@@ -41,7 +44,13 @@ def watch(
         Path, typer.Argument(help="Record, .csv, to which another program appends rows; it may not be there yet.")
     ],
     out: Out,
-    family: Family = "parabola",
+    family: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Shape, as in infer, by default parabola; of several, repeated, the probability of each is told, and "
+            "the band is averaged over them."
+        ),
+    ] = None,
     reading: RecordOptions,
     unknown: UnknownOptions,
     rig: KnownRig = None,
@@ -56,6 +65,10 @@ def watch(
     until_width: Annotated[
         float | None,
         typer.Option(help="End when the band is nowhere wider than this [m, or L] between the ends of --between."),
+    ] = None,
+    until_probability: Annotated[
+        float | None,
+        typer.Option(help="End when a shape of several has a greater probability.", min=0.0, max=1.0),
     ] = None,
     poll: Annotated[float, typer.Option(help="Time from one look at the file to the next [s].", min=0.01)] = 0.5,
     idle: Annotated[
@@ -82,9 +95,10 @@ def watch(
         probability=probability,
         between=None if between is None else numbers_asked(between, "--between", 2),
         until_width=until_width,
+        until_probability=until_probability,
+        families=family or ["parabola"],
         record_file=record,
         command=ctx.meta["words"],
-        family=family,
         friction=unknown.friction,
         nuisances=unknown.nuisances,
         seed=seed,
@@ -128,8 +142,8 @@ class _Follower:
             if growth is not None:
                 self._take(growth)
                 news = time.monotonic()
-                if self.last is not None and self.last.may_stop:
-                    return "the band is narrow enough"
+                if self.last is not None and self.last.enough:
+                    return self.last.enough
             elif self.idle is not None and began - news >= self.idle:
                 return f"no new rows for {self.idle:g} s"
             took = time.monotonic() - began
@@ -192,7 +206,11 @@ class _Follower:
         self.parameters = parameters
         if update.restarted:
             self.tell(f"samples before have changed or do not go on in order: all {update.samples:,} taken anew")
-        words = [f"{sentence(_band(update))}.", f"The answer is {behind:.1f} s behind its newest sample."]
+        words = [
+            *_families(update),
+            f"{sentence(_band(update))}.",
+            f"The answer is {behind:.1f} s behind its newest sample.",
+        ]
         self.write_page(
             _counted(update, self.is_late),
             [*words, *(f"{message}." for message in self.messages)],
@@ -202,7 +220,8 @@ class _Follower:
             print_object(self._numbers(update, now, behind), in_a_line=True)
         elif not self.output.quiet:
             typer.echo(f"{_counted(update, self.is_late)}; {_band(update)}; {behind:.1f} s behind")
-            typer.echo(f"    {_parameters(update)}")
+            for line in [*_families(update), _parameters(update)]:
+                typer.echo(f"    {line}")
         self.messages.clear()
 
     def write_page(self, headline: str, sentences: Sequence[str], *, is_well: bool, is_last: bool = False) -> None:
@@ -236,7 +255,8 @@ class _Follower:
             "probability": update.summary.attrs["probability"],
             "quantities": columns_of(update.summary, "quantity"),
             "band_width": update.width,
-            "may_stop": update.may_stop,
+            "probabilities": dict(update.probabilities),
+            "may_stop": bool(update.enough),
             "converged": bool(update.posterior.attrs["converged"]),
             "message": update.posterior.attrs["message"],
             "warnings": list(self.messages),
@@ -257,14 +277,14 @@ def _answer(ctx: typer.Context, follower: _Follower, reason: str) -> Answer:
         raise InferenceError(f"{follower.path}: {reason}, and there is no sample in it")
     run = follower.watched.finish(follower.load_cell)
     said = f"Ended after {last.samples:,} samples: {reason}"
-    words = [*run.verdicts, f"{sentence(_band(last))}."]
+    words = [*run.verdicts, *_families(last), f"{sentence(_band(last))}."]
     follower.write_page(said, words, is_well=run.verdicts[0].startswith("All is well"), is_last=True)
     folder = follower.watched.folder.path
     files = {**run.files, "stream": follower.watched.state, "page": folder / _PAGE}
     answer = answer_of(ctx, run, files, {}, "")
     return replace(
         answer,
-        parts=[f"{said}.", "", *answer.parts],
+        parts=[f"{said}.", *_families(last), "", *answer.parts],
         numbers=lambda: {"event": "end", "reason": reason, "samples_taken": last.samples, **answer.numbers()},
         in_a_line=True,
     )
@@ -276,6 +296,17 @@ def _counted(update: WatchUpdate, is_late: bool) -> str:
         return f"{update.samples:,} samples, resumed"
     together = " taken together, since the update before took longer than --poll" if is_late else ""
     return f"{update.samples:,} samples, {update.new:,} new{together}"
+
+
+def _families(update: WatchUpdate) -> list[str]:
+    """Return a sentence on the probabilities of families, the most probable one first; none for a single family."""
+    from tactile_bayes.report.wording import percent
+
+    if not update.probabilities:
+        return []
+    in_order = sorted(update.probabilities.items(), key=lambda item: -item[1])
+    shares = [f"{name} {'<' if p < _RARE else ''}{percent(max(round(p, 3), _RARE))}" for name, p in in_order]
+    return [f"Probability of the shapes: {', '.join(shares)}; parameters are those of the first, the band is averaged."]
 
 
 def _band(update: WatchUpdate) -> str:

@@ -37,14 +37,14 @@ from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import record_hash, rod_of
 
-__all__ = ["SHAPES", "compare_families"]
+__all__ = ["GIVEN_UP", "SHAPES", "checked_families", "compare_families"]
 
 SHAPES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
 """Families that are compared by default; the last but one has flanks of two shapes."""
 
 _USUAL = WIDTHS.index(1.0)
 
-_GIVEN_UP = 100.0
+GIVEN_UP = 100.0
 """Distance of a family's largest log-likelihood below the best log-evidence from which the family is not sampled."""
 
 _HOPELESS = 20.0
@@ -194,7 +194,7 @@ def compare_families(
     check_switch("leave_one_out", leave_one_out)
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
     check_function("progress", progress)
-    names = _checked(families, priors)
+    names = checked_families(families, priors)
     joint = None if rig is None else rig_prior(rig)
     experiment = Experiment(measured, SHAPE_FREE.name, load_cell, {}, rod, friction, nuisances, joint=joint)
     if rig is not None:
@@ -213,7 +213,7 @@ def compare_families(
         with threadpool_limits(1):
             walk = walk_of(problem.model, of_family[0], settings)
             ceiling = _ceiling(problem.model, walk)
-        if ceiling < best - _GIVEN_UP:
+        if ceiling < best - GIVEN_UP:
             tried[name] = _Tried(ceiling)
             continue
         watch = None if progress is None else functools.partial(progress, name)
@@ -238,7 +238,14 @@ def _ceiling(model: ContourModel, walk: Walk) -> float:
     return float(np.max(model.log_probability(points) - model.log_prior(points)))
 
 
-def _checked(families: Sequence[str], priors: Mapping[str, Mapping[str, Prior]] | None) -> list[str]:
+def checked_families(families: Sequence[str], priors: Mapping[str, Mapping[str, Prior]] | None) -> list[str]:
+    """Return the names of families that are to be compared, with their own priors.
+
+    Raises
+    ------
+    ParameterError
+        If they are fewer than two different ones, unknown, or not those of the priors.
+    """
     if isinstance(families, str):
         raise ParameterError(f"families is {families!r}: give several, like ['parabola', {families!r}]")
     names = [family_named(name).name for name in check_names("families", families)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
+from pathlib import Path
 from time import perf_counter
 from typing import Any, Self
 
@@ -27,15 +28,16 @@ from tactile_bayes.inference.particles import DECORRELATED, Particles, effective
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
-from tactile_bayes.inference.stream_state import StreamState, read_state, write_state
+from tactile_bayes.inference.stream_state import StreamState, read_tree, state_in, tree_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import carried_sweeps, validate
+from tactile_bayes.record.netcdf import write_netcdf
 
-__all__ = ["Stream"]
+__all__ = ["LEVELS", "Stream"]
 
-_LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
+LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
 """Levels of the quantiles of parameters and of the band."""
 
 _PRIOR_DRAWS = 4000
@@ -79,8 +81,9 @@ class Stream:
     Notes
     -----
     Each update computes the likelihood of the whole record so far again: exact for drifts, correlated noise and
-    integrated biases, but an update costs more the longer the record. With 1,000 particles of four parameters, updates
-    by 28 samples, up to 330 of a double sweep, took 0.5 to 6 s on one core. The result states its `seconds`.
+    integrated biases, but an update costs more the longer the record. With 1,000 particles, updates by 28 samples, up
+    to 330 of a double sweep, took 0.1 to 0.6 s on one core with four parameters, and 0.1 to 1.4 s with 13, once the rod
+    had touched; the first two took 3 and 2 s, and 4 and 3 s. The result states its `seconds`.
 
     Too few particles lose the posterior without a sign. With 13 parameters and 332 samples at once, medians were up to
     nine standard deviations off with 200 particles, 0.5 with 400 and 0.1 with 650: take 30 for each parameter at least,
@@ -162,16 +165,9 @@ class Stream:
         with threadpool_limits(1):
             advance = Particles(experiment.model, old, self._particles, random)
             share = _share_within_reach(experiment.model, old, random)
-            weights = np.exp(advance.log_weights)
-            result = self._brief(experiment.model, advance, weights)
-        result["samples"] = record.sizes["sample"]
-        result["log_evidence"] = advance.log_integral - np.log(share)
-        result["seconds"] = ((), perf_counter() - began, {"units": "s"})
-        if self._stop is not None:
-            result["may_stop"] = bool(self._stop(result))
         seconds, evaluations = (0.0, 0) if old is None else (old.seconds, old.evaluations)
         had = np.nan if old is None else old.correlation
-        self._state = StreamState(
+        state = StreamState(
             record,
             experiment,
             advance.points,
@@ -184,7 +180,24 @@ class Stream:
             evaluations + advance.evaluations,
             seconds + perf_counter() - began,
         )
+        result = self._brief(state).assign(stages=advance.stages, steps=advance.steps, correlation=advance.correlation)
+        result["seconds"] = ((), perf_counter() - began, {"units": "s"})
+        if self._stop is not None:
+            result["may_stop"] = bool(self._stop(result))
+        self._state = state
         return result
+
+    def latest(self) -> xr.Dataset:
+        """Return what is known so far, as `update` does, without what is of an update alone.
+
+        These are `stages`, `steps`, `seconds` and `may_stop`; `correlation` is that of the last steps of any update.
+
+        Raises
+        ------
+        InferenceError
+            Before the first update.
+        """
+        return self._brief(self._known_state())
 
     def posterior(self) -> xr.DataTree:
         """Return the posterior of the record so far, as `infer_contour` does, with equally weighted particles as draws.
@@ -198,9 +211,7 @@ class Stream:
         InferenceError
             Before the first update.
         """
-        state = self._state
-        if state is None:
-            raise InferenceError("the stream has no samples yet: call update with some first")
+        state = self._known_state()
         model, random = state.experiment.model, self._random(1, state.updates)
         left = effective_number(state.log_weights)
         picked = random.permutation(resampled(np.exp(state.log_weights), len(state.log_weights), random))
@@ -265,10 +276,12 @@ class Stream:
         >>> one.drop_vars("seconds").identical(other.drop_vars("seconds"))
         True
         """
-        state = self._state
-        if state is None:
-            raise InferenceError("the stream has no samples yet: call update with some first")
-        write_state(state, self._identity(state.experiment), check_path("path", path))
+        write_netcdf(self.as_tree(), check_path("path", path))
+
+    def as_tree(self) -> xr.DataTree:
+        """Return what `save` writes."""
+        state = self._known_state()
+        return tree_of(state, self._identity(state.experiment))
 
     @classmethod
     def resume(cls, path: str | os.PathLike[str], record: xr.Dataset | None = None, **arguments: Any) -> Self:
@@ -292,13 +305,18 @@ class Stream:
             As in `update`.
         """
         path, stream = check_path("path", path), cls(**arguments)
-        stored = read_state(path)
+        stream.restore(read_tree(path), path, record)
+        return stream
+
+    def restore(self, tree: xr.DataTree, path: Path, record: xr.Dataset | None = None) -> None:
+        """Go on from what `as_tree` has returned, which is in the file at a path; see `resume`."""
+        stored = state_in(tree, path)
         own = stored.record
         if record is not None:
             own = validate(record).isel(sample=slice(0, own.sizes["sample"]))
-        experiment = stream._experiment(own)
+        experiment = self._experiment(own)
         state = stored.state(own, experiment)
-        differing = changes(stored.identity, stream._identity(experiment))
+        differing = changes(stored.identity, self._identity(experiment))
         if not differing:
             with threadpool_limits(1):
                 values = experiment.model.log_probability(state.points)
@@ -309,8 +327,24 @@ class Stream:
                 f"{path} is of another stream, which differs in {'; '.join(differing)}: give another file, or what was "
                 "given then"
             )
-        stream._state = state
-        return stream
+        self._state = state
+
+    def contour_draws(self, count: int) -> Floats:
+        """Return draws of the contour's parameters from the particles, shape (count, parameters of the contour).
+
+        Raises
+        ------
+        InferenceError
+            Before the first update.
+        """
+        state = self._known_state()
+        picked = resampled(np.exp(state.log_weights), count, self._random(2, state.updates))
+        return state.points[picked, : len(state.experiment.model.family.parameters)]
+
+    def _known_state(self) -> StreamState:
+        if self._state is None:
+            raise InferenceError("the stream has no samples yet: call update with some first")
+        return self._state
 
     def _experiment(self, record: xr.Dataset) -> Experiment:
         experiment = Experiment(record, *self._arguments, joint=self._joint)
@@ -333,21 +367,21 @@ class Stream:
         key = (*self._entropy.spawn_key, purpose, updates)
         return np.random.default_rng(np.random.SeedSequence(self._entropy.entropy, spawn_key=key))
 
-    def _brief(self, model: ContourModel, advance: Particles, weights: Floats) -> xr.Dataset:
-        quantiles = _weighted_quantiles(advance.points, weights)
+    def _brief(self, state: StreamState) -> xr.Dataset:
+        model, points, weights = state.experiment.model, state.points, np.exp(state.log_weights)
         units = [unit_of(model, name) for name in model.names]
         result = xr.Dataset(
             {
-                "effective_number": effective_number(advance.log_weights),
-                "stages": advance.stages,
-                "steps": advance.steps,
-                "correlation": advance.correlation,
-                "parameters": (("level", "parameter"), quantiles),
+                "samples": state.record.sizes["sample"],
+                "log_evidence": state.log_integral - np.log(state.share),
+                "effective_number": effective_number(state.log_weights),
+                "correlation": state.correlation,
+                "parameters": (("level", "parameter"), _weighted_quantiles(points, weights)),
             },
-            coords={"level": list(_LEVELS), "parameter": list(model.names), "unit": ("parameter", units)},
+            coords={"level": list(LEVELS), "parameter": list(model.names), "unit": ("parameter", units)},
         )
         if self._x is not None:
-            heights = model.contours(advance.points).take(np.arange(len(weights))[:, None]).height(self._x)
+            heights = model.contours(points).take(np.arange(len(weights))[:, None]).height(self._x)
             result = result.assign_coords(x=self._x)
             result["height"] = (("level", "x"), _weighted_quantiles(heights, weights))
         return result
@@ -364,7 +398,7 @@ def _share_within_reach(model: ContourModel, old: StreamState | None, random: np
 
 def _weighted_quantiles(values: Floats, weights: Floats) -> Floats:
     """Return quantiles of every column, shape (levels, columns); NaN where a value is."""
-    found = np.quantile(values, _LEVELS, axis=0, weights=weights, method="inverted_cdf")
+    found = np.quantile(values, LEVELS, axis=0, weights=weights, method="inverted_cdf")
     return np.where(np.isfinite(values).all(axis=0), found, np.nan)
 
 

@@ -15,9 +15,9 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.record import validate
-from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
+from tactile_bayes.record.netcdf import read_netcdf
 
-__all__ = ["StoredState", "StreamState", "read_state", "write_state"]
+__all__ = ["StoredState", "StreamState", "read_tree", "state_in", "tree_of"]
 
 _KIND = "stream of tactile-bayes"
 
@@ -67,32 +67,42 @@ class StoredState(NamedTuple):
         return StreamState(record, experiment, **known)
 
 
-def write_state(state: StreamState, identity: Mapping[str, str], path: Path) -> None:
-    """Write a state with its record and its identity to a NetCDF file, whole or not at all."""
+def tree_of(state: StreamState, identity: Mapping[str, str]) -> xr.DataTree:
+    """Return a state with its record and its identity as a tree for a file."""
     arrays = {name: (dims, getattr(state, name)) for name, dims in _ARRAYS.items()}
     particles = xr.Dataset({**arrays, **{name: getattr(state, name) for name in _NUMBERS}})
     tree = xr.DataTree.from_dict({"record": state.record, "particles": particles})
     tree.attrs = {"kind": _KIND, "format": _FORMAT, "identity": json.dumps(dict(identity))}
-    write_netcdf(tree, path)
+    return tree
 
 
-def read_state(path: Path) -> StoredState:
-    """Read a state.
+def read_tree(path: Path) -> xr.DataTree:
+    """Read the file of a stream, or of several.
 
     Raises
     ------
     InferenceError
-        If there is no such file, or it is damaged, of another kind, or of a later format.
+        If there is no such file, or it is damaged.
     """
     if not path.is_file():
         raise InferenceError(f"there is no file {path}: give the state that a stream has saved")
-    tree = read_netcdf(
+    return read_netcdf(
         path,
         xr.open_datatree,
         lambda what: InferenceError(f"{path} {what}: {_HOW}"),
         decode_times=False,
         decode_timedelta=False,
     )
+
+
+def state_in(tree: xr.DataTree, path: Path) -> StoredState:
+    """Return the state in a tree from `tree_of`, or of a part of the file.
+
+    Raises
+    ------
+    InferenceError
+        If it is no whole state, of another kind, or of a later format.
+    """
     if tree.attrs.get("kind") != _KIND:
         raise InferenceError(f"{path} holds no state of a stream: give a file that Stream.save has written")
     if tree.attrs["format"] != _FORMAT:

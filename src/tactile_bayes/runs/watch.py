@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import perf_counter
@@ -14,6 +14,7 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_numbers, check_positive, check_probability
+from tactile_bayes.comparison.streams import StreamComparison
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.stream import Stream
@@ -51,8 +52,10 @@ class WatchUpdate(NamedTuple):
     """Band between the ends that were given, or of what the sweeps touch if they go on; None if they touch nothing."""
     width: float
     """Largest width of the band [length]; NaN without one."""
-    may_stop: bool
-    """True if the band is narrow enough, and the particles have lost their places in the last moves."""
+    probabilities: Mapping[str, float]
+    """Probability of each family, if there are several."""
+    enough: str
+    """Reason why measuring may stop; empty if it may not, or the particles have kept their places in the last moves."""
 
 
 @contextmanager
@@ -86,17 +89,21 @@ class Watch:
         sweeps touch if they go on.
     until_width : float, optional
         Width below which the band has to be everywhere between these ends for measuring to stop [length].
+    until_probability : float, optional
+        Probability of a family above which measuring may stop.
+    families : sequence of str
+        Families of contours; of several, the posterior is that of the most probable one, and the band is averaged.
     record_file : path-like
         File that is followed; the posterior states it.
     command : sequence of str
         Words of the command; the posterior states them.
     **options
-        Arguments of `Stream`, without the load cell.
+        Arguments of `Stream`, without family and load cell.
 
     Raises
     ------
     ParameterError
-        If an argument is not valid, or a width is given without ends.
+        If an argument is not valid, a width is given without ends, or the probability of a family for a single one.
     """
 
     def __init__(
@@ -106,6 +113,8 @@ class Watch:
         probability: float = 0.95,
         between: Sequence[float] | None = None,
         until_width: float | None = None,
+        until_probability: float | None = None,
+        families: Sequence[str] = ("parabola",),
         record_file: str | os.PathLike[str],
         command: Sequence[str] = (),
         **options: Any,
@@ -121,12 +130,20 @@ class Watch:
             check_positive("until_width", until_width)
             if between is None:
                 raise ParameterError("until_width is for a stretch of the contour: give its ends in x with between")
-        self._until_width = until_width
-        self._file, self._command, self._options = record_file, command, options
-        family_named(options.get("family", "parabola"))
-        Stream(**options)  # both refuse what they can before the first sample
+        if until_probability is not None:
+            check_probability("until_probability", until_probability)
+            if len(families) < 2:
+                raise ParameterError("until_probability is for several families: give two or more")
+        self._until_width, self._until_probability = until_width, until_probability
+        self._file, self._command = record_file, command
+        if len(families) == 1:
+            self._kind: type[Stream | StreamComparison] = Stream
+            self._options = {**options, "family": family_named(families[0]).name}
+        else:
+            self._kind, self._options = StreamComparison, {**options, "families": list(families)}
+        self._kind(**self._options)  # which refuses what it can before the first sample
         self.folder = RunFolder(out)
-        self._stream: Stream | None = None
+        self._stream: Stream | StreamComparison | None = None
         self._answer: tuple[xr.DataTree, xr.Dataset] | None = None
 
     @property
@@ -151,7 +168,7 @@ class Watch:
         began = perf_counter()
         if not self.state.is_file():
             return None
-        self._stream = Stream.resume(self.state, record, **self._options, load_cell=load_cell)
+        self._stream = self._kind.resume(self.state, record, **self._options, load_cell=load_cell)
         return self._update(self._stream, self.samples, began, sha256)
 
     def forget(self) -> None:
@@ -189,7 +206,7 @@ class Watch:
                 self._stream.update(record.isel(sample=slice(had, None)))
                 self._stream.save(self.state)
                 return self._update(self._stream, had, began, sha256)
-        stream = Stream(**self._options, load_cell=load_cell)
+        stream = self._kind(**self._options, load_cell=load_cell)
         stream.update(record)
         self._stream = stream
         stream.save(self.state)
@@ -208,18 +225,23 @@ class Watch:
         posterior, record = self._answer
         return complete(posterior, record, self.folder.path, load_cell=load_cell, probability=self._probability)
 
-    def _update(self, stream: Stream, had: int, began: float, sha256: str, *, restarted: bool = False) -> WatchUpdate:
+    def _update(
+        self, stream: Stream | StreamComparison, had: int, began: float, sha256: str, *, restarted: bool = False
+    ) -> WatchUpdate:
         """Write the posterior, and return the answer."""
         posterior, record = stream.posterior(), stream.record
         assert record is not None
         posterior.attrs |= origin_of(record, self._probability, self._command) | file_of(self._file, sha256)
         self.folder.write_posterior(posterior)
         self._answer = posterior, record
-        band = None
+        band, probabilities = None, {}
+        if isinstance(stream, StreamComparison):
+            latest = stream.latest()
+            probabilities = dict(zip(latest.family.values.tolist(), latest.probability.values.tolist(), strict=True))
         with suppress(InferenceError):  # nothing is touched yet
-            band = contour_band(posterior, reach(posterior) if self._x is None else self._x, self._probability)
+            x = reach(posterior) if self._x is None else self._x
+            band = contour_band(latest if probabilities else posterior, x, self._probability)
         widths = np.array([np.nan]) if band is None else (band["upper"] - band["lower"]).values
-        narrow = self._until_width is not None and bool(np.all(widths < self._until_width))
         return WatchUpdate(
             samples=record.sizes["sample"],
             new=record.sizes["sample"] - had,
@@ -229,8 +251,19 @@ class Watch:
             summary=summary(posterior, self._probability),
             band=band,
             width=float(np.nanmax(widths)) if np.isfinite(widths).any() else np.nan,
-            may_stop=narrow and bool(posterior.attrs["converged"]),
+            probabilities=probabilities,
+            enough=self._enough(widths, probabilities) if posterior.attrs["converged"] else "",
         )
+
+    def _enough(self, widths: Floats, probabilities: Mapping[str, float]) -> str:
+        """Return the first reason why measuring may stop."""
+        if self._until_width is not None and np.all(widths < self._until_width):
+            return "the band is narrow enough"
+        if self._until_probability is not None:
+            family = max(probabilities, key=probabilities.__getitem__)
+            if probabilities[family] > self._until_probability:
+                return f"{family} is probable enough"
+        return ""
 
 
 def _continues(before: xr.Dataset | None, record: xr.Dataset) -> bool:

@@ -18,7 +18,7 @@ def family_weights(comparison: xr.Dataset) -> tuple[Floats, str]:
     Parameters
     ----------
     comparison : xr.Dataset
-        From `compare_families`.
+        From `compare_families`, or from `StreamComparison.update`.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def family_weights(comparison: xr.Dataset) -> tuple[Floats, str]:
     """
     if "contour_draws" not in comparison:
         raise InferenceError("this comparison has no draws of contours: compare again")
-    if comparison.attrs["none_fits"]:
+    if comparison.attrs.get("none_fits"):
         raise InferenceError("none of the families fits the record: their average does not describe it either")
     for name, source in (("probability", "evidence"), ("weight", "stacking")):
         if name in comparison and np.isfinite(comparison[name].values).all():

@@ -1,0 +1,117 @@
+"""Families compared while a record grows, against streams of each and the comparison of the whole record."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.special import softmax
+
+import tactile_bayes as tb
+from tactile_bayes.errors import InferenceError, ParameterError, RecordError
+from tactile_bayes.inference.matched_priors import matched_priors
+
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+OPTIONS = {"load_cell": CELL, "nuisances": [], "seed": 1, "particles": 200}
+FAMILIES = ["circle", "ellipse", "parabola"]
+X = [-0.1, 0.0, 0.1]
+
+
+@pytest.fixture(scope="module")
+def measured():
+    scan = tb.scan(tb.contours.Circle(0.4, q=0.5), drive_step=0.08)
+    return CELL.measure(scan.record, seed=3)
+
+
+def fed(streams, measured, blocks):
+    parts = np.array_split(np.arange(measured.sizes["sample"]), blocks)
+    return [streams.update(measured.isel(sample=part)) for part in parts]
+
+
+@pytest.fixture(scope="module")
+def compared(measured):
+    streams = tb.StreamComparison(families=FAMILIES, x=X, stop=lambda now: now.probability.max() > 0.9, **OPTIONS)
+    return streams, fed(streams, measured, 3)
+
+
+def test_each_family_is_a_stream_of_its_own(compared, measured):
+    alone = tb.Stream(family="ellipse", priors=matched_priors("ellipse", 1.0), **OPTIONS)
+    for now, own in zip(compared[1], fed(alone, measured, 3), strict=True):
+        assert float(now.log_evidence.sel(family="ellipse")) == float(own.log_evidence)
+        finite = np.isfinite(now.log_evidence.values)
+        expected = np.where(finite, softmax(np.where(finite, now.log_evidence.values, -np.inf)), 0.0)
+        np.testing.assert_allclose(now.probability.values, expected)
+    xr.testing.assert_identical(
+        compared[0].posterior("ellipse")["posterior"].dataset, alone.posterior()["posterior"].dataset
+    )
+
+
+@pytest.mark.slow
+def test_the_last_evidences_agree_with_those_of_the_whole_record(measured):
+    quick = tb.SamplerSettings(ensembles=2, min_ess=400, max_r_hat=1.05)
+    options = {"load_cell": CELL, "nuisances": [], "seed": 1, "leave_one_out": False, "settings": quick}
+    whole = tb.compare_families(measured, families=FAMILIES[:2], **options)
+    streams = tb.StreamComparison(families=FAMILIES[:2], **(OPTIONS | {"particles": 1000}))
+    now = fed(streams, measured, 3)[-1]
+    np.testing.assert_allclose(now.log_evidence, whole.log_evidence, atol=1.5)
+    assert now.attrs["most_probable"] == whole.attrs["most_probable"] == "circle"
+
+
+def test_a_family_far_behind_is_given_up(compared):
+    now = compared[1][-1]
+    assert set(json.loads(now.attrs["lost"])) == {"parabola"}
+    assert float(now.probability.sel(family="parabola")) == 0.0
+    with pytest.raises(InferenceError, match="parabola"):
+        compared[0].posterior("parabola")
+
+
+def test_heights_are_averaged_over_families(compared):
+    now = compared[1][-1]
+    band = tb.contour_band(now, X)
+    np.testing.assert_allclose(now.height.sel(level=0.025), band["lower"], rtol=1e-12)
+    np.testing.assert_allclose(now.height.sel(level=0.975), band["upper"], rtol=1e-12)
+    truth = tb.contours.Circle(0.4, q=0.5).height(np.array(X))
+    assert np.all((band["lower"].values < truth) & (truth < band["upper"].values))
+    assert bool(now.may_stop)
+
+
+def test_resumed_streams_go_on_with_the_same_numbers(measured, tmp_path):
+    first, block = measured.isel(sample=slice(0, 12)), measured.isel(sample=slice(12, 24))
+    streams = tb.StreamComparison(families=FAMILIES[:2], **OPTIONS)
+    for early in (lambda: streams.save(tmp_path / "streams.nc"), streams.latest, lambda: streams.posterior("circle")):
+        with pytest.raises(InferenceError):
+            early()
+    streams.update(first)
+    streams.save(tmp_path / "streams.nc")
+    resumed = tb.StreamComparison.resume(tmp_path / "streams.nc", measured, families=FAMILIES[:2], **OPTIONS)
+    xr.testing.assert_identical(resumed.latest(), streams.latest())
+    one, other = (each.update(block) for each in (streams, resumed))
+    xr.testing.assert_identical(one.drop_vars("seconds"), other.drop_vars("seconds"))
+    for changed in ({"families": FAMILIES[1:]}, {"families": FAMILIES[:2], "seed": 2}):
+        with pytest.raises(InferenceError):
+            tb.StreamComparison.resume(tmp_path / "streams.nc", **(OPTIONS | changed))
+    with pytest.raises(InferenceError, match=r"streams\.nc"):
+        tb.Stream.resume(tmp_path / "streams.nc", **OPTIONS)
+
+
+def test_a_refusal_leaves_all_streams_as_they_were(measured):
+    streams = tb.StreamComparison(families=FAMILIES[:2], **OPTIONS)
+    streams.update(measured.isel(sample=slice(0, 12)))
+    with pytest.raises(RecordError):
+        streams.update(measured.isel(sample=slice(0, 12)))
+    assert streams.record.sizes["sample"] == 12
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"families": ["circle"]},
+        {"families": "circle"},
+        {"families": FAMILIES, "family": "circle"},
+        {"families": FAMILIES, "priors": {"ellipse": 1.0}},
+        {"families": FAMILIES, "particles": 3},
+    ],
+)
+def test_impossible_arguments_are_refused(arguments):
+    with pytest.raises(ParameterError):
+        tb.StreamComparison(**(OPTIONS | arguments))
