@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Record", "RecordOptions"]
 
-Record = Annotated[Path, typer.Argument(help="Record, .csv or .nc.")]
+Record = Annotated[Path, typer.Argument(help="Record, .csv or .nc, or a bag of ROS.")]
 
 
 @dataclass(frozen=True)

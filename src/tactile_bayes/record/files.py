@@ -13,6 +13,7 @@ import xarray as xr
 from tactile_bayes.checks import check_choice, check_kind, check_mapping, check_optional, check_path, check_switch
 from tactile_bayes.errors import RecordError
 from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record.bag import is_bag, read_bag_table
 from tactile_bayes.record.construction import completed_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
@@ -38,13 +39,14 @@ def read_record(
     missing: Collection[str] = (),
     load_cell_frame: Frame | None = None,
 ) -> xr.Dataset:
-    """Read a record from a CSV or a NetCDF file, with columns of any name, unit, sign and zero.
+    """Read a record from a CSV or a NetCDF file, or a bag of ROS, with columns of any name, unit, sign and zero.
 
     A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per
     sample; `write_record` shows the format. The header is optional: without it the numbers are dimensionless, or SI if
     `rod` is given or a column states a unit. The line `# load_cell_frame: turning` states a load cell that turns with
     the drive. Semicolons or tabs may separate columns, and decimals may then have commas; text is in UTF-8 or
-    Windows-1252. In a NetCDF file every variable has one common dimension, "sample" or any other.
+    Windows-1252. In a NetCDF file every variable has one common dimension, "sample" or any other. In a bag columns are
+    fields of messages, like "/wrench.wrench.force.x" (see `tactile_bayes.record.bag`); it takes the package rosbags.
 
     Units are those of the record (SI, or those of the rod; angles in radians). Other units are converted if they are
     stated: by `columns`, in the name of a column ("force_x [mN]"), in a row of units below the names, in a line of the
@@ -131,10 +133,10 @@ def read_record(
         check_choice("load_cell_frame", load_cell_frame, FRAMES)
     if not path.exists():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
-    if path.is_dir():
-        raise RecordError(f"{path} is a folder: give the record itself, a .csv or a .nc file")
     columns = columns or {}
-    table = _READERS[_suffix(path)](path, columns)
+    if path.is_dir() and not is_bag(path):
+        raise RecordError(f"{path} is a folder: give the record itself, a .csv or a .nc file, or a bag")
+    table = (read_bag_table if is_bag(path) else _READERS[_suffix(path)])(path, columns)
     return record_in(table, columns, split_sweeps, rod, missing, load_cell_frame)
 
 
