@@ -60,6 +60,7 @@ _HOMES = {
     "reconstruct": "reconstruction",
     "required_noise": "planning.requirement",
     "required_rod": "planning.requirement",
+    "rest_of_sweep": "planning.rest_of_sweep",
     "scan": "sweep",
     "scan_many": "sweep",
     "sensitivity": "planning.sensitivity",
@@ -110,6 +111,7 @@ if TYPE_CHECKING:
     from tactile_bayes.planning.plan import Plan as Plan
     from tactile_bayes.planning.requirement import required_noise as required_noise
     from tactile_bayes.planning.requirement import required_rod as required_rod
+    from tactile_bayes.planning.rest_of_sweep import rest_of_sweep as rest_of_sweep
     from tactile_bayes.planning.sensitivity import sensitivity as sensitivity
     from tactile_bayes.reconstruction import reconstruct as reconstruct
     from tactile_bayes.record import in_frame as in_frame

@@ -1,0 +1,51 @@
+"""What the rest of a sweep is expected to add, against streams that measure it."""
+
+import numpy as np
+import pytest
+
+import tactile_bayes as tb
+from tactile_bayes.errors import ParameterError
+
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+X = np.linspace(-0.2, 0.2, 5)
+SO_FAR = 40
+
+
+@pytest.fixture(scope="module")
+def measured():
+    scan = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.05)
+    return CELL.measure(scan.record, seed=1)
+
+
+@pytest.fixture(scope="module")
+def stream(measured):
+    stream = tb.Stream(load_cell=CELL, nuisances=["force_x_bias"], seed=1, particles=500, x=X)
+    stream.update(measured.isel(sample=slice(0, SO_FAR)))
+    return stream
+
+
+def width(now):
+    return (now.height.sel(level=0.975) - now.height.sel(level=0.025)).values
+
+
+def test_it_is_what_the_rest_then_adds(measured, stream):
+    end = int((measured.direction == "forward").sum())
+    rest = tb.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, seed=1)
+    np.testing.assert_allclose(rest.present_width, width(stream.latest()), rtol=0.15)
+    whole = tb.Stream(load_cell=CELL, nuisances=["force_x_bias"], seed=1, particles=500, x=X)
+    np.testing.assert_allclose(rest.width, width(whole.update(measured.isel(sample=slice(0, end)))), rtol=0.3)
+    assert np.all(rest.width < 0.5 * rest.present_width)
+    assert np.all(rest.width_error < 0.1 * rest.width)
+
+
+def test_fewer_samples_add_less(measured, stream):
+    few, more = (
+        tb.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, seed=1).width for end in (44, 56)
+    )
+    assert np.all(more < few)
+
+
+@pytest.mark.parametrize("angles", [[0.1, 0.2], [np.nan], "all"])
+def test_angles_that_cannot_come_are_refused(stream, angles):
+    with pytest.raises(ParameterError):
+        tb.rest_of_sweep(stream.posterior(), angles, X, seed=1)
