@@ -1,5 +1,7 @@
 """The posterior of a growing record, against the posterior of the whole record."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -85,6 +87,23 @@ def test_the_posterior_is_one_of_a_contour(streamed, measured):
     assert tb.contour_band(tree, [0.0])["median"].values == pytest.approx([0.5], abs=0.005)
     assert tb.gap(tree).sizes["stroke"] == 2
     tb.to_arviz(tree)
+
+
+def test_particles_that_have_lost_the_posterior_are_told(streamed, measured):
+    """They climb towards it as soon as they move."""
+    assert 0.0 < float(streamed[1][-1].log_density_shift) < 1.0
+    stream = stream_of(particles=200)
+    stream.update(measured.isel(sample=slice(0, 40)))
+    assert stream.posterior().attrs["converged"] == 1
+    state = stream._state
+    lost = state.points + [4.0, 0.0, 0.0, 0.0] * state.points.std(axis=0)
+    stream._state = replace(state, points=lost, values=state.experiment.model.log_probability(lost))
+    assert stream.update(measured.isel(sample=slice(40, 109))).steps > 0
+    stream.update(measured.isel(sample=slice(109, None)))
+    assert float(stream.latest().log_density_shift) > 1.2
+    posterior = stream.posterior()
+    assert posterior.attrs["converged"] == 0
+    assert "they have lost the posterior" in posterior.attrs["message"]
 
 
 def test_samples_without_contact_are_informative(measured):

@@ -122,11 +122,11 @@ class StreamComparison:
         Returns
         -------
         xr.Dataset
-            Over "family": `probability`; `log_evidence`; `effective_number` and `correlation` of the particles, as from
-            `Stream.update` (NaN for a family that is lost); `contour_draws`, of which `contour_band` computes a band
-            averaged over families. `samples`, their number so far; `seconds` that the update took; with x, `height` by
-            `level` and `x`, averaged over families; with a rule, `may_stop`. Attributes: `most_probable`; `lost`,
-            messages by family (JSON).
+            Over "family": `probability`; `log_evidence`; `effective_number`, `correlation` and `log_density_shift` of
+            particles, as from `Stream.update` (NaN for a family that is lost); `contour_draws`, of which `contour_band`
+            computes a band averaged over families. `samples`, their number so far; `seconds` that the update took;
+            with x, `height` by `level` and `x`, averaged over families; with a rule, `may_stop`. Attributes:
+            `most_probable`; `lost`, messages by family (JSON).
 
         Raises
         ------
@@ -192,6 +192,7 @@ class StreamComparison:
                 "log_evidence": logs,
                 "effective_number": of_each("effective_number"),
                 "correlation": of_each("correlation"),
+                "log_density_shift": of_each("log_density_shift"),
                 "contour_draws": (("family", "contour_draw", "contour_parameter"), draws),
                 "samples": record.sizes["sample"],
             },

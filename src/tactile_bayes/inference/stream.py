@@ -24,7 +24,7 @@ from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, seed
 from tactile_bayes.inference.ensembles.identity import changes, seed_as_text
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.particles import DECORRELATED, Particles, effective_number
+from tactile_bayes.inference.particles import DECORRELATED, SETTLED, Particles, effective_number
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
@@ -146,7 +146,9 @@ class Stream:
             `samples`, their number so far; `log_evidence`, the logarithm of the density of the record under the prior
             of contours within reach; `effective_number` of the particles; `stages` and `steps` of this update (0 if
             weights alone changed), and `correlation`, the largest one of a parameter before and after the last steps,
-            which end below 0.2, or after 40 (NaN without steps); `seconds` that the update took; `parameters` by
+            which end below 0.2, or after 40 (NaN without steps); `log_density_shift`, the largest increase of the mean
+            log-density in the steps of a stage so far, over its standard deviation: above 1.2 the posterior has been
+            lost, and it takes more particles from the start; `seconds` that the update took; `parameters` by
             `parameter` and `level`, their quantiles; with `x`, `height` by `level` and `x`; with a rule, `may_stop`.
 
         Raises
@@ -176,6 +178,7 @@ class Stream:
             advance.log_integral,
             share,
             advance.correlation if advance.steps else had,
+            max(advance.shift, 0.0 if old is None else old.shift),
             updates,
             evaluations + advance.evaluations,
             seconds + perf_counter() - began,
@@ -203,8 +206,8 @@ class Stream:
         """Return the posterior of the record so far, as `infer_contour` does, with equally weighted particles as draws.
 
         There is one chain, whose convergence is not judged by R̂: `converged` is 0 if the last moves of the particles
-        ended before they had lost their places, and the message states their effective number. Where that is less than
-        their number, some draws are repeated.
+        ended before they had lost their places, or the posterior was lost (`log_density_shift`), and the message states
+        their effective number. Where that is less than their number, some draws are repeated.
 
         Raises
         ------
@@ -214,6 +217,12 @@ class Stream:
         state = self._known_state()
         model, random = state.experiment.model, self._random(1, state.updates)
         left = effective_number(state.log_weights)
+        if state.shift > SETTLED:
+            fault = "; not converged, they have lost the posterior: take more of them from the start"
+        elif state.correlation >= DECORRELATED:
+            fault = f"; not converged, the last moves left a correlation of {state.correlation:.2f}: take more of them"
+        else:
+            fault = ""
         picked = random.permutation(resampled(np.exp(state.log_weights), len(state.log_weights), random))
         unknown = np.full(len(model.names), np.nan)
         draws = Draws(
@@ -230,8 +239,8 @@ class Stream:
             autocorrelation_time=unknown,
             evaluations=state.evaluations,
             seconds=state.seconds,
-            converged=not state.correlation >= DECORRELATED,
-            message=f"sequential Monte Carlo, {left:.0f} effective of {len(picked)} particles",
+            converged=not fault,
+            message=f"sequential Monte Carlo, {left:.0f} effective of {len(picked)} particles{fault}",
             stuck=0,
         )
         with threadpool_limits(1):
@@ -376,6 +385,7 @@ class Stream:
                 "log_evidence": state.log_integral - np.log(state.share),
                 "effective_number": effective_number(state.log_weights),
                 "correlation": state.correlation,
+                "log_density_shift": state.shift,
                 "parameters": (("level", "parameter"), _weighted_quantiles(points, weights)),
             },
             coords={"level": list(LEVELS), "parameter": list(model.names), "unit": ("parameter", units)},

@@ -44,6 +44,8 @@ class StreamState:
     """Share of the prior within reach."""
     correlation: float
     """Of the last steps of any update; NaN if there were none."""
+    shift: float
+    """Largest one of all updates, as of `Particles`."""
     updates: int
     evaluations: int
     seconds: float
