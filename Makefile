@@ -13,7 +13,7 @@ export MPLBACKEND ?= Agg
 # Bytecode halves the time that a process takes to start, and tests and notebooks start many.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test notebooks test-lowest test-slow bench coverage calibration shapes recognition misspecification trust designs efficiency nuisances samplers images docs dist lint clean
+.PHONY: demo test notebooks test-lowest test-slow bench coverage calibration shapes recognition misspecification streams trust designs efficiency nuisances samplers images docs dist lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -55,6 +55,9 @@ recognition: $(READY)
 
 misspecification: $(READY)
 	$(BIN)/python -m benchmarks.misspecification
+
+streams: $(READY)
+	$(BIN)/python -m benchmarks.stream
 
 trust: $(READY)
 	$(BIN)/python -m benchmarks.trust

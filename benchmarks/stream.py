@@ -22,6 +22,7 @@ import tactile_bayes as tb
 from tactile_bayes.calibration.calibrate import calibration_replicate
 from tactile_bayes.calibration.ranks import uniformity_p_value
 from tactile_bayes.errors import StudyError, TactileBayesError
+from tactile_bayes.inference.particles import SETTLED
 from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
 
 OUT = Path("results/stream")
@@ -80,6 +81,8 @@ def compared(measured: xr.Dataset, truth: Mapping[str, float], posterior: xr.Dat
     row["off_median"] = float(np.abs(off[now.level.values == 0.5]).max())
     band = tb.contour_band(posterior, x)
     row["wider"] = float(np.mean((high - low) / (band["upper"] - band["lower"]).values))
+    row["held_by_infer"] = bool(np.all((band["lower"] <= height) & (height <= band["upper"])))
+    row["shift"] = float(now.log_density_shift)
     row["converged"] = bool(posterior.attrs["converged"])
     return row
 
@@ -104,10 +107,13 @@ def report(rows: list[Row], errors: list[str]) -> None:
         held, width = (np.array([row[what][at] for row in rows]) for what in ("held", "width"))
         smallest = f"{min(values):.2g} of {len(values)}"
         print(f"{name:<18}{smallest:>12}{_share(held):>12}{np.median(width):>12.4f}")
-    sure = [row for row in rows if row["converged"]]
+    print(f"{'infer_contour':<18}{'':>12}{_share(np.array([row['held_by_infer'] for row in rows])):>12}")
+    lost = [row for row in rows if row["shift"] > SETTLED]
+    print(f"\n{len(lost)} records told that the particles had lost the posterior; without them:")
+    sure = [row for row in rows if row["converged"] and row["shift"] <= SETTLED]
     off = np.array([max(row["off"].values()) for row in sure])
     median = np.array([row["off_median"] for row in sure])
-    print(f"\nagainst infer_contour, {len(sure)} records on which it converged, in its standard deviations: largest")
+    print(f"against infer_contour, {len(sure)} records on which it converged, in its standard deviations: largest")
     print(f"difference of a quantile {np.median(off):.2f} (median of records), {off.max():.2f} (largest), of a median")
     wider = _range([row["wider"] for row in sure])
     print(f"{np.median(median):.2f}, {median.max():.2f}; width of the band over its width, 5 to 95 %: {wider}\n")
