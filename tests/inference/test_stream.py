@@ -1,6 +1,7 @@
 """The posterior of a growing record, against the posterior of the whole record."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import contour_evidence
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.stream import surprise_after
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 X = [-0.2, 0.0, 0.2]
@@ -104,6 +106,28 @@ def test_particles_that_have_lost_the_posterior_are_told(streamed, measured):
     posterior = stream.posterior()
     assert posterior.attrs["converged"] == 0
     assert "they have lost the posterior" in posterior.attrs["message"]
+
+
+def test_a_wrong_model_shows_early_and_a_right_one_never(streamed):
+    assert all(float(now.e_value) < 2.0 for now in streamed[1])
+    sliding = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.05, friction=0.2).record
+    stream = stream_of(particles=200)
+    first, *_, last = fed(stream, CELL.measure(sliding, seed=1).isel(sample=slice(0, 60)), 4)
+    assert float(first.e_value) < 2.0
+    assert float(last.e_value) > 1000.0
+
+
+def test_an_e_value_is_of_the_blocks_since_the_model_went_wrong():
+    """Against the sum over all blocks from which it may be wrong."""
+    ratios = np.random.default_rng(1).normal(-0.5, 1.0, (6, 3))
+    state, largest = None, -np.inf
+    for count in range(1, 7):
+        products, surprise = surprise_after(state, ratios[count - 1])
+        weights = [1.0 / (k * (k + 1.0)) for k in range(1, count + 1)]
+        value = sum(w * np.exp(ratios[k:count].sum(axis=0)).mean() for k, w in enumerate(weights)) + 1.0 - sum(weights)
+        largest = max(largest, value)
+        assert np.exp(surprise) == pytest.approx(largest, rel=1e-12)
+        state = SimpleNamespace(updates=count - 1, log_products=products, surprise=surprise)
 
 
 def test_samples_without_contact_are_informative(measured):

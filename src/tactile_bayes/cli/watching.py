@@ -30,6 +30,9 @@ _STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl
 
 _PAGE = "watch.html"
 
+_SURPRISING = 1000
+"""Least e-value of a model that is wrong; of a right one a stream reaches it with a probability of at most 0.001."""
+
 _RARE = 0.001
 """Smallest probability of a shape that is written out."""
 
@@ -132,6 +135,7 @@ class _Follower:
     has_begun: bool = False
     is_late: bool = False
     parameters: int = 0
+    e_value: float = 0.0
 
     def follow(self) -> str:
         """Take what comes, until the end; return its reason."""
@@ -256,6 +260,7 @@ class _Follower:
             "quantities": columns_of(update.summary, "quantity"),
             "band_width": update.width,
             "probabilities": dict(update.probabilities),
+            "e_value": update.e_value,
             "may_stop": bool(update.enough),
             "converged": bool(update.posterior.attrs["converged"]),
             "message": update.posterior.attrs["message"],

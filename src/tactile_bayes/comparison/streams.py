@@ -122,8 +122,8 @@ class StreamComparison:
         Returns
         -------
         xr.Dataset
-            Over "family": `probability`; `log_evidence`; `effective_number`, `correlation` and `log_density_shift` of
-            particles, as from `Stream.update` (NaN for a family that is lost); `contour_draws`, of which `contour_band`
+            Over "family": `probability`; `log_evidence`; `effective_number`, `correlation`, `log_density_shift` and
+            `e_value`, as from `Stream.update` (NaN for a family that is lost); `contour_draws`, of which `contour_band`
             computes a band averaged over families. `samples`, their number so far; `seconds` that the update took;
             with x, `height` by `level` and `x`, averaged over families; with a rule, `may_stop`. Attributes:
             `most_probable`; `lost`, messages by family (JSON).
@@ -193,6 +193,7 @@ class StreamComparison:
                 "effective_number": of_each("effective_number"),
                 "correlation": of_each("correlation"),
                 "log_density_shift": of_each("log_density_shift"),
+                "e_value": of_each("e_value"),
                 "contour_draws": (("family", "contour_draw", "contour_parameter"), draws),
                 "samples": record.sizes["sample"],
             },

@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
+from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
@@ -24,7 +25,7 @@ from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, seed
 from tactile_bayes.inference.ensembles.identity import changes, seed_as_text
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.particles import DECORRELATED, SETTLED, Particles, effective_number
+from tactile_bayes.inference.particles import DECORRELATED, SETTLED, WIDER, Particles, effective_number
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
@@ -35,7 +36,7 @@ from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import carried_sweeps, validate
 from tactile_bayes.record.netcdf import write_netcdf
 
-__all__ = ["LEVELS", "Stream"]
+__all__ = ["LEVELS", "Stream", "surprise_after"]
 
 LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
 """Levels of the quantiles of parameters and of the band."""
@@ -84,6 +85,12 @@ class Stream:
     integrated biases, but an update costs more the longer the record. With 1,000 particles, updates by 28 samples, up
     to 330 of a double sweep, took 0.1 to 0.6 s on one core with four parameters, and 0.1 to 1.4 s with 13, once the rod
     had touched; the first two took 3 and 2 s, and 4 and 3 s. The result states its `seconds`.
+
+    `e_value` is the largest so far of a martingale: the density of the samples from some block on with noise that is
+    wider by 1.5, 3 or 6, over that of the model, both given the samples before. For records of the model, drawn from
+    its prior, it exceeds 1/α with a probability of at most α, however often one looks (Ville 1939; Shin, Ramdas &
+    Rinaldo 2023, arXiv:2203.03532), up to the Monte-Carlo error of the particles: above 1,000 the model is wrong, in
+    its shape, its rig or its noise. It is NaN with a discrepancy.
 
     Too few particles lose the posterior without a sign. With 13 parameters and 332 samples at once, medians were up to
     nine standard deviations off with 200 particles, 0.5 with 400 and 0.1 with 650: take 30 for each parameter at least,
@@ -148,8 +155,9 @@ class Stream:
             weights alone changed), and `correlation`, the largest one of a parameter before and after the last steps,
             which end below 0.2, or after 40 (NaN without steps); `log_density_shift`, the largest increase of the mean
             log-density in the steps of a stage so far, over its standard deviation: above 1.2 the posterior has been
-            lost, and it takes more particles from the start; `seconds` that the update took; `parameters` by
-            `parameter` and `level`, their quantiles; with `x`, `height` by `level` and `x`; with a rule, `may_stop`.
+            lost, and it takes more particles from the start; `e_value`, above 1,000 for a model that is wrong, see
+            Notes of `Stream`; `seconds` that the update took; `parameters` by `parameter` and `level`, their quantiles;
+            with `x`, `height` by `level` and `x`; with a rule, `may_stop`.
 
         Raises
         ------
@@ -169,16 +177,19 @@ class Stream:
             share = _share_within_reach(experiment.model, old, random)
         seconds, evaluations = (0.0, 0) if old is None else (old.seconds, old.evaluations)
         had = np.nan if old is None else old.correlation
+        products, surprise = surprise_after(old, advance.log_ratios)
         state = StreamState(
             record,
             experiment,
             advance.points,
             advance.values,
             advance.log_weights,
+            products,
             advance.log_integral,
             share,
             advance.correlation if advance.steps else had,
             max(advance.shift, 0.0 if old is None else old.shift),
+            surprise,
             updates,
             evaluations + advance.evaluations,
             seconds + perf_counter() - began,
@@ -386,6 +397,7 @@ class Stream:
                 "effective_number": effective_number(state.log_weights),
                 "correlation": state.correlation,
                 "log_density_shift": state.shift,
+                "e_value": np.exp(state.surprise),
                 "parameters": (("level", "parameter"), _weighted_quantiles(points, weights)),
             },
             coords={"level": list(LEVELS), "parameter": list(model.names), "unit": ("parameter", units)},
@@ -395,6 +407,19 @@ class Stream:
             result = result.assign_coords(x=self._x)
             result["height"] = (("level", "x"), _weighted_quantiles(heights, weights))
         return result
+
+
+def surprise_after(old: StreamState | None, log_ratios: Floats) -> tuple[Floats, float]:
+    """Return the products of ratios after a block, and the logarithm of the largest e-value so far.
+
+    The block from which the model is wrong has the prior weight 1/(k(k + 1)), for the k-th; what remains of it, for
+    blocks to come, has no ratio yet.
+    """
+    blocks = 1 if old is None else old.updates + 2
+    before = np.full(len(WIDER), -np.inf) if old is None else old.log_products
+    products = np.logaddexp(before, -np.log(blocks * (blocks + 1.0))) + log_ratios
+    now = float(np.logaddexp(logsumexp(products) - np.log(len(WIDER)), -np.log(blocks + 1.0)))
+    return products, now if old is None else float(np.fmax(now, old.surprise))
 
 
 def _share_within_reach(model: ContourModel, old: StreamState | None, random: np.random.Generator) -> float:

@@ -38,6 +38,9 @@ class StreamState:
     """Logarithm of prior times likelihood of the particles, shape (n,)."""
     log_weights: Floats
     """Shape (n,), normalised."""
+    log_products: Floats
+    """Logarithms of the products of ratios of `Particles`, each from one of the blocks on and with the prior weight of
+    that block, summed over these; shape (factors,)."""
     log_integral: float
     """Logarithm of the integral of prior times likelihood."""
     share: float
@@ -46,13 +49,20 @@ class StreamState:
     """Of the last steps of any update; NaN if there were none."""
     shift: float
     """Largest one of all updates, as of `Particles`."""
+    surprise: float
+    """Logarithm of the largest e-value so far."""
     updates: int
     evaluations: int
     seconds: float
 
 
-_ARRAYS = {"points": ("particle", "parameter"), "values": ("particle",), "log_weights": ("particle",)}
-_NUMBERS = tuple(field.name for field in fields(StreamState))[5:]
+_ARRAYS = {
+    "points": ("particle", "parameter"),
+    "values": ("particle",),
+    "log_weights": ("particle",),
+    "log_products": ("factor",),
+}
+_NUMBERS = tuple(field.name for field in fields(StreamState))[6:]
 
 
 class StoredState(NamedTuple):

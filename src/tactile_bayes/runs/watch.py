@@ -54,6 +54,8 @@ class WatchUpdate(NamedTuple):
     """Largest width of the band [length]; NaN without one."""
     probabilities: Mapping[str, float]
     """Probability of each family, if there are several."""
+    e_value: float
+    """That of `Stream.update`; of several families the least; NaN if there is none."""
     enough: str
     """Reason why measuring may stop; empty if it may not, or the particles have kept their places in the last moves."""
 
@@ -234,9 +236,8 @@ class Watch:
         posterior.attrs |= origin_of(record, self._probability, self._command) | file_of(self._file, sha256)
         self.folder.write_posterior(posterior)
         self._answer = posterior, record
-        band, probabilities = None, {}
+        band, probabilities, latest = None, {}, stream.latest()
         if isinstance(stream, StreamComparison):
-            latest = stream.latest()
             probabilities = dict(zip(latest.family.values.tolist(), latest.probability.values.tolist(), strict=True))
         with suppress(InferenceError):  # nothing is touched yet
             x = reach(posterior) if self._x is None else self._x
@@ -252,6 +253,7 @@ class Watch:
             band=band,
             width=float(np.nanmax(widths)) if np.isfinite(widths).any() else np.nan,
             probabilities=probabilities,
+            e_value=float(latest.e_value.min()),
             enough=self._enough(widths, probabilities) if posterior.attrs["converged"] else "",
         )
 
