@@ -76,26 +76,27 @@ def test_heights_are_averaged_over_families(compared):
 
 
 def test_resumed_streams_go_on_with_the_same_numbers(measured, tmp_path):
-    first, block = measured.isel(sample=slice(0, 12)), measured.isel(sample=slice(12, 24))
-    streams = tb.StreamComparison(families=FAMILIES[:2], **OPTIONS)
+    first, block = measured.isel(sample=slice(0, 10)), measured.isel(sample=slice(10, 14))
+    options = OPTIONS | {"particles": 100}
+    streams = tb.StreamComparison(families=FAMILIES[:2], **options)
     for early in (lambda: streams.save(tmp_path / "streams.nc"), streams.latest, lambda: streams.posterior("circle")):
         with pytest.raises(InferenceError):
             early()
     streams.update(first)
     streams.save(tmp_path / "streams.nc")
-    resumed = tb.StreamComparison.resume(tmp_path / "streams.nc", measured, families=FAMILIES[:2], **OPTIONS)
+    resumed = tb.StreamComparison.resume(tmp_path / "streams.nc", measured, families=FAMILIES[:2], **options)
     xr.testing.assert_identical(resumed.latest(), streams.latest())
     one, other = (each.update(block) for each in (streams, resumed))
     xr.testing.assert_identical(one.drop_vars("seconds"), other.drop_vars("seconds"))
     for changed in ({"families": FAMILIES[1:]}, {"families": FAMILIES[:2], "seed": 2}):
         with pytest.raises(InferenceError):
-            tb.StreamComparison.resume(tmp_path / "streams.nc", **(OPTIONS | changed))
+            tb.StreamComparison.resume(tmp_path / "streams.nc", **(options | changed))
     with pytest.raises(InferenceError, match=r"streams\.nc"):
-        tb.Stream.resume(tmp_path / "streams.nc", **OPTIONS)
+        tb.Stream.resume(tmp_path / "streams.nc", **options)
 
 
 def test_a_refusal_leaves_all_streams_as_they_were(measured):
-    streams = tb.StreamComparison(families=FAMILIES[:2], **OPTIONS)
+    streams = tb.StreamComparison(families=FAMILIES[:2], **(OPTIONS | {"particles": 100}))
     streams.update(measured.isel(sample=slice(0, 12)))
     with pytest.raises(RecordError):
         streams.update(measured.isel(sample=slice(0, 12)))
