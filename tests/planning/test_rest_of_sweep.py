@@ -45,6 +45,13 @@ def test_fewer_samples_add_less(measured, stream):
     assert np.all(more < few)
 
 
+def test_no_more_draws_are_taken_than_there_are(measured, stream):
+    angles = measured.drive_angle[SO_FAR:44]
+    every, more = (tb.rest_of_sweep(stream.posterior(), angles, X, seed=1, draws=count) for count in (500, 600))
+    np.testing.assert_allclose(more.width, every.width, rtol=1e-12)
+    np.testing.assert_allclose(more.width_error, every.width_error, rtol=1e-12)
+
+
 @pytest.mark.parametrize("angles", [[0.1, 0.2], [np.nan], "all"])
 def test_angles_that_cannot_come_are_refused(stream, angles):
     with pytest.raises(ParameterError):

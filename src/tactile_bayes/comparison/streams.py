@@ -94,8 +94,8 @@ class StreamComparison:
         self._families = checked_families(families, priors)
         self._priors, self._options, self._stop = priors or {}, options, stop
         self._x = None if x is None else check_numbers("x", x, "give a list of finite numbers", shape=(None,))
-        for odd in {"family"} & set(options):
-            raise ParameterError(f"there is no argument {odd!r}: give families, like families=['circle', 'parabola']")
+        if "family" in options:
+            raise ParameterError("there is no argument 'family': give families, like families=['circle', 'parabola']")
         for name in self._families:
             Stream(family=name, **options)  # refuses what it can before the first sample
         self._streams: dict[str, Stream] = {}

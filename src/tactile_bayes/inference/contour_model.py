@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import DriftWarning, ParameterError, ReachError
@@ -259,10 +259,15 @@ class ContourModel:
         It lacks the prior's normalisation over contours within reach.
         """
         values = self.log_prior(points)
-        inside = np.flatnonzero(np.isfinite(values))
-        for block in blocks(inside.size, self.loads_of_a_point) if inside.size else ():
-            values[inside[block]] += self.log_likelihood(points[inside[block]])
+        for which in self.possible(values):
+            values[which] += self.log_likelihood(points[which])
         return values
+
+    def possible(self, log_prior: Floats) -> Iterator[Index]:
+        """Yield the indices of points with a finite log-prior, so many at a time as memory allows."""
+        inside = np.flatnonzero(np.isfinite(log_prior))
+        for block in blocks(inside.size, self.loads_of_a_point) if inside.size else ():
+            yield inside[block]
 
     def prior_points(
         self, rng: np.random.Generator, count: int, others: Mapping[str, Prior] = MappingProxyType({})

@@ -13,7 +13,6 @@ from tactile_bayes.inference.ensembles import in_coordinates
 from tactile_bayes.inference.ensembles.moves import step_ensembles
 from tactile_bayes.inference.ensembles.proposal import effective
 from tactile_bayes.inference.stream_state import StreamState
-from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import resampled
 
 __all__ = ["DECORRELATED", "SETTLED", "WIDER", "Particles", "effective_number"]
@@ -119,11 +118,9 @@ class Particles:
         """
         model = self.model
         values, wider = model.log_prior(points), np.full((len(points), len(WIDER)), -np.inf)
-        inside = np.flatnonzero(np.isfinite(values))
-        self.evaluations += inside.size
         had = 0 if self._before is None else len(self._before.likelihood.measured)
-        for block in blocks(inside.size, model.loads_of_a_point) if inside.size else ():
-            which = inside[block]
+        for which in model.possible(values):
+            self.evaluations += which.size
             loads, usable, discrepancy = model.loads_and_discrepancy(points[which])
             scale, score = model.noise_scale(points[which]), model.likelihood.score
             values[which] += score(loads, usable, scale, discrepancy=discrepancy)
@@ -141,10 +138,8 @@ class Particles:
             return model.log_probability(points), model.log_prior(points)
         own = points[:, [model.names.index(name) for name in before.names]]
         new, old = model.log_prior(points), before.log_prior(own) + self._log_prior_of_added(points)
-        inside = np.flatnonzero(np.isfinite(new))
-        self.evaluations += inside.size
-        for block in blocks(inside.size, model.loads_of_a_point) if inside.size else ():
-            which = inside[block]
+        for which in model.possible(new):
+            self.evaluations += which.size
             felt, usable = model.felt(points[which])
             if self._is_continued:
                 part = felt[:, :, : len(before.likelihood.measured)].copy()

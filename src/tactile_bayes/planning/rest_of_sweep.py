@@ -45,7 +45,7 @@ def rest_of_sweep(
     probability : float
         Probability of the pointwise band, in (0, 1).
     draws : int
-        Number of contours that are drawn, at least 2.
+        Number of contours that are drawn, at least 2; at most all draws of the posterior are taken.
 
     Returns
     -------
@@ -84,9 +84,10 @@ def rest_of_sweep(
     at = check_numbers("x", x, "give a list of finite numbers", shape=(None,))
     angles = check_numbers("drive_angles", drive_angles, "give drive angles in radians", shape=(None,))
     known = known_from_posterior(posterior, draws=draws, rng=np.random.default_rng(seed))
-    last = record_of(posterior).isel(sample=-1)
+    record = record_of(posterior)
+    last = record.isel(sample=-1)
     direction, end = str(last.direction.values), float(last.drive_angle)
-    if int(last.sweep) in carried_sweeps(record_of(posterior)):
+    if int(last.sweep) in carried_sweeps(record):
         raise ParameterError("the drive carries the base in the last sweep: give the whole drive to design instead")
     ahead = angles > end if direction == "forward" else angles < end
     if not ahead.all():
@@ -98,7 +99,8 @@ def rest_of_sweep(
     cell = known.experiment.noise.cell
     model = known.model(record_template([Rotation(base)], (direction,), angles, known.experiment.rod, cell))
     own, factor = known.of(model), band_factor(probability)
-    now, then = np.empty((draws, at.size)), np.empty((draws, at.size))
+    count = len(own.points)
+    now, then = np.empty((count, at.size)), np.empty((count, at.size))
     for k, point in enumerate(own.points):
         slopes = height_slopes(model, point, at)
         gained = record_information(model, point, slopes=reading_slopes(model, point, _STEP)).matrix
@@ -109,7 +111,7 @@ def rest_of_sweep(
         {
             "present_width": ("x", now.mean(axis=0), unit),
             "width": ("x", then.mean(axis=0), unit),
-            "width_error": ("x", then.std(axis=0, ddof=1) / np.sqrt(draws), unit),
+            "width_error": ("x", then.std(axis=0, ddof=1) / np.sqrt(count), unit),
         },
         coords={"x": ("x", at, unit)},
         attrs={"probability": probability},

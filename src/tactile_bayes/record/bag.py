@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.arrays import Flags, Index
 from tactile_bayes.errors import RecordError
 from tactile_bayes.record.schema import CHANNELS
 from tactile_bayes.record.table import Cells, Source, Table
@@ -18,9 +18,9 @@ from tactile_bayes.record.table import Cells, Source, Table
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
-__all__ = ["BAGS", "is_bag", "read_bag_table"]
+__all__ = ["is_bag", "read_bag_table"]
 
-BAGS = (".mcap", ".bag", ".db3")
+_BAGS = (".mcap", ".bag", ".db3")
 """Suffixes of bags."""
 
 _SMOOTH = ("drive_angle", "base_x", "base_y")
@@ -38,7 +38,7 @@ Messages = dict[str, tuple[list[int], dict[str, list[Any]]]]
 
 def is_bag(path: Path) -> bool:
     """Return True for a path of a bag: a file, or a folder as ROS 2 writes it."""
-    return path.suffix.lower() in BAGS or (path / "metadata.yaml").is_file()
+    return path.suffix.lower() in _BAGS or (path / "metadata.yaml").is_file()
 
 
 def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
@@ -157,16 +157,12 @@ def _surrounded(times: Index, at: Index) -> Flags:
 
 def _at(times: Index, values: Any, at: Index, name: str, columns: Mapping[str, str]) -> Any:
     """Return the values of a field at other times, as the columns demand that come from it."""
-    if not times.size:
-        return np.empty(at.size, dtype=values.dtype)
     field = re.compile(rf"{re.escape(name)}(?![\w.])")
     targets = {target for target, text in columns.items() if field.search(text)}
+    if values.dtype.kind == "f" and not targets.isdisjoint(_SMOOTH):
+        return np.interp(at - times[0], times - times[0], values)  # differences, as floats have no nanoseconds of today
     last = np.clip(np.searchsorted(times, at, side="right") - 1, 0, times.size - 1)
     following = np.minimum(last + 1, times.size - 1)
-    if values.dtype.kind == "f" and not targets.isdisjoint(_SMOOTH):
-        whole = np.maximum(times[following] - times[last], 1)
-        share: Floats = np.clip((at - times[last]) / whole, 0.0, 1.0)
-        return (1.0 - share) * values[last] + share * values[following]
     if not targets.isdisjoint(CHANNELS):
         return values[np.where(at - times[last] <= times[following] - at, last, following)]
     return values[last]
