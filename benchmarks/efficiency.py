@@ -1,7 +1,7 @@
 """Prints posterior standard deviations over Cramér and Rao's bounds, at several noises.
 
 Profile II at the distance 0.5, swept forward and backward in steps of 2°, with all that is not known of the rig by
-default: nine parameters. What stands in the table is the standard deviation of each in its posterior, over the bound
+default: 13 parameters. What stands in the table is the standard deviation of each in its posterior, over the bound
 (with priors, at the noise that the posterior finds); the mean of several records.
 """
 

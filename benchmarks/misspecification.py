@@ -113,10 +113,12 @@ def main(replicates: int = 40, *names: str, discrepancy: bool = False) -> None:
     heads = ("in the gap", "beside it", "bias [L]", "width [L]", "check", "misfit", "axial", "any", "not conv.")
     print(f"{'':<38}" + "".join(f"{head:>11}" for head in heads), flush=True)
     for name in names or CASES:
-        for other, run in (beside_discrepancy(CASES[name]) if discrepancy else CASES[name]).items():
+        runs = beside_discrepancy(CASES[name]) if discrepancy else CASES[name]
+        for k, (other, run) in enumerate(runs.items()):
             few = max(1, replicates // (FEWER if run.asked.get("family") else 1))
             count = f" ({few})" if few < replicates else ""
-            print(row(f"  {other}{count}" if other else name, calibrated(f"{name} {other}", run, few)), flush=True)
+            title = f"  {other}{count}" if k else f"{name} {other}".strip()
+            print(row(title, calibrated(f"{name} {other}", run, few)), flush=True)
 
 
 def beside_discrepancy(runs: Mapping[str, Run]) -> dict[str, Run]:

@@ -94,7 +94,7 @@ def test_poses_of_a_rod_with_a_bend_need_a_fine_table(sign):
     profile = profile_of(lambda s: 1.5 + 1.5 * np.tanh((s - 0.65) / 0.2))._replace(sign=sign)
     box = Box((0.0, 0.0), (0.0, 0.0), (0.0, 0.5))
     assert tabulated(profile, box) is NO_TABLE
-    table = tabulated(profile, box, fine=True)
+    table = tabulated(profile, box, grade=1)
     compared(profile, table, 0.3)
     far = np.array([[-0.7, 1.0, 1.0], [2.5, 1.0, 1.0], [0.2, 1.0, 21.0]]).T
     held, found = poses(profile, table, 0.0, *far, True)
@@ -165,3 +165,23 @@ def bound(profile):
 
 
 _most = taylor.most_rest_curvature
+
+
+def test_strong_friction_of_a_hooked_rod_needs_a_small_range_of_the_force():
+    """A rod bent toward the object, that is pulled along it, is far from its rest shape under larger forces."""
+    profile = profile_of(lambda s: -1.95 * (1.0 + np.tanh((s - 0.75) / 0.12)))
+    box = Box((0.0, 0.0), (0.0, 0.0), (0.5, 0.9))
+    assert tabulated(profile, box, grade=1) is NO_TABLE
+    table = tabulated(profile, box, grade=2)
+    assert table is not NO_TABLE
+    rng, count = np.random.default_rng(1), 200
+    force, arclength, tangential = rng.uniform(0.0, 6.9, count), rng.uniform(0.05, 1.0, count), np.full(count, -0.7)
+    for sign, tip in ((1.0, True), (-1.0, True), (1.0, False), (-1.0, False)):
+        bent, ends = profile._replace(sign=sign), np.ones(count)
+        psi1 = rng.uniform(-0.7, 2.3, count) if tip else tangential
+        scaled = force if tip else force / arclength**2
+        held, found = poses(bent, table, 0.7, psi1, ends if tip else arclength, scaled, tip)
+        exact = poses(bent, NO_TABLE, 0.7, psi1, ends if tip else arclength, scaled, tip)[1]
+        assert held
+        before = exact[:, 0, 0] >= 0.0
+        assert np.abs(found - exact)[before, 0].max() < 1e-5

@@ -166,3 +166,30 @@ def _tip_slope(shooting: Shooting, alpha: float, force: float) -> float:
     """ψ1 at which a rod with a known force ends nearest to the pivot, as a guess."""
     choices = np.linspace(shooting.psi1, 1.5, 40)
     return float(min(choices, key=lambda psi1: np.hypot(*shooting.miss(alpha, psi1, 1.0, force))))
+
+
+HOOKED = {
+    "arc": (given_rod(2.0), Parabola(1.0, 0.8315, 0.1)),
+    "hook": (given_rod(lambda s: -1.5 * (1.0 + np.tanh((s - 0.7) / 0.15)), taper=0.3), Parabola(1.3, 0.9631, 0.1)),
+}
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+@pytest.mark.parametrize("kind", HOOKED)
+def test_a_hooked_rod_is_released_where_its_tip_touches_without_load(kind, friction):
+    """A rod that yields along its chord passes a shallow object: the force grows, and vanishes without a jump."""
+    rod, contour = HOOKED[kind]
+    found = scan(contour, direction="forward", rod=rod.rod, friction=friction, drive_step=2e-4)
+    first, last = found.events["forward"].first_contact, found.events["forward"].snap_off
+    assert (first.kind, last.kind) == ("tip", "release")
+    shooting = Shooting(contour, rod.in_sweep(1.0), rod.rod, 1.0, friction)
+    for event in (first, last):
+        slope_angle, drive_angle = shooting.tip_touches(event.slope_angle)
+        assert event.drive_angle == pytest.approx(drive_angle, abs=1e-10)
+        assert event.slope_angle == pytest.approx(slope_angle, abs=1e-9)
+    assert last.drive_angle > first.drive_angle + 0.05
+    assert np.hypot(last.force_x, last.force_y) < 1e-9
+    forces = np.hypot(found.record.force_x, found.record.force_y).values
+    touched = np.flatnonzero(forces)
+    assert forces[touched[-1]] < 0.1 * forces.max()
+    assert np.all(np.diff(touched) == 1)

@@ -37,7 +37,7 @@ from tactile_bayes.record import (
 )
 
 if TYPE_CHECKING:
-    from tactile_bayes.mechanics.forward_table import Box, ForwardTable
+    from tactile_bayes.mechanics.forward_table import Box, ForwardTable, Tables
     from tactile_bayes.mechanics.sweeps import Segments, Shapes, Solutions, Sweeps
 
 __all__ = ["RecordLikelihood", "Rig", "without_errors"]
@@ -52,11 +52,14 @@ _LEAST = 1e-10
 _TABULATED = 5e-6
 """Least tolerance of loads for which the pose of a rod with a profile comes from a table."""
 
-_TAPERS, _BENDS, _FRICTION_ANGLE = (0.15, 0.1), (0.2, 0.15), (0.0, 0.5)
+_TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
 """Ranges of tables: distances from the stated taper and rest curvature [1/L], three and four standard deviations of the
-default priors, and angles up to that of a coefficient of 0.55, in either sense where the base is carried. Few draws are
-beyond them, and integrated. For thin tips the second range of the taper is taken, and for uneven curvature that of the
-curvature."""
+default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and for
+uneven curvature that of the rest curvature."""
+
+_FRICTION_ANGLES = (0.0, 0.5), (0.5, 0.9)
+"""Angles of friction in the two tables of a likelihood, up to those of coefficients of 0.55 and 1.26, two and four
+standard deviations of the default prior; the first in either sense where the base is carried."""
 
 
 _OFF = 1e-6
@@ -292,35 +295,47 @@ class RecordLikelihood:
         """Return the stem of each contour [L]."""
         return np.asarray(self.rod.stem / self.rod.length + rig.stem)
 
-    def _table(self, rig: Rig) -> ForwardTable:
-        """Return a table for the rod, made at the first rig in which the same differs from what is stated."""
-        from tactile_bayes.mechanics.forward_table import NO_TABLE, forward_table  # numba takes a second to load
+    def _known(self, rig: Rig) -> Tables:
+        """Return tables for the rod, made at the first rig in which the same differs from what is stated.
+
+        The second is for friction beyond the first.
+        """
+        from tactile_bayes.mechanics.forward_table import NO_TABLE, NO_TABLES  # numba takes a second to load
 
         profile = self._profile(rig)
         if self.exact or profile is None or self._tolerance.min() < _TABULATED:
-            return NO_TABLE
-        varied = bool(np.any(rig.taper)), bool(np.any(rig.rest_curvature)), bool(np.any(rig.friction != self.friction))
-        if varied not in self._tables:
+            return NO_TABLES
+        slides = bool(np.any(rig.friction != self.friction))
+        varied = bool(np.any(rig.taper)), bool(np.any(rig.rest_curvature)), slides
+        rubs_hard = slides and self._lines is None and bool(np.any(np.arctan(rig.friction) > _FRICTION_ANGLES[0][1]))
+        return self._table(profile, varied, False), self._table(profile, varied, True) if rubs_hard else NO_TABLE
+
+    def _table(self, profile: Profile, varied: tuple[bool, bool, bool], rubs_hard: bool) -> ForwardTable:
+        from tactile_bayes.mechanics.forward_table import GRADES, NO_TABLE, forward_table
+
+        key = *varied, rubs_hard
+        if key not in self._tables:
             widths = _TAPERS if varied[0] else (0.0,), _BENDS if varied[1] else (0.0,)
             senses = (True, False) if self._lines is not None and (varied[2] or self.friction) else (False,)
-            for fine, both, bend, taper in product((False, True), senses, *widths[::-1]):
-                self._tables[varied] = forward_table(profile, self._box(taper, bend, varied[2], both), fine)
-                if self._tables[varied] is not NO_TABLE:
+            angle = float(np.arctan(self.friction))
+            low, high = _FRICTION_ANGLES[rubs_hard] if varied[2] else (angle, angle)
+            for grade, both, bend, taper in product(range(GRADES), senses, *widths[::-1]):
+                box = self._box(taper, bend, (-high if both else low, high))
+                self._tables[key] = forward_table(profile, box, grade)
+                if self._tables[key] is not NO_TABLE:
                     break
-        return self._tables[varied]
+        return self._tables[key]
 
-    def _box(self, width: float, bend: float, slides: bool, both: bool) -> Box:
+    def _box(self, width: float, bend: float, friction_angle: tuple[float, float]) -> Box:
         """Return the ranges of a table, for tapers and rest curvatures within distances from the stated ones.
 
         Friction acts in one sense, or in both, as where first contact of a carried rod decides it.
         """
         from tactile_bayes.mechanics.forward_table import Box
 
-        surface, angle = self.rod.surface, float(np.arctan(self.friction))
+        surface, (low, high) = self.rod.surface, friction_angle
         tapers = max(surface.taper - width, 0.0), min(surface.taper + width, STEEPEST_TAPER)
         least, most = (surface._replace(taper=end).half_angle for end in tapers)
-        low, high = _FRICTION_ANGLE if slides else (angle, angle)
-        low = -high if both else low
         return Box(tapers, (-bend, bend), (low - most, high - least))
 
     def _bases(self, rig: Rig) -> Floats:
@@ -473,7 +488,7 @@ class RecordLikelihood:
             self._samples_with(errors),
             (contours.shape[0], errors.size * len(self.measured)),
             profile=self._profile(rig),
-            table=self._table(rig),
+            known=self._known(rig),
             tolerance=None if self.exact else self._tolerance,
             asks_clearance=not self.is_always_clear,
         )

@@ -43,6 +43,7 @@ __all__ = [
     "chord_to",
     "free_end",
     "from_tip",
+    "is_straight",
     "lever_of_stem",
     "loaded_part",
     "mirrored_beam",
@@ -368,6 +369,12 @@ def _rest_curvature(varied: Varied | None, curvature: float, arclength: float) -
     if varied is None:
         return curvature
     return rest_curvature_at(varied.profile, cell_at(varied.profile, arclength, FORWARD), arclength)
+
+
+@compiled
+def is_straight(beam: Beam) -> bool:
+    """Whether the rod at rest is known to be straight."""
+    return beam.varied is None and beam.curvature == 0.0
 
 
 @compiled

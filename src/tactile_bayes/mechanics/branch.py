@@ -6,8 +6,9 @@ derivative vanishes), a corner, or the point where the line of force passes thro
 drive angle falls by less than `curves.DIP` before it exceeds the maximum again does not count: the branch continues
 where it does so. This happens where a radius of curvature vanishes.
 
-If the drive carries the base, its travel along lines takes the place of the drive angle. Contact may then also end
-because the force vanishes, and is known as far as the drive goes. A leg ends where a line does.
+If the rod is curved or the drive carries the base, contact may also end because the force vanishes. If it carries the
+base, travel along lines takes the place of the drive angle; contact is known as far as the drive goes, and a leg ends
+where a line does.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.beam import free_end, from_tip, loaded_part, rest_curvature, rubbed_otherwise
+from tactile_bayes.mechanics.beam import free_end, from_tip, is_straight, loaded_part, rest_curvature, rubbed_otherwise
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
@@ -499,6 +500,7 @@ def follow_branch(
     begin_angle, last_at, last_tip, fate, longest = first, z, loaded.tip, _NEVER, _LONGEST
     changes, largest, is_first, done, runs_out, is_over = 0, math.nan, True, 0, False, False
     wants_states = found.changes.shape[0] > 0
+    may_release = lines is not None or not is_straight(scene.beam)
     most = workspace.followed.shape[0]
     for _ in range(4 * most):
         if done == most:
@@ -507,7 +509,7 @@ def follow_branch(
         if known == 0.0 and scene.beam.varied is not None:
             share = _share_in_phase(leg, psi1)
             leg, length = shortened(leg, share), share * length
-        share = math.nan if lines is None else _released(loaded, leg)
+        share = _released(loaded, leg) if may_release else math.nan
         released = share <= 1.0
         if released:
             leg, length, known = shortened(leg, share), share * length, share * known
@@ -608,7 +610,7 @@ def follow_branch(
                 sample_leg(loaded, shortened(leg, change), begin, nothing, change, settled, work)
                 behind = min(behind / change, 1.0)
             onward = regained(behind, begin_angle, curves)
-            if onward == LOST:
+            if onward == LOST or end.at.force < 0.0:
                 break
         behind_begin, onward_from = nothing, leg.along
         if onward <= 1.0:

@@ -49,8 +49,8 @@ _MOST_STEPS = 25
 _MOST_TURN, _MOST_LOADING = 0.4, 1.0
 """Largest changes of q, and of f over 1 + f, in a step."""
 
-_ASTRAY = 1.5
-"""Arc length [L] beyond which no tangential contact is sought."""
+_ASTRAY, _LEAST_PSI1, _MOST_PSI1 = 1.5, -0.5 * math.pi, 1.5 * math.pi
+"""Arc length [L] beyond which no tangential contact is sought, and the ψ1 between which tip contact is."""
 
 SETTLED = 1e-8
 """Step, over the largest, after which a first-order correction leaves rounding errors only."""
@@ -294,8 +294,10 @@ def settle(
 
 @compiled
 def _is_astray(loaded: Loaded, at: Equilibrium) -> bool:
-    """Return whether a rod without a closed form is sought too far beyond its tip: it takes long and leads nowhere."""
-    return loaded.beam.varied is not None and not loaded.tip and at.q > _ASTRAY
+    """Return whether a rod without a closed form is sought too far away: it takes long and leads nowhere."""
+    if loaded.beam.varied is None:
+        return False
+    return not _LEAST_PSI1 <= at.q <= _MOST_PSI1 if loaded.tip else at.q > _ASTRAY
 
 
 @compiled

@@ -29,7 +29,20 @@ from tactile_bayes.mechanics.profile_shape import chord_along, rest_along
 from tactile_bayes.mechanics.taylor import workspace
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["NO_TABLE", "Box", "ForwardTable", "RestChord", "chord_in", "forward_table", "pose_in", "prepare", "sheet"]
+__all__ = [
+    "GRADES",
+    "NO_TABLE",
+    "NO_TABLES",
+    "Box",
+    "ForwardTable",
+    "RestChord",
+    "Tables",
+    "chord_in",
+    "forward_table",
+    "pose_in",
+    "prepare",
+    "sheet",
+]
 
 _ROWS, _MOST_ROWS, _TERMS = 16, 26, 24
 """Terms in ψ1 or s1, also of a fine table, and in the force and the distance of the rod at rest."""
@@ -59,6 +72,12 @@ _PSI1, _FORCE, _BEYOND = (-1.0, 1.4), 36.0, 0.6
 
 _THRUST = 20.0
 """f Λ² before which sweeps end with a thrust through the pivot; their last series may go on."""
+
+_FINE_FORCES = (_THRUST, 7.0)
+"""Largest f Λ² of fine tables; the last is seldom exceeded."""
+
+GRADES = 1 + len(_FINE_FORCES)
+"""Number of grades of tables."""
 
 _BELOW, _FINE_PSI1 = 0.1, 2.4
 """How far ψ1 goes below that of tangential contact in a fine table, and its largest value."""
@@ -128,27 +147,34 @@ _NONE = Terms(np.zeros((0, 3), dtype=np.intp), np.zeros((2, 0, 0, 0)))
 NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 1.0, _PSI1, 1.0)
 """Table without any rod."""
 
+Tables = tuple[ForwardTable, ForwardTable]
+"""Tables of which the first that holds a rod serves it."""
+
+NO_TABLES: Tables = (NO_TABLE, NO_TABLE)
+"""No tables."""
+
 
 def sheet() -> Floats:
     """Return an array for the coefficients of one rod and those of one pose."""
     return np.zeros((_RANGES + 1, _COLUMNS))
 
 
-def forward_table(profile: Profile, box: Box, fine: bool = False) -> ForwardTable:
+def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:
     """Return the table of a profile, or `NO_TABLE` if it would need too many terms.
 
-    A fine table has more terms, and smaller ranges of force and ψ1 except that rods curved backward touch at larger
-    ψ1: it holds rods of strong and uneven curvature, and costs more.
+    A grade of 1 or 2 is a fine table. It has more terms, and smaller ranges of ψ1 and of the force, the smallest for 2,
+    except that rods curved backward touch at larger ψ1: it holds rods of strong and uneven curvature, and costs more.
     """
-    table = _tabulated(profile, box, fine)
+    table = _tabulated(profile, box, grade)
     return table if _errors(profile, table).max() <= _WORST else NO_TABLE
 
 
-def _tabulated(profile: Profile, box: Box, fine: bool) -> ForwardTable:
+def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
     work = workspace()
     rows, (low, high), most = _ROWS, _PSI1, _FORCE
-    if fine:
-        rows, (low, high), most = _MOST_ROWS, (-box.friction_angle[1] - _BELOW, _FINE_PSI1), _THRUST
+    if grade:
+        rows, (low, high) = _MOST_ROWS, (-box.friction_angle[1] - _BELOW, _FINE_PSI1)
+        most = _FINE_FORCES[grade - 1]
     span = math.log1p(most / _SCALE)
     wide = box.friction_angle[1] - box.friction_angle[0] > _BOTH
     counts = _OUTER_OF_BOTH if wide else _OUTER
@@ -322,19 +348,20 @@ def _stretched(factor: float, pose: Pose) -> Pose:
 @compiled
 def _sums(sheet: Floats, row: int, x: float, z: float) -> tuple[Pose, Pose, Pose]:
     """Three polynomials in two variables, and their derivatives."""
-    rows = int(sheet[_RANGES, 0])
+    rows, at, by = int(sheet[_RANGES, 0]), sheet[_POSE], sheet[_POSE + 1]
     for j in range(_COLUMNS):
-        at, by = sheet[row + rows - 1, j], 0.0
-        for i in range(rows - 2, -1, -1):
-            by = by * x + at
-            at = at * x + sheet[row + i, j]
-        sheet[_POSE, j], sheet[_POSE + 1, j] = at, by
+        at[j], by[j] = sheet[row + rows - 1, j], 0.0
+    for i in range(rows - 2, -1, -1):
+        here = sheet[row + i]
+        for j in range(_COLUMNS):  # several at a time
+            by[j] = by[j] * x + at[j]
+            at[j] = at[j] * x + here[j]
     u, v, turn, u_x, v_x, turn_x, u_z, v_z, turn_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(_COLUMNS - 3, -1, -3):
         u_z, v_z, turn_z = u_z * z + u, v_z * z + v, turn_z * z + turn
-        u, v, turn = u * z + sheet[_POSE, j], v * z + sheet[_POSE, j + 1], turn * z + sheet[_POSE, j + 2]
-        u_x, v_x = u_x * z + sheet[_POSE + 1, j], v_x * z + sheet[_POSE + 1, j + 1]
-        turn_x = turn_x * z + sheet[_POSE + 1, j + 2]
+        u, v, turn = u * z + at[j], v * z + at[j + 1], turn * z + at[j + 2]
+        u_x, v_x = u_x * z + by[j], v_x * z + by[j + 1]
+        turn_x = turn_x * z + by[j + 2]
     return Pose(u, v, turn), Pose(u_x, v_x, turn_x), Pose(u_z, v_z, turn_z)
 
 

@@ -68,4 +68,4 @@ class SnapOff(IntEnum):
     THRUST = 3
     """The line of force passes through the pivot, so that the holding moment vanishes."""
     RELEASE = 4
-    """The force vanishes: a rod that is carried leaves the contour without a jump."""
+    """The force vanishes: a rod that is curved or carried leaves the contour without a jump."""

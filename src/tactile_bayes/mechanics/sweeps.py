@@ -23,7 +23,7 @@ from tactile_bayes.mechanics.branch import (
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.curves import Accuracy
 from tactile_bayes.mechanics.equilibrium import Equilibrium, Rig, Scene, balance, in_phase
-from tactile_bayes.mechanics.forward_table import NO_TABLE, ForwardTable, prepare
+from tactile_bayes.mechanics.forward_table import NO_TABLES, Tables, prepare
 from tactile_bayes.mechanics.limits import clear_angle, is_clear
 from tactile_bayes.mechanics.line import NO_LINE, Line, line_at, line_of, pose_at
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
@@ -32,6 +32,9 @@ from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples, write_state
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
+
+_SAME_ANGLE = 1e-9
+"""Difference of drive angles [rad] that rounding may cause where the contact has no force."""
 
 _TOUCHES, _NEVER, _RELEASE = int(Reachability.TOUCHES), int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
@@ -186,7 +189,7 @@ def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
 def _scene(
     shapes: Shapes,
     varied: Varied | None,
-    known: ForwardTable,
+    known: Tables,
     sweep: Any,
     line: Line | None,
     exact: bool,
@@ -214,7 +217,7 @@ def _place_lines(lines: Floats | None, sweep: Any, room: Floats | None) -> None:
 
 @compiled
 def _beam(
-    varied: Varied | None, table: ForwardTable, sweep: Any, sign: float, half_angle: float, may_slip_back: bool
+    varied: Varied | None, known: Tables, sweep: Any, sign: float, half_angle: float, may_slip_back: bool
 ) -> Beam:
     """Rod of a sweep, with coefficients for its friction, and for friction of the other sense if that may act."""
     if varied is None:
@@ -222,10 +225,13 @@ def _beam(
     edges, curvature, rigidity, _, bend, _ = varied.profile
     room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
     angle, own, other = sweep.friction_angle, varied.sheet, varied.other_sheet
-    slenderness = table.slenderness if prepare(table, room, angle - half_angle, own) else 0.0
-    otherwise = 0.0
-    if may_slip_back and angle > 0.0 and slenderness > 0.0 and prepare(table, room, -angle - half_angle, other):
-        otherwise = table.slenderness
+    slenderness, otherwise = 0.0, 0.0
+    for table in known:
+        if prepare(table, room, angle - half_angle, own):
+            slenderness = table.slenderness
+            if may_slip_back and angle > 0.0 and prepare(table, room, -angle - half_angle, other):
+                otherwise = table.slenderness
+            break
     return beam_of(0.0, Varied(room, varied.work, own, slenderness, sign, other, otherwise), sweep.stem)
 
 
@@ -233,7 +239,7 @@ def _beam(
 def _solve_events(
     shapes: Shapes,
     varied: Varied | None,
-    known: ForwardTable,
+    known: Tables,
     sweeps: Any,
     lines: Floats | None,
     room: Floats | None,
@@ -280,7 +286,7 @@ def solve_events(
     """
     out = np.empty((*events.shape[:2], STATE_COLUMNS + 1))
     table, drive = np.empty(shapes.tables.shape[1:]), _carried(lines)
-    _solve_events(shapes, varied_of(profile), NO_TABLE, _as_sweeps(sweeps), *drive, events, table, out)
+    _solve_events(shapes, varied_of(profile), NO_TABLES, _as_sweeps(sweeps), *drive, events, table, out)
     return out
 
 
@@ -296,17 +302,19 @@ def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: flo
     A rod that is released touches there without load, which rounding alone would decide.
     """
     if lines is None:
-        return clear_angle(scene.outline, scene.beam, first_step)
+        clear = clear_angle(scene.outline, scene.beam, first_step)
+        return -math.inf if ends.snap_off == _RELEASE and clear < ends.snap_angle + _SAME_ANGLE else clear
+    if ends.snap_off == _RELEASE:
+        return -math.inf
     pose = pose_at(line_of(lines, line_at(lines, ends.snap_angle)), ends.snap_angle)
-    jumps = ends.snap_off != _NEVER and ends.snap_off != _RELEASE
-    return -math.inf if not jumps or is_clear(scene.outline, scene.beam, pose, first_step) else math.inf
+    return -math.inf if ends.snap_off == _NEVER or is_clear(scene.outline, scene.beam, pose, first_step) else math.inf
 
 
 @cached
 def _solve(
     shapes: Shapes,
     varied: Varied | None,
-    known: ForwardTable,
+    known: Tables,
     sweeps: Any,
     segments: Segments,
     lines: Floats | None,
@@ -367,7 +375,7 @@ def solve_sweeps(
     shape: tuple[int, int],
     *,
     profile: Profile | None = None,
-    table: ForwardTable = NO_TABLE,
+    known: Tables = NO_TABLES,
     tolerance: Floats | None = None,
     states: bool = False,
     polished: bool = True,
@@ -385,8 +393,8 @@ def solve_sweeps(
     profile : Profile, optional
         Rod whose rest curvature or rigidity varies along it, the same in all sweeps but for the taper, and for what is
         added to its rest curvature; by default rods are uniform and of constant rest curvature.
-    table : ForwardTable, optional
-        Table of the profile, for loads with errors of some 1e-6 of the largest.
+    known : (ForwardTable, ForwardTable), optional
+        Tables of the profile, for loads with errors of some 1e-6 of the largest.
     tolerance : ndarray, shape (3,), optional
         Tolerated errors of moment and forces [EI/L and EI/L²], at least 1e-10 of the loads; by default events are
         exact, and loads have errors of some 1e-8 of the largest.
@@ -412,7 +420,7 @@ def solve_sweeps(
     _solve(
         shapes,
         varied_of(profile),
-        table,
+        known,
         sweep,
         segments,
         *_carried(segments.lines),
