@@ -45,7 +45,7 @@ __all__ = [
 ]
 
 _ROWS, _MOST_ROWS, _TERMS = 16, 26, 24
-"""Terms in ψ1 or s1, also of a fine table, and in the force and the distance of the rod at rest."""
+"""Even numbers of terms in ψ1 or s1, also of a fine table, and in the force and the distance of the rod at rest."""
 
 _COLUMNS = 3 * _TERMS
 
@@ -311,20 +311,17 @@ def pose_in(
     length, rate = _length(slenderness, taper, arclength)
     scaled, span = force * length * length, sheet[_RANGES, 3]
     z, by_scaled = 2.0 / span * math.log1p(scaled / _SCALE) - 1.0, 2.0 / (span * (_SCALE + scaled))
-    by_force = by_scaled * length * length
+    row, begin, by_x, at = _TANGENTIAL, 0.0, 2.0, arclength
     if tip:
-        least, most = sheet[_RANGES, 1], sheet[_RANGES, 2]
-        by_x = 2.0 / (most - least)
-        x = (psi1 - least) * by_x - 1.0
-        inside = -1.0 <= x <= 1.0 and z <= 1.0
-        here, in_x, in_z = _sums(sheet, 0, x, z)
-        return inside, here, _times(by_x, in_x), _times(by_force, in_z)
-    row, begin, by_x = _TANGENTIAL, 0.0, 2.0
-    if arclength > 1.0:
+        row, begin, at = 0, sheet[_RANGES, 1], psi1
+        by_x = 2.0 / (sheet[_RANGES, 2] - begin)
+    elif arclength > 1.0:
         row, begin, by_x = _BEYOND_TIP, 1.0, 2.0 / (_BEYOND * (1.0 - taper))
-    x = (arclength - begin) * by_x - 1.0
+    x, by_force = (at - begin) * by_x - 1.0, by_scaled * length * length
     inside = -1.0 <= x <= 1.0 and z <= 1.0
     here, in_x, in_z = _sums(sheet, row, x, z)
+    if tip:
+        return inside, here, _times(by_x, in_x), _times(by_force, in_z)
     by_s = 2.0 * by_scaled * force * length * rate
     in_s = Pose(by_x * in_x.u + by_s * in_z.u, by_x * in_x.v + by_s * in_z.v, by_x * in_x.turn + by_s * in_z.turn)
     return (
@@ -351,11 +348,15 @@ def _sums(sheet: Floats, row: int, x: float, z: float) -> tuple[Pose, Pose, Pose
     rows, at, by = int(sheet[_RANGES, 0]), sheet[_POSE], sheet[_POSE + 1]
     for j in range(_COLUMNS):
         at[j], by[j] = sheet[row + rows - 1, j], 0.0
-    for i in range(rows - 2, -1, -1):
-        here = sheet[row + i]
-        for j in range(_COLUMNS):  # several at a time
-            by[j] = by[j] * x + at[j]
-            at[j] = at[j] * x + here[j]
+    for i in range(rows - 2, 0, -2):  # rows by twos, and several columns at a time
+        here, next_one = sheet[row + i], sheet[row + i - 1]
+        for j in range(_COLUMNS):
+            mid = at[j] * x + here[j]
+            by[j] = (by[j] * x + at[j]) * x + mid
+            at[j] = mid * x + next_one[j]
+    for j in range(_COLUMNS):  # the last, of an even number
+        by[j] = by[j] * x + at[j]
+        at[j] = at[j] * x + sheet[row, j]
     u, v, turn, u_x, v_x, turn_x, u_z, v_z, turn_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(_COLUMNS - 3, -1, -3):
         u_z, v_z, turn_z = u_z * z + u, v_z * z + v, turn_z * z + turn
