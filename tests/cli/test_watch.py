@@ -170,6 +170,30 @@ def test_the_same_command_goes_on_with_the_same_numbers(path, lines, follow):
     commands.assert_refused(follow(), "samples (was '60', now '20')")
 
 
+def test_of_a_long_record_every_other_sample_is_taken(path, lines, follow):
+    """The posterior is that of a stream of these samples, also after a stop before they were too many."""
+    head, rows = lines
+    assert 100 < len(rows) < 200
+    some = ["--most-samples", 100]
+    write(path, head, rows[:90])
+    first = objects(follow(*some, json=True))[0]
+    assert (first["samples"], first["every"], first["warnings"]) == (90, 1, [])
+    write(path, head, rows)
+    resumed, thinned, end = objects(follow(*some, json=True))
+    assert (resumed["samples"], resumed["every"]) == (90, 1)
+    half = (len(rows) + 1) // 2
+    assert (thinned["samples"], thinned["new"], thinned["every"]) == (half, half, 2)
+    assert not thinned["restarted"]
+    assert any("one sample of 2" in words for words in thinned["warnings"])
+    stream = Stream(nuisances=[], seed=1, particles=120)
+    stream.update(read_record(path).isel(sample=slice(None, None, 2)))
+    expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
+    assert [row["median"] for row in thinned["quantities"]] == pytest.approx(expected, rel=1e-12)
+    assert end["samples_taken"] == half
+    again, *_ = objects(follow(*some, json=True))
+    assert (again["samples"], again["new"], again["every"]) == (half, 0, 2)
+
+
 def test_samples_that_do_not_go_on_in_order_are_taken_anew(path, lines, follow):
     """The backward sweep, of which some samples came before, now with the whole forward sweep before them."""
     head, rows = lines

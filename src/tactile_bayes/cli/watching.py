@@ -73,6 +73,14 @@ def watch(
         float | None,
         typer.Option(help="End when a shape of several has a greater probability.", min=0.0, max=1.0),
     ] = None,
+    most_samples: Annotated[
+        int,
+        typer.Option(
+            help="Largest number of samples that are taken into account: of a longer record every second one is, every "
+            "fourth, and so on.",
+            min=100,
+        ),
+    ] = 1000,
     poll: Annotated[float, typer.Option(help="Time from one look at the file to the next [s].", min=0.01)] = 0.5,
     idle: Annotated[
         float | None, typer.Option(help="End when no row has come for so long [s]; by default Ctrl-C ends it.", min=0.0)
@@ -99,6 +107,7 @@ def watch(
         between=None if between is None else numbers_asked(between, "--between", 2),
         until_width=until_width,
         until_probability=until_probability,
+        most_samples=most_samples,
         families=family or ["parabola"],
         record_file=record,
         command=ctx.meta["words"],
@@ -136,6 +145,7 @@ class _Follower:
     is_late: bool = False
     parameters: int = 0
     e_value: float = 0.0
+    every: int = 1
 
     def follow(self) -> str:
         """Take what comes, until the end; return its reason."""
@@ -208,6 +218,12 @@ class _Follower:
                 f"--particles {_PER_PARAMETER * parameters} or more"
             )
         self.parameters = parameters
+        if update.every > self.every:
+            self.tell(
+                f"one sample of {update.every} is taken from now on, also of those before: more than --most-samples "
+                "would take too long"
+            )
+        self.every = update.every
         if update.restarted:
             self.tell(f"samples before have changed or do not go on in order: all {update.samples:,} taken anew")
         words = [
@@ -254,6 +270,7 @@ class _Follower:
             "new": update.new,
             "taken_together": self.is_late,
             "restarted": update.restarted,
+            "every": update.every,
             "seconds": update.seconds,
             "seconds_behind": behind,
             "probability": update.summary.attrs["probability"],

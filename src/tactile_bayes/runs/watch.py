@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_numbers, check_positive, check_probability
+from tactile_bayes.checks import check_numbers, check_positive, check_probability, check_whole_number
 from tactile_bayes.comparison.streams import StreamComparison
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
@@ -45,6 +45,8 @@ class WatchUpdate(NamedTuple):
     """Time that the update took, with its files [s]."""
     restarted: bool
     """True if all samples were taken anew, since they do not go on from those before."""
+    every: int
+    """Stride of the samples that are taken into account; 1 if all are."""
     posterior: xr.DataTree
     summary: xr.Dataset
     """Parameters with intervals."""
@@ -93,6 +95,9 @@ class Watch:
         Width below which the band has to be everywhere between these ends for measuring to stop [length].
     until_probability : float, optional
         Probability of a family above which measuring may stop.
+    most_samples : int
+        Largest number of samples that are taken into account, at least 100. Of a longer record every second sample is,
+        every fourth, and so on; when this begins, all that are left are taken anew.
     families : sequence of str
         Families of contours; of several, the posterior is that of the most probable one, and the band is averaged.
     record_file : path-like
@@ -116,6 +121,7 @@ class Watch:
         between: Sequence[float] | None = None,
         until_width: float | None = None,
         until_probability: float | None = None,
+        most_samples: int = 1000,
         families: Sequence[str] = ("parabola",),
         record_file: str | os.PathLike[str],
         command: Sequence[str] = (),
@@ -136,6 +142,7 @@ class Watch:
             check_probability("until_probability", until_probability)
             if len(families) < 2:
                 raise ParameterError("until_probability is for several families: give two or more")
+        self._most = check_whole_number("most_samples", most_samples, 100, "give a whole number of at least 100")
         self._until_width, self._until_probability = until_width, until_probability
         self._file, self._command = record_file, command
         if len(families) == 1:
@@ -146,6 +153,7 @@ class Watch:
         self._kind(**self._options)  # which refuses what it can before the first sample
         self.folder = RunFolder(out)
         self._stream: Stream | StreamComparison | None = None
+        self._every = 1
         self._answer: tuple[xr.DataTree, xr.Dataset] | None = None
 
     @property
@@ -170,12 +178,18 @@ class Watch:
         began = perf_counter()
         if not self.state.is_file():
             return None
-        self._stream = self._kind.resume(self.state, record, **self._options, load_cell=load_cell)
+        options = {**self._options, "load_cell": load_cell}
+        strides = [1 << power for power in range(self._stride(record).bit_length())]
+        every = 1
+        if len(strides) > 1:
+            stored = self._kind.resume(self.state, **options).record
+            every = next((stride for stride in strides if _continues(stored, _thinned(record, stride))), 1)
+        self._stream, self._every = self._kind.resume(self.state, _thinned(record, every), **options), every
         return self._update(self._stream, self.samples, began, sha256)
 
     def forget(self) -> None:
         """Begin again with the next samples."""
-        self._stream = None
+        self._stream, self._every = None, 1
 
     def take(self, record: xr.Dataset, load_cell: LoadCell | None, sha256: str) -> WatchUpdate | None:
         """Take the samples that are new into account, and write the stream and its posterior.
@@ -201,7 +215,9 @@ class Watch:
             As in `Stream.update`. The stream is then as before.
         """
         began, had = perf_counter(), self.samples
-        if self._stream is not None and _continues(self._stream.record, record):
+        every = self._stride(record)
+        record = _thinned(record, every)
+        if self._stream is not None and every == self._every and _continues(self._stream.record, record):
             if had == record.sizes["sample"]:
                 return None
             with suppress(RecordError):  # the samples are a record, but do not follow those before
@@ -210,9 +226,10 @@ class Watch:
                 return self._update(self._stream, had, began, sha256)
         stream = self._kind(**self._options, load_cell=load_cell)
         stream.update(record)
-        self._stream = stream
+        restarted = had > 0 and every == self._every
+        self._stream, self._every = stream, every
         stream.save(self.state)
-        return self._update(stream, 0, began, sha256, restarted=had > 0)
+        return self._update(stream, 0, began, sha256, restarted=restarted)
 
     def finish(self, load_cell: LoadCell | None) -> ContourRun:
         """Write all files of a run for the last answer.
@@ -248,6 +265,7 @@ class Watch:
             new=record.sizes["sample"] - had,
             seconds=perf_counter() - began,
             restarted=restarted,
+            every=self._every,
             posterior=posterior,
             summary=summary(posterior, self._probability),
             band=band,
@@ -256,6 +274,11 @@ class Watch:
             e_value=float(latest.e_value.min()),
             enough=self._enough(widths, probabilities) if posterior.attrs["converged"] else "",
         )
+
+    def _stride(self, record: xr.Dataset) -> int:
+        """Return the least power of two by which a record is thinned to the largest number of samples."""
+        parts = -(-record.sizes["sample"] // self._most)
+        return 1 << (parts - 1).bit_length()
 
     def _enough(self, widths: Floats, probabilities: Mapping[str, float]) -> str:
         """Return the first reason why measuring may stop."""
@@ -266,6 +289,11 @@ class Watch:
             if probabilities[family] > self._until_probability:
                 return f"{family} is probable enough"
         return ""
+
+
+def _thinned(record: xr.Dataset, every: int) -> xr.Dataset:
+    """Return every so many samples of a record, from the first on."""
+    return record.isel(sample=slice(None, None, every))
 
 
 def _continues(before: xr.Dataset | None, record: xr.Dataset) -> bool:
