@@ -9,7 +9,8 @@ long: there it lets go of the smaller cylinder. Its rigidity is that of a wire o
 
     python -m benchmarks.whisker_sweeps [--stem] FOLDER [SWEEP ...]
 
-keeps the rig and every posterior in FOLDER, and goes on from there. SWEEP is like cylinder_may25/trial0. With --stem
+keeps the rig and every posterior in FOLDER, and goes on from there. SWEEP is like cylinder_may25/trial0, or
+cylinder_may25, the sweeps of a session in one record, which have one hysteresis if they repeat each other. With --stem
 the piece before the first traced point is rigid, and its length inferred, with a prior of 4.1 ± 2 mm.
 """
 
@@ -49,6 +50,9 @@ COUNTS = 5e6
 
 RINGS = range(3, 9)
 """Distances of the probe from the clamp: closer points do not fit any rod, and the outermost is at the tip."""
+
+UNTOUCHED = 15
+"""Number of readings before contact."""
 
 BEFORE = np.radians(-108.0)
 """Bearing from which the probe arrives, on the other side of the whisker."""
@@ -90,13 +94,25 @@ def points(rod: tb.Rod) -> xr.Dataset:
     return _record(rod, sweep.astype(int), x, y, counts)
 
 
-def sweep_of(name: str, rod: tb.Rod) -> xr.Dataset:
-    """Return the record of a cylinder, up to where the reading has fallen to 60 % of its peak."""
-    table = _table(f"{name}.csv")
-    counts = table["sensor_y"]
-    released = (np.arange(counts.size) > counts.argmax()) & (counts < 0.6 * counts.max())
-    x, y = table["x"] - ORIGIN[0], table["y"] - table["y"][0]
-    return _record(rod, np.zeros(counts.size, dtype=int), x, y, counts).isel(sample=~released)
+def record_of(name: str, rod: tb.Rod) -> xr.Dataset:
+    """Return the record of a cylinder, of one sweep or of all of a session, without what follows the release.
+
+    A sweep ends where its reading has fallen to 60 % of its peak, and those that repeat each other where the first
+    does. In the record of a session the zero of each is that of its first readings.
+    """
+    tables = [_table(f"{one}.csv") for one in SWEEPS if one == name or one.startswith(f"{name}/")]
+    counts = [table["sensor_y"] for table in tables]
+    if len(tables) > 1:
+        counts = [each - each[:UNTOUCHED].mean() for each in counts]
+    until = [int(np.argmax((np.arange(each.size) > each.argmax()) & (each < 0.6 * each.max()))) for each in counts]
+    at = [float(table["y"][-1]) for table in tables]
+    until = [min(end for end, other in zip(until, at, strict=True) if other == own) for own in at]
+    rows = []
+    for k, (table, each, end) in enumerate(zip(tables, counts, until, strict=True)):
+        x, y = table["x"] - ORIGIN[0], table["y"] - table["y"][0]
+        rows.append(np.stack([np.full(end, k), x[:end], y[:end], each[:end]]))
+    sweep, x, y, counted = np.concatenate(rows, axis=1)
+    return _record(rod, sweep.astype(int), x, y, counted)
 
 
 def hysteresis(share: float, rod: tb.Rod) -> dict[str, Any]:
@@ -159,7 +175,7 @@ def main() -> None:
     for name in names:
         path, began = folder / f"{name.replace('/', '-')}.nc", perf_counter()
         if not path.exists():
-            record = sweep_of(name, rod)
+            record = record_of(name, rod)
             found = tb.infer_contour(
                 record,
                 family="circle",

@@ -488,3 +488,22 @@ def test_loads_of_rods_that_vary_are_within_1e_5_of_the_largest(name):
     slack = 1e-5 * largest + 1e-6 / turn * np.abs(turned - exact)
     assert np.count_nonzero(both) > 5_000
     assert np.all((np.abs(loads - exact) <= slack)[both])
+
+
+def test_a_drive_that_repeats_itself_is_followed_once_and_has_one_discrepancy():
+    """Two sweeps through the same poses, and the same with the second further on by less than what matters."""
+    there, contour = Translation((0.8, 0.0), np.pi, 1.2, 1.6), Circle(0.3, 0.8)
+    whole = scan(contour, drive=[there, there], drive_step=0.05).record
+    measured = CELL.measure(whole, seed=1)
+    apart = measured.assign(base_x=measured.base_x - 1e-12 * (measured.sweep == 1))
+    once, twice = RecordLikelihood(measured, CELL), RecordLikelihood(apart, CELL)
+    assert [len(each.segments) for each in (once, twice)] == [1, 2]
+    contours = Circle(np.array([0.3, 0.305]), np.array([0.8, 0.8]), np.array([0.0, 0.01]))
+    np.testing.assert_allclose(once.log_likelihood(contours), twice.log_likelihood(contours), atol=1e-6)
+    np.testing.assert_array_equal(
+        once.predict(contours)[0][:, : measured.sizes["sample"] // 2],
+        once.predict(contours)[0][:, measured.sizes["sample"] // 2 :],
+    )
+    steps = [np.count_nonzero(np.isinf(each.course.step)) for each in (once, twice)]
+    assert steps == [1, 2]
+    assert once.ways(np.array([[0.5]])) == pytest.approx(twice.ways(np.array([[0.5, 0.5]]))[:, :1])

@@ -74,8 +74,8 @@ _TURNS = np.array([[0.0, 0.0, -0.5 * np.pi, 0.0, 0.0, 1.0, -0.5 * np.pi, 1.5 * n
 
 @dataclass(frozen=True)
 class _Segment:
-    """A sweep segment: samples with one pivot, one side of contact and one direction of the drive, or those of a sweep
-    in which the drive carries the base."""
+    """A sweep segment: samples with one pivot, one side of contact and one direction of the drive, or those of sweeps
+    in which the drive carries the base through the same poses."""
 
     pivot: int
     """Index of the pivot, in the order of the record."""
@@ -112,6 +112,18 @@ class Rig(NamedTuple):
     base_shifts: Any = None
     """Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
     after the last given one are not shifted."""
+
+
+def _repeated(measured: xr.Dataset, angle: Floats) -> Index:
+    """Return for each sample one more than the first sweep that is carried through the same poses as its own; 0 if its
+    sweep is not carried."""
+    sweep, found = measured.sweep.values, np.zeros(angle.size, dtype=np.intp)
+    poses = np.column_stack([measured.base_x.values, measured.base_y.values, angle, measured.direction == "backward"])
+    first: dict[bytes, int] = {}
+    for number in carried_sweeps(measured):
+        own = sweep == number
+        found[own] = 1 + first.setdefault(poses[own].tobytes(), number)
+    return found
 
 
 class RecordLikelihood:
@@ -170,8 +182,7 @@ class RecordLikelihood:
         self._turn = angle if frame_of(record) == "turning" else None
         backward = contact_sides(without_errors(measured, load_cell), load_cell) < 0.0
         bases, of_sample = base_of_sample(measured)
-        sweep = measured.sweep.values
-        carried = np.where(np.isin(sweep, carried_sweeps(measured)), sweep + 1, 0)
+        carried = _repeated(measured, angle)
         sense = np.where(carried > 0, 0.0, np.where(measured.direction.values == "backward", -1.0, 1.0))
         places = np.array(bases)[of_sample]
         kinds, which = np.unique(np.column_stack([places, backward, sense, carried]), axis=0, return_inverse=True)
@@ -204,11 +215,12 @@ class RecordLikelihood:
                 drives.append(_TURNS)
                 continue
             own = segment.samples
-            poses = np.column_stack([measured.base_x.values[own], measured.base_y.values[own], angle[own]])
+            once = own[measured.sweep.values[own] == measured.sweep.values[own[0]]]
+            poses = np.column_stack([measured.base_x.values[once], measured.base_y.values[once], angle[once]])
             if np.ptp(poses[:, 2]) <= _SCATTER * noise:
                 poses[:, 2] = poses[:, 2].mean()
             path = lines_through(poses, self.rod.length, backward=segment.backward, off=max(_OFF, 3.0 * noise))
-            row[: own.size] = path.travels
+            row[: own.size] = np.tile(path.travels, own.size // once.size)
             self._ways[k] = np.append(0.0, np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T)))
             drives.append(path.lines)
         lines = np.full((len(drives), max(map(len, drives)), LINE_COLUMNS), np.nan)
@@ -374,7 +386,7 @@ class RecordLikelihood:
             if segment.sense:
                 ways[:, k] = np.pi - ways[:, k] if segment.backward else ways[:, k]
             else:
-                ways[:, k] = np.interp(ways[:, k], self._angles[k, : segment.samples.size], self._ways[k])
+                ways[:, k] = np.interp(ways[:, k], self._angles[k, : self._ways[k].size], self._ways[k])
         return ways
 
     def misread(self, rig: Rig) -> Floats:
@@ -438,7 +450,8 @@ class RecordLikelihood:
         """Order in which a discrepancy passes through the samples: by drive angle, in the direction of the drive, or by
         travel where the drive carries the base.
 
-        Sweeps from one pivot in one direction repeat each other, and have one discrepancy in common.
+        Sweeps from one pivot in one direction, or carried through the same poses, repeat each other, and have one
+        discrepancy in common.
         """
         pairs = zip(self.segments, self._signs, strict=True)
         direction = np.array([segment.sense * sign or 1.0 for segment, sign in pairs])
