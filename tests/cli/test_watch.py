@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,8 +16,10 @@ from helpers.report_pages import Page
 from tactile_bayes.cli import watching
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.inference.stream import Stream
+from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import read_record
 from tactile_bayes.runs import contour as contour_run
+from tactile_bayes.runs.watch import open_watch
 
 FEW = ("--as-stated", "--particles", 120)
 
@@ -190,8 +193,23 @@ def test_of_a_long_record_every_other_sample_is_taken(path, lines, follow):
     expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
     assert [row["median"] for row in thinned["quantities"]] == pytest.approx(expected, rel=1e-12)
     assert end["samples_taken"] == half
+    assert read_result(path.parent / "run" / "posterior.nc").attrs["samples_taken_every"] == 2
     again, *_ = objects(follow(*some, json=True))
     assert (again["samples"], again["new"], again["every"]) == (half, 0, 2)
+    said = follow(*some).stdout
+    assert f"Ended after {half} samples, one of 2 that were measured" in said
+    whole, *_ = objects(follow(json=True))[1:]
+    assert (whole["samples"], whole["every"]) == (len(rows), 1)
+
+
+def test_samples_of_a_load_cell_that_drifts_are_all_taken(record, tmp_path):
+    """The steps of its drift are those from one sample to the next."""
+    measured = read_record(record)
+    cell = replace(LoadCell.from_record(measured), drift=RandomWalk(force=1e-4))
+    options = {"record_file": record, "seed": 1, "nuisances": [], "particles": 100, "most_samples": 100}
+    with open_watch(tmp_path / "run", **options) as watched:
+        update = watched.take(measured, cell, "")
+    assert (update.samples, update.every) == (measured.sizes["sample"], 1)
 
 
 def test_samples_that_do_not_go_on_in_order_are_taken_anew(path, lines, follow):

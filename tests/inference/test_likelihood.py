@@ -507,3 +507,17 @@ def test_a_drive_that_repeats_itself_is_followed_once_and_has_one_discrepancy():
     steps = [np.count_nonzero(np.isinf(each.course.step)) for each in (once, twice)]
     assert steps == [1, 2]
     assert once.ways(np.array([[0.5]])) == pytest.approx(twice.ways(np.array([[0.5, 0.5]]))[:, :1])
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("rod", [Rod(rest_curvature=2.0), Rod(rest_curvature=lambda s: 2.0 + 0.3 * s)])
+def test_contours_that_release_a_rod_are_usable_in_a_likelihood_as_well(rod, friction):
+    """Where contact ends without force, only small errors decide whether the rod at rest still touches."""
+    at, rng = Parabola(1.0, 0.8315 if rod.profile is None else 0.81, 0.1), np.random.default_rng(1)
+    found = scan(at, rod=rod, friction=friction, drive_step=0.01)
+    assert "release" in {sweep.snap_off.kind for sweep in found.events.values()}
+    measured = CELL.measure(found.record, seed=1)
+    contours = Parabola(*(rng.normal(0.0, 1e-4, (3, 60)) + np.array([[at.a], [at.q], [at.x_c]])))
+    exact, fast = (RecordLikelihood(measured, CELL, friction, one, is_always_clear=False) for one in (True, False))
+    np.testing.assert_array_equal(fast.usable(contours), exact.usable(contours))
+    assert exact.usable(contours).any()

@@ -218,11 +218,9 @@ class _Follower:
                 f"--particles {_PER_PARAMETER * parameters} or more"
             )
         self.parameters = parameters
-        if update.every > self.every:
-            self.tell(
-                f"one sample of {update.every} is taken from now on, also of those before: more than --most-samples "
-                "would take too long"
-            )
+        if update.every != self.every:
+            of = "all samples are" if update.every == 1 else f"one sample of {update.every} is"
+            self.tell(f"{of} taken from now on, also of those before (--most-samples)")
         self.every = update.every
         if update.restarted:
             self.tell(f"samples before have changed or do not go on in order: all {update.samples:,} taken anew")
@@ -298,7 +296,8 @@ def _answer(ctx: typer.Context, follower: _Follower, reason: str) -> Answer:
             raise KeyboardInterrupt("interrupted before the first answer")
         raise InferenceError(f"{follower.path}: {reason}, and there is no sample in it")
     run = follower.watched.finish(follower.load_cell)
-    said = f"Ended after {last.samples:,} samples: {reason}"
+    left_out = f", one of {last.every} that were measured" if last.every > 1 else ""
+    said = f"Ended after {last.samples:,} samples{left_out}: {reason}"
     words = [*run.verdicts, *_families(last), f"{sentence(_band(last))}."]
     follower.write_page(said, words, is_well=run.verdicts[0].startswith("All is well"), is_last=True)
     folder = follower.watched.folder.path

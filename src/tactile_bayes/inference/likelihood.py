@@ -19,6 +19,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.encoder import EncoderErrors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
+from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.line import LINE_COLUMNS, lines_through
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile
@@ -57,9 +58,9 @@ _TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
 default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and for
 uneven curvature that of the rest curvature."""
 
-_FRICTION_ANGLES = (0.0, 0.5), (0.5, 0.9)
-"""Angles of friction in the two tables of a likelihood, up to those of coefficients of 0.55 and 1.26, two and four
-standard deviations of the default prior; the first in either sense where the base is carried."""
+_FRICTION_ANGLES = (0.0, 0.5), (0.5, MAX_FRICTION_ANGLE)
+"""Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where the base is
+carried."""
 
 
 _OFF = 1e-6

@@ -33,8 +33,8 @@ from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples, writ
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
 
-_SAME_ANGLE = 1e-9
-"""Difference of drive angles [rad] that rounding may cause where the contact has no force."""
+_SAME_ANGLE = 1e-5
+"""Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
 
 _TOUCHES, _NEVER, _RELEASE = int(Reachability.TOUCHES), int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
@@ -299,7 +299,8 @@ def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line |
 def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: float) -> float:
     """Travel beyond which the unloaded rod is clear; on lines this only tells whether it is so where contact ends.
 
-    A rod that is released touches there without load, which rounding alone would decide.
+    A rod that is released touches there without load, which small errors alone would decide: −∞ if it does so nowhere
+    else.
     """
     if lines is None:
         clear = clear_angle(scene.outline, scene.beam, first_step)

@@ -38,13 +38,14 @@ class WatchUpdate(NamedTuple):
     """The answer after some samples."""
 
     samples: int
-    """Number of samples so far."""
+    """Number of samples that are taken into account so far."""
     new: int
     """Number of those that came with this update."""
     seconds: float
     """Time that the update took, with its files [s]."""
     restarted: bool
-    """True if all samples were taken anew, since they do not go on from those before."""
+    """True if all samples were taken anew since they do not go on from those before, and not since others of them are
+    left out."""
     every: int
     """Stride of the samples that are taken into account; 1 if all are."""
     posterior: xr.DataTree
@@ -97,7 +98,8 @@ class Watch:
         Probability of a family above which measuring may stop.
     most_samples : int
         Largest number of samples that are taken into account, at least 100. Of a longer record every second sample is,
-        every fourth, and so on; when this begins, all that are left are taken anew.
+        every fourth, and so on; when this begins, all that are left are taken anew. Records of a load cell that drifts
+        from sample to sample are taken whole.
     families : sequence of str
         Families of contours; of several, the posterior is that of the most probable one, and the band is averaged.
     record_file : path-like
@@ -179,12 +181,11 @@ class Watch:
         if not self.state.is_file():
             return None
         options = {**self._options, "load_cell": load_cell}
-        strides = [1 << power for power in range(self._stride(record).bit_length())]
-        every = 1
-        if len(strides) > 1:
-            stored = self._kind.resume(self.state, **options).record
-            every = next((stride for stride in strides if _continues(stored, _thinned(record, stride))), 1)
-        self._stream, self._every = self._kind.resume(self.state, _thinned(record, every), **options), every
+        stored = self._kind.resume(self.state, **options)
+        strides = [1 << power for power in range(record.sizes["sample"].bit_length())]
+        every = next((stride for stride in strides if _continues(stored.record, _thinned(record, stride))), 0)
+        self._stream = stored if every else self._kind.resume(self.state, record, **options)
+        self._every = every or 1
         return self._update(self._stream, self.samples, began, sha256)
 
     def forget(self) -> None:
@@ -215,7 +216,7 @@ class Watch:
             As in `Stream.update`. The stream is then as before.
         """
         began, had = perf_counter(), self.samples
-        every = self._stride(record)
+        every = self._stride(record, load_cell)
         record = _thinned(record, every)
         if self._stream is not None and every == self._every and _continues(self._stream.record, record):
             if had == record.sizes["sample"]:
@@ -251,6 +252,7 @@ class Watch:
         posterior, record = stream.posterior(), stream.record
         assert record is not None
         posterior.attrs |= origin_of(record, self._probability, self._command) | file_of(self._file, sha256)
+        posterior.attrs["samples_taken_every"] = self._every
         self.folder.write_posterior(posterior)
         self._answer = posterior, record
         band, probabilities, latest = None, {}, stream.latest()
@@ -275,8 +277,11 @@ class Watch:
             enough=self._enough(widths, probabilities) if posterior.attrs["converged"] else "",
         )
 
-    def _stride(self, record: xr.Dataset) -> int:
+    def _stride(self, record: xr.Dataset, load_cell: LoadCell | None) -> int:
         """Return the least power of two by which a record is thinned to the largest number of samples."""
+        cell = load_cell or LoadCell.from_record(record)
+        if cell is not None and cell.drift is not None:  # its steps are those from one sample to the next
+            return 1
         parts = -(-record.sizes["sample"] // self._most)
         return 1 << (parts - 1).bit_length()
 

@@ -27,8 +27,9 @@ class Event:
     kind : str
         At first contact "tip" or "tangential"; at a change "tip → tangential" and so on; at snap-off "fold" (a smooth
         maximum of the drive angle, or of the travel), "corner" (a maximum where the phase changes or the contour's
-        curvature jumps) or "thrust" (the line of force passes through the pivot). A rod that is carried may also leave
-        the contour without a jump ("release"), or still touch it at the end of the drive ("never").
+        curvature jumps) or "thrust" (the line of force passes through the pivot). A rod that is curved or carried
+        may also leave the contour without a jump ("release"), and one that is carried still touch it at the end of the
+        drive ("never").
     travel : float
         How far along the drive it lies: the drive angle of a rotation [rad], or the way of the base [length].
     drive_angle, slope_angle : float
