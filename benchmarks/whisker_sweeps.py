@@ -104,15 +104,23 @@ def record_of(name: str, rod: tb.Rod) -> xr.Dataset:
     counts = [table["sensor_y"] for table in tables]
     if len(tables) > 1:
         counts = [each - each[:UNTOUCHED].mean() for each in counts]
-    until = [int(np.argmax((np.arange(each.size) > each.argmax()) & (each < 0.6 * each.max()))) for each in counts]
-    at = [float(table["y"][-1]) for table in tables]
-    until = [min(end for end, other in zip(until, at, strict=True) if other == own) for own in at]
+    distances = [float(table["y"][-1]) for table in tables]
+    ends: dict[float, int] = {}
+    for at, each in zip(distances, counts, strict=True):
+        ends[at] = min(ends.get(at, each.size), _end(each))
     rows = []
-    for k, (table, each, end) in enumerate(zip(tables, counts, until, strict=True)):
+    for k, (table, each, at) in enumerate(zip(tables, counts, distances, strict=True)):
+        end = ends[at]
         x, y = table["x"] - ORIGIN[0], table["y"] - table["y"][0]
         rows.append(np.stack([np.full(end, k), x[:end], y[:end], each[:end]]))
     sweep, x, y, counted = np.concatenate(rows, axis=1)
     return _record(rod, sweep.astype(int), x, y, counted)
+
+
+def _end(counts: Floats) -> int:
+    """Return the number of readings before they have fallen to 60 % of their peak."""
+    released = (np.arange(counts.size) > counts.argmax()) & (counts < 0.6 * counts.max())
+    return int(np.argmax(released)) if released.any() else counts.size
 
 
 def hysteresis(share: float, rod: tb.Rod) -> dict[str, Any]:

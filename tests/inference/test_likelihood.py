@@ -193,7 +193,7 @@ def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
         places = 0.003 * rng.normal(size=(3, count)) + np.array([[0.29], [0.21], [0.0]])
         likelihood, exactly = (RecordLikelihood(measured, CELL, exact=exact) for exact in (False, True))
         loads, usable = likelihood.predict(Circle(*places), rig)
-        assert likelihood._tables[False, True, True, False] is not NO_TABLE
+        assert likelihood._tables.made[False, True, True, False] is not NO_TABLE
         exact, usable_exactly = exactly.predict(Circle(*places), rig)
         np.testing.assert_array_equal(usable, usable_exactly)
         assert np.count_nonzero(usable) > 20

@@ -145,7 +145,6 @@ class _Follower:
     is_late: bool = False
     parameters: int = 0
     e_value: float = 0.0
-    every: int = 1
 
     def follow(self) -> str:
         """Take what comes, until the end; return its reason."""
@@ -208,7 +207,7 @@ class _Follower:
 
         if update is None:
             return
-        self.last = update
+        every_before, self.last = self.last.every if self.last else 1, update
         now = time.time()
         behind = max(0.0, now - growth.written_at)
         count, parameters = update.posterior["posterior"].sizes["draw"], update.summary.sizes["quantity"]
@@ -218,10 +217,9 @@ class _Follower:
                 f"--particles {_PER_PARAMETER * parameters} or more"
             )
         self.parameters = parameters
-        if update.every != self.every:
+        if update.every != every_before:
             of = "all samples are" if update.every == 1 else f"one sample of {update.every} is"
             self.tell(f"{of} taken from now on, also of those before (--most-samples)")
-        self.every = update.every
         if update.restarted:
             self.tell(f"samples before have changed or do not go on in order: all {update.samples:,} taken anew")
         words = [

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,12 +16,12 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.encoder import EncoderErrors
+from tactile_bayes.inference.rod_tables import RodTables
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
-from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.line import LINE_COLUMNS, lines_through
 from tactile_bayes.mechanics.paths import Paths, trace
-from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile
+from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.shapes import shapes_of
 from tactile_bayes.reconstruction import contact_sides
@@ -38,7 +37,7 @@ from tactile_bayes.record import (
 )
 
 if TYPE_CHECKING:
-    from tactile_bayes.mechanics.forward_table import Box, ForwardTable, Tables
+    from tactile_bayes.mechanics.forward_table import Tables
     from tactile_bayes.mechanics.sweeps import Segments, Shapes, Solutions, Sweeps
 
 __all__ = ["RecordLikelihood", "Rig", "without_errors"]
@@ -52,16 +51,6 @@ _LEAST = 1e-10
 
 _TABULATED = 5e-6
 """Least tolerance of loads for which the pose of a rod with a profile comes from a table."""
-
-_TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
-"""Ranges of tables: distances from the stated taper and rest curvature [1/L], three and four standard deviations of the
-default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and for
-uneven curvature that of the rest curvature."""
-
-_FRICTION_ANGLES = (0.0, 0.5), (0.5, MAX_FRICTION_ANGLE)
-"""Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where the base is
-carried."""
-
 
 _OFF = 1e-6
 """Distance of recorded poses from a line [L and rad] that is rounding of the record."""
@@ -196,7 +185,7 @@ class RecordLikelihood:
         self._signs = np.array([-1.0 if segment.backward else 1.0 for segment in self.segments])
         longest = max(segment.samples.size for segment in self.segments)
         self._samples_by_errors: dict[bytes, Segments] = {}
-        self._tables: dict[tuple[bool, ...], ForwardTable] = {}
+        self._tables = RodTables(self.rod, friction, bool(np.any(carried)))
         self._angles = np.full((len(self.segments), longest), np.nan)
         for row, segment in zip(self._angles, self.segments, strict=True):
             read = angle[segment.samples]
@@ -309,47 +298,13 @@ class RecordLikelihood:
         return np.asarray(self.rod.stem / self.rod.length + rig.stem)
 
     def _known(self, rig: Rig) -> Tables:
-        """Return tables for the rod, made at the first rig in which the same differs from what is stated.
-
-        The second is for friction beyond the first.
-        """
-        from tactile_bayes.mechanics.forward_table import NO_TABLE, NO_TABLES  # numba takes a second to load
+        """Return tables for the rod, as far as the noise allows their errors."""
+        from tactile_bayes.mechanics.forward_table import NO_TABLES  # numba takes a second to load
 
         profile = self._profile(rig)
         if self.exact or profile is None or self._tolerance.min() < _TABULATED:
             return NO_TABLES
-        slides = bool(np.any(rig.friction != self.friction))
-        varied = bool(np.any(rig.taper)), bool(np.any(rig.rest_curvature)), slides
-        rubs_hard = slides and self._lines is None and bool(np.any(np.arctan(rig.friction) > _FRICTION_ANGLES[0][1]))
-        return self._table(profile, varied, False), self._table(profile, varied, True) if rubs_hard else NO_TABLE
-
-    def _table(self, profile: Profile, varied: tuple[bool, bool, bool], rubs_hard: bool) -> ForwardTable:
-        from tactile_bayes.mechanics.forward_table import GRADES, NO_TABLE, forward_table
-
-        key = *varied, rubs_hard
-        if key not in self._tables:
-            widths = _TAPERS if varied[0] else (0.0,), _BENDS if varied[1] else (0.0,)
-            senses = (True, False) if self._lines is not None and (varied[2] or self.friction) else (False,)
-            angle = float(np.arctan(self.friction))
-            low, high = _FRICTION_ANGLES[rubs_hard] if varied[2] else (angle, angle)
-            for grade, both, bend, taper in product(range(GRADES), senses, *widths[::-1]):
-                box = self._box(taper, bend, (-high if both else low, high))
-                self._tables[key] = forward_table(profile, box, grade)
-                if self._tables[key] is not NO_TABLE:
-                    break
-        return self._tables[key]
-
-    def _box(self, width: float, bend: float, friction_angle: tuple[float, float]) -> Box:
-        """Return the ranges of a table, for tapers and rest curvatures within distances from the stated ones.
-
-        Friction acts in one sense, or in both, as where first contact of a carried rod decides it.
-        """
-        from tactile_bayes.mechanics.forward_table import Box
-
-        surface, (low, high) = self.rod.surface, friction_angle
-        tapers = max(surface.taper - width, 0.0), min(surface.taper + width, STEEPEST_TAPER)
-        least, most = (surface._replace(taper=end).half_angle for end in tapers)
-        return Box(tapers, (-bend, bend), (low - most, high - least))
+        return self._tables.known(profile, rig.taper, rig.rest_curvature, rig.friction)
 
     def _bases(self, rig: Rig) -> Floats:
         """Return the pivots, shape (segments, n, 2)."""

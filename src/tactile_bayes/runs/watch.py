@@ -183,9 +183,10 @@ class Watch:
         options = {**self._options, "load_cell": load_cell}
         stored = self._kind.resume(self.state, **options)
         strides = [1 << power for power in range(record.sizes["sample"].bit_length())]
-        every = next((stride for stride in strides if _continues(stored.record, _thinned(record, stride))), 0)
-        self._stream = stored if every else self._kind.resume(self.state, record, **options)
-        self._every = every or 1
+        every = next((stride for stride in strides if _continues(stored.record, _thinned(record, stride))), None)
+        if every is None:  # it is of another record, and the message states what differs
+            stored = self._kind.resume(self.state, record, **options)
+        self._stream, self._every = stored, every or 1
         return self._update(self._stream, self.samples, began, sha256)
 
     def forget(self) -> None:
