@@ -41,7 +41,7 @@ def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
     assert found[0].endswith(
         "Do not use this contour. It may be the family or the rig. Try another family (--family shape-free, or "
         "compare), or infer more of the rig (--nuisance friction, gain, drift, lever, backlash, "
-        "suspension_compliance, rest_curvature, taper, stem)."
+        "suspension_compliance, rest_curvature, taper, stem, length)."
     )
     assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 60 steps")
     assert found[2].startswith("The noise is ")

@@ -9,7 +9,7 @@ import xarray as xr
 
 import tactile_bayes as tb
 from tactile_bayes.inference.found_rig import contact_points, found_rig
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, to_dimensionless, with_rod
 
 CONTOUR = tb.contours.Parabola(0.5, q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -127,6 +127,24 @@ def test_contacts_are_true_if_the_faults_are_found(names, frame):
     assert distance < 1e-6
     assert misfit < 1e-6
     distance, misfit = off(read, truth, CELL, posterior_of())
+    assert distance > 1e-3 or misfit > 0.1
+
+
+@pytest.mark.parametrize("bent", [0.0, 0.4, lambda s: 0.5 * s - 0.1], ids=["straight", "arc", "bent"])
+@pytest.mark.parametrize("units", ["SI", "dimensionless"])
+def test_the_length_of_the_rod_is_found(bent, units):
+    """It keeps its proportions; a record in lengths of the stated rod has another rod's then."""
+    stated = tb.Rod(1.0, 2.0, rest_curvature=bent)
+    longer = stated.reshaped(stated.mean_rest_curvature, 0.0, length=1.03)
+    truth = tb.scan(CONTOUR, rod=longer, drive_step=np.radians(8.0)).record
+    read = truth.drop_vars([name for name in truth.data_vars if str(name).startswith("truth_")])
+    read, cell = with_rod(read, stated), tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+    if units == "dimensionless":
+        read, cell = to_dimensionless(read), cell.dimensionless(stated)
+    distance, misfit = off(read, truth, cell, posterior_of(length=1.03))
+    assert distance < 1e-6
+    assert misfit < 1e-6
+    distance, misfit = off(read, truth, cell, posterior_of())
     assert distance > 1e-3 or misfit > 0.1
 
 

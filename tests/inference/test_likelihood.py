@@ -15,6 +15,7 @@ from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.forward_table import NO_TABLE
@@ -22,7 +23,7 @@ from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
 from tactile_bayes.record.units import with_rod
-from tactile_bayes.sweep import Translation, scan
+from tactile_bayes.sweep import Motion, Translation, scan
 
 SHARE = {False: 3e-4, True: 1e-6}
 """Error of the interpolated loads over their largest value, at worst, in 150 contours."""
@@ -521,3 +522,46 @@ def test_contours_that_release_a_rod_are_usable_in_a_likelihood_as_well(rod, fri
     exact, fast = (RecordLikelihood(measured, CELL, friction, one, is_always_clear=False) for one in (True, False))
     np.testing.assert_array_equal(fast.usable(contours), exact.usable(contours))
     assert exact.usable(contours).any()
+
+
+@pytest.mark.parametrize("rig", ["straight", "arc", "curved by a function", "carried"])
+def test_the_length_of_a_rig_is_that_of_a_rod_of_the_same_proportions(rig):
+    """Against a likelihood for which the rod is stated, in SI units; with a suspension and a stem."""
+    shape = {
+        "arc": {"rest_curvature": 4.0, "stem": 0.003},
+        "curved by a function": {"rest_curvature": lambda s: 80.0 * s},
+    }
+    stated = Rod(0.1, 2e-4, diameter=5e-4, **shape.get(rig, {}))
+    longer = stated.reshaped(stated.mean_rest_curvature, 0.0, length=0.102)
+    np.testing.assert_allclose(longer.mean_rest_curvature * longer.length, stated.mean_rest_curvature * stated.length)
+    drive = Motion([0.08, 0.0, -0.08], [0.0, 0.002, 0.0], [0.9, 1.1, 1.1]) if rig == "carried" else None
+    true = Circle(0.03, 0.045)
+    record = scan(true, rod=longer, drive=drive, friction=0.2).record
+    cell = LoadCell(force_noise=1e-4, moment_noise=1e-5)
+    contours = stack([true, Circle(0.0303, 0.0452)])
+    off = {
+        "friction": 0.2,
+        "suspension_compliance": np.full(2, 0.01),
+        "rigidity_scale": 1.1,
+        "drive_angle_offset": 1e-3,
+    }
+    for exact in (True, False):
+        known = RecordLikelihood(with_rod(record, longer), cell, exact=exact)
+        found = RecordLikelihood(with_rod(record, stated), cell, exact=exact)
+        # The compliance is in rad per EI/L of the stated rod.
+        expected, usable = known.predict(contours, Rig(**off | {"suspension_compliance": np.full(2, 0.01 / 1.02)}))
+        loads, usable_too = found.predict(contours, Rig(**off, length=1.02))
+        assert usable.all()
+        np.testing.assert_array_equal(usable_too, usable)
+        expected, loads = expected * longer.load_units, loads * stated.load_units
+        error = SHARE[exact] * np.abs(expected).max(axis=(0, 1))
+        assert np.all(np.abs(loads - expected) <= error)
+    events = [
+        events_of(likelihood, contours, Rig(**off | more))
+        for likelihood, more in (
+            (known, {"suspension_compliance": np.full(2, 0.01 / 1.02)}),
+            (found, {"length": np.full(2, 1.02)}),
+        )
+    ]
+    for name, expected in events[0].items():
+        np.testing.assert_allclose(events[1][name], expected, atol=1e-9, err_msg=name)

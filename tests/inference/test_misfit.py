@@ -9,6 +9,7 @@ from tactile_bayes.comparison.verdict import NONE_FITS, verdict_on
 from tactile_bayes.inference.misfit import what_to_try
 
 EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance", "rest_curvature", "taper", "stem"]
+EVERY += ["length"]
 
 
 def suggested(nuisances, **stated):
@@ -27,6 +28,7 @@ def suggested(nuisances, **stated):
         (["suspension_compliance"], "suspension_compliance"),
         (["taper"], "taper"),
         (["stem"], "stem"),
+        (["length", "discrepancy_length"], "length"),
     ],
 )
 def test_what_was_inferred_is_not_suggested(inferred, name):
@@ -35,11 +37,12 @@ def test_what_was_inferred_is_not_suggested(inferred, name):
 
 def test_what_would_be_refused_is_not_suggested():
     assert suggested([], friction=0.2) == EVERY[1:]
+    assert suggested(["discrepancy_length"]) == EVERY
     assert suggested(["rigidity_scale"])[1] == "gain in place of rigidity_scale"
 
 
 def test_where_everything_was_inferred_only_the_family_is_left():
-    words = what_to_try(["circle"], ["friction", "moment_gain", "force_y_drift", "lever_y", "backlash", *EVERY[-4:]])
+    words = what_to_try(["circle"], ["friction", "moment_gain", "force_y_drift", "lever_y", "backlash", *EVERY[-5:]])
     assert words == "It may be the family or the rig. Try another family (--family shape-free, or compare)."
 
 

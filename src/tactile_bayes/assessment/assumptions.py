@@ -28,7 +28,7 @@ from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 __all__ = ["Alternative", "alternatives_of", "band_by_assumption"]
 
-_NUISANCES = (*STANDARD, "base", "drift", "gain", "suspension_compliance", "rest_curvature", "taper", "stem")
+_NUISANCES = (*STANDARD, "base", "drift", "gain", "suspension_compliance", "rest_curvature", "taper", "stem", "length")
 """Nuisance parameters, or groups of them, each of which is added or fixed."""
 
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)

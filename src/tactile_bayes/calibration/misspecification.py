@@ -158,5 +158,6 @@ class Misspecification:
             rest_curvature=drawn.rest_curvature + self.rest_curvature,
             taper=drawn.taper + self.taper,
             stem=drawn.stem,
+            length=drawn.length,
             base_shifts=shifts,
         )

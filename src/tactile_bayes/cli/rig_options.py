@@ -169,8 +169,8 @@ class UnknownOptions:
         typer.Option(
             help="Unknown of the rig to be inferred, in place of rigidity_scale, drive_angle_offset, bias, lever, "
             "backlash and friction: one of these, standard (all of these), or drift, gain, moment_curve, "
-            "suspension_compliance, rest_curvature, taper, stem, base (positions of further pivots), or gauge (place "
-            "of the gauge, for calibrate-rig); may be repeated."
+            "suspension_compliance, rest_curvature, taper, stem, length, base (positions of further pivots), or gauge "
+            "(place of the gauge, for calibrate-rig); may be repeated."
         ),
     ] = None
     as_stated: Annotated[

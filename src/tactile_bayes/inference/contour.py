@@ -104,11 +104,12 @@ def infer_contour(
         to last sample; the bias is the zero in the middle), "gain" (likewise), "friction" (Coulomb's coefficient),
         "suspension_compliance" (turn of the pivot per holding moment), "rest_curvature" (mean curvature of the unloaded
         rod; how it varies along the rod stays as stated), "taper", "stem" (rigid piece between pivot and rod; beside
-        the lever it is refused if the base is only carried without turning). By default the first five and friction,
-        except those that are not identifiable (the lever without the moment, the backlash in a single direction) and a
-        given friction; "standard" stands for these, and an empty list takes all as stated. "base": shifts of the second
-        and further pivots of a record, as "base_2_x", "base_2_y", "base_3_x" and so on. The position of the first pivot
-        is not identifiable, since a common shift of pivots and object changes no reading: results are relative to it.
+        the lever it is refused if the base is only carried without turning), "length" (of the rod, which keeps its
+        proportions: rest curvature times length, and taper). By default the first five and friction, except those that
+        are not identifiable (the lever without the moment, the backlash in a single direction) and a given friction;
+        "standard" stands for these, and an empty list takes all as stated. "base": shifts of the second and further
+        pivots of a record, as "base_2_x", "base_2_y", "base_3_x" and so on. The position of the first pivot is not
+        identifiable, since a common shift of pivots and object changes no reading: results are relative to it.
         "discrepancy": a smooth deviation of the readings in contact from those of any contour and rig, as by
         hysteresis, stick-slip or a lean out of the plane (Kennedy and O'Hagan 2001, doi 10.1111/1467-9868.00294), with
         "discrepancy_scale" and "discrepancy_length"; see Notes. nuisances=["standard", "discrepancy"] infers it beside
@@ -178,7 +179,8 @@ def infer_contour(
     stated one with 0.05 L/EI and 0.02 (L/EI)², backlash normal with 0.2°, gains normal around 1 with 2 %, friction
     half-normal with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, rest_curvature normal
     around the stated mean with the rod's rest_curvature_deviation, or 0.05/L if it has none, taper normal around
-    the stated one with 0.05, stem normal around the stated one with 2 % of L, from 0 on, pivots normal with 1 % of L;
+    the stated one with 0.05, stem normal around the stated one with 2 % of L, from 0 on, length normal around the
+    stated one with 1 % of L, pivots normal with 1 % of L;
     discrepancy_scale log-normal around 0.005, standard deviation 1 of the logarithm, discrepancy_length log-normal
     around 0.3 rad, standard deviation 0.5 of the logarithm. In addition, contours out of reach are excluded, those that
     the rod would still cut after snap-off, and those that a rod curved toward the object would touch twice.

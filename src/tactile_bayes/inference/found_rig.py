@@ -13,10 +13,11 @@ import xarray as xr
 from tactile_bayes.inference.nuisances import CURVE
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of, with_rod
+from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of, to_si, with_rod
 
-__all__ = ["FoundRig", "contact_points", "found_rig", "rig_with"]
+__all__ = ["FoundRig", "contact_points", "found_rig", "rig_with", "rod_with"]
 
 _CHANNEL_NAMES = ("moment", "force_x", "force_y")
 
@@ -110,13 +111,20 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
             columns[name] = columns.get(name, measured[name]) + shift * at_pivot
     record = measured.assign({name: values.assign_attrs(measured[name].attrs) for name, values in columns.items()})
     rod = rod_of(measured)
-    shape = rig.get("rest_curvature", rod.mean_rest_curvature), rig.get("taper", rod.taper), rig.get("stem", rod.stem)
+    if "length" in rig:  # no record in lengths of its own rod any more
+        record = to_si(record, rod)
     return FoundRig(
-        with_rod(record, rod.reshaped(*shape)),
+        with_rod(record, rod_with(rod, rig)),
         cell,
         rig.get("friction", friction),
         rig.get("suspension_compliance", 0.0) * rig.get("rigidity_scale", 1.0),
     )
+
+
+def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
+    """Return a rod of the shape that nuisance parameters by name give it, others than those of shape without effect."""
+    curvature, taper = rig.get("rest_curvature", rod.mean_rest_curvature), rig.get("taper", rod.taper)
+    return rod.reshaped(curvature, taper, rig.get("stem"), rig.get("length"))
 
 
 def contact_points(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> xr.Dataset | None:

@@ -35,6 +35,7 @@ from tactile_bayes.record import (
     to_dimensionless,
     turned,
 )
+from tactile_bayes.sweep import ManyUnits
 
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.forward_table import Tables
@@ -57,6 +58,9 @@ _OFF = 1e-6
 
 _SCATTER = 10.0
 """Range of drive angles, over the noise of their readings, of a rod that is clamped at one."""
+
+_LENGTHS_OF_LINE = [0, 1, 3, 4]
+"""Columns of a line that are lengths, or changes of lengths."""
 
 _TURNS = np.array([[0.0, 0.0, -0.5 * np.pi, 0.0, 0.0, 1.0, -0.5 * np.pi, 1.5 * np.pi]])
 """Rotation as a line, with the drive angle as travel."""
@@ -99,6 +103,8 @@ class Rig(NamedTuple):
     """Taper of the rod in addition to the stated one."""
     stem: Any = 0.0
     """Rigid piece between pivot and rod in addition to the stated one [L]."""
+    length: Any = 1.0
+    """Length of the rod, which keeps its proportions (rest curvature times length, taper), over the stated one."""
     base_shifts: Any = None
     """Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
     after the last given one are not shifted."""
@@ -223,6 +229,13 @@ class RecordLikelihood:
         """Pivot [length], whether contact is on the side of a backward sweep, and sense of the drive, by segment."""
         return [(segment.base, segment.backward, segment.sense) for segment in self.segments]
 
+    def units(self, rig: Rig, index: Index) -> ManyUnits:
+        """Return the units of rods by their batch index, as in `paths`."""
+        length, rigidity = (np.tile(v, len(self.segments))[index] for v in (rig.length, rig.rigidity_scale))
+        moment = rigidity / length
+        rod = self.rod
+        return ManyUnits(rod.length_unit * length, rod.moment_unit * moment, rod.force_unit * moment / length)
+
     @property
     def is_carried(self) -> bool:
         """True if a drive carries the base in any sweep."""
@@ -261,11 +274,12 @@ class RecordLikelihood:
         if self._lines is not None:
             lines = np.repeat(self._lines[:, None], contours.shape[0], axis=1)
             lines[..., 2] -= (self._signs * self._misread(rig)).T[..., None]
+            lines[..., _LENGTHS_OF_LINE] /= rig.length[:, None, None]
             lines = lines.reshape(-1, *lines.shape[2:])
         return trace(
             self._in_sweep_frame(contours, rig),
             friction_angle=np.tile(np.arctan(rig.friction), segments),
-            suspension_compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, segments),
+            suspension_compliance=np.tile(self._compliance(rig), segments),
             profile=self._profile(rig),
             tolerance=None if exact else self._tolerance,
             drive_angles=drive_angles,
@@ -277,8 +291,9 @@ class RecordLikelihood:
         base_x, base_y = self._bases(rig).reshape(-1, 2).T
         backward = np.repeat(self._signs < 0.0, count)
         every = contours.take(np.tile(np.arange(count), segments))
+        length = np.tile(self.rod.length * rig.length, segments)
         of_rod = (np.tile(values, segments) for values in (*self._shape_of_rod(rig), self._stem(rig)))
-        return SweepFrame(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward, *of_rod)
+        return SweepFrame(every, base_x, base_y, length, 0.5 * self.rod.diameter, backward, *of_rod)
 
     def _profile(self, rig: Rig) -> Profile | None:
         """Return the profile of the rod, without what the rig adds to it; None for arcs."""
@@ -294,8 +309,12 @@ class RecordLikelihood:
         return known + rig.rest_curvature, self.rod.taper + rig.taper
 
     def _stem(self, rig: Rig) -> Floats:
-        """Return the stem of each contour [L]."""
-        return np.asarray(self.rod.stem / self.rod.length + rig.stem)
+        """Return the stem of each contour, in lengths of its rod."""
+        return np.asarray((self.rod.stem / self.rod.length + rig.stem) / rig.length)
+
+    def _compliance(self, rig: Rig) -> Floats:
+        """Return the compliance of the suspension of each contour, in rad per EI/L of its rod."""
+        return np.asarray(rig.suspension_compliance * rig.rigidity_scale / rig.length)
 
     def _known(self, rig: Rig) -> Tables:
         """Return tables for the rod, as far as the noise allows their errors."""
@@ -490,16 +509,17 @@ class RecordLikelihood:
             segment=np.repeat(np.arange(segments), count),
             base_x=bases[..., 0].ravel(),
             base_y=bases[..., 1].ravel(),
-            length=np.full(segments * count, self.rod.length),
+            length=np.tile(self.rod.length * rig.length, segments),
             standoff=np.full(segments * count, 0.5 * self.rod.diameter),
             backward=np.repeat(self._signs < 0.0, count),
             friction_angle=np.tile(np.arctan(rig.friction), segments),
-            compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, segments),
+            compliance=np.tile(self._compliance(rig), segments),
             rest_curvature=np.tile(curvature, segments),
             taper=np.tile(taper, segments),
             stem=np.tile(self._stem(rig), segments),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
             rigidity=np.tile(rig.rigidity_scale, segments),
+            relative_length=np.tile(rig.length, segments),
         )
 
     def _rig_of(self, rig: Rig | None, count: int) -> Rig:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from tactile_bayes.inference.discrepancy import is_discrepancy
+
 __all__ = ["CHECK_RIG", "GAUGE", "is_inferred", "what_to_try"]
 
 CHECK_RIG = (
@@ -15,7 +17,7 @@ CHECK_RIG = (
 GAUGE = "gauge"
 """Name of the family of a gauge, whose contour is known."""
 
-_OF_ROD = ("rest_curvature", "taper", "stem")
+_OF_ROD = ("rest_curvature", "taper", "stem", "length")
 _SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance", *_OF_ROD)
 """Nuisance parameters, or groups of them, that may cause a misfit."""
 
@@ -37,7 +39,8 @@ def is_inferred(suspect: str, nuisances: Collection[str]) -> bool:
     >>> is_inferred("gain", ["force_x_gain"]), is_inferred("lever", ["lever_x", "lever_y"]), is_inferred("drift", [])
     (True, True, False)
     """
-    return any(name == suspect or name.startswith(f"{suspect}_") or name.endswith(f"_{suspect}") for name in nuisances)
+    of_rig = [name for name in nuisances if not is_discrepancy(name)]
+    return any(name == suspect or name.startswith(f"{suspect}_") or name.endswith(f"_{suspect}") for name in of_rig)
 
 
 def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, friction: float = 0.0) -> str:
@@ -56,7 +59,7 @@ def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, f
     --------
     >>> print(what_to_try(["circle"], ["friction", "drift", "lever_x", "lever_y", "backlash"]))
     It may be the family or the rig. Try another family (--family shape-free, or compare), or infer more of the rig \
-(--nuisance gain, suspension_compliance, rest_curvature, taper, stem).
+(--nuisance gain, suspension_compliance, rest_curvature, taper, stem, length).
     """
     suspects = (*_SUSPECTS, GAUGE) if GAUGE in families else _SUSPECTS
     left = [name for name in suspects if not is_inferred(name, nuisances)]

@@ -51,10 +51,10 @@ BIAS = 0.1
 """Standard deviation of the prior of a bias, in EI/L and EI/L²."""
 
 _RIGIDITY, _OFFSET, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.02, 0.3, 0.05, 0.01
-_LEVER, _BACKLASH, _CURVATURE, _TAPER, _STEM = 0.005, np.radians(0.2), 0.05, 0.05, 0.02
+_LEVER, _BACKLASH, _CURVATURE, _TAPER, _STEM, _LENGTH = 0.005, np.radians(0.2), 0.05, 0.05, 0.02, 0.01
 _BENT = {"moment_curve_quadratic": 0.05, "moment_curve_cubic": 0.02}
 """Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; L; 1/L; of the
-diameter at the base; L; and of the curve of the moment, in powers of L/EI."""
+diameter at the base; L; L; and of the curve of the moment, in powers of L/EI."""
 
 
 _SAME_DIRECTION = 1e-3
@@ -86,6 +86,7 @@ _KINDS = {
     "rest_curvature": _Kind(-np.inf, np.inf, power_of_length=-1),
     "taper": _Kind(0.0, STEEPEST_TAPER),
     "stem": _Kind(0.0, np.inf, power_of_length=1),
+    "length": _Kind(0.0, np.inf, power_of_length=1),
     **{name: _Kind(-np.inf, np.inf, power_of_moment=1) for name in (*_GROUPS["bias"], *_GROUPS["drift"])},
     **{name: _Kind(0.0, np.inf) for name in _GROUPS["gain"]},
     **{name: _Kind(-np.inf, np.inf, power_of_length=1) for name in (*_GROUPS["lever"], *_GROUPS["gauge"])},
@@ -158,7 +159,7 @@ class Nuisances:
         """Return the SI unit of a parameter, like "N m"."""
         if name in (*_GROUPS["bias"], *_GROUPS["drift"]):
             return "N m" if name.startswith("moment") else "N"
-        if _BASE.fullmatch(name) or name in (*_GROUPS["lever"], *_GROUPS["gauge"], "stem"):
+        if _BASE.fullmatch(name) or name in (*_GROUPS["lever"], *_GROUPS["gauge"], "stem", "length"):
             return "m"
         if name in CURVE:
             return LOAD_CELL_UNITS[name]
@@ -176,6 +177,8 @@ class Nuisances:
             known["taper"] = values["taper"] - self.rod.taper
         if "stem" in self.names:
             known["stem"] = (values["stem"] - self.rod.stem) / self.units["stem"]
+        if "length" in self.names:
+            known["length"] = values["length"] / self.rod.length
         return Rig(
             base_shifts=self._base_shifts(values),
             **known,
@@ -348,6 +351,8 @@ def nuisances_of(
     if "taper" in defaults:
         ends = ((end - rod.taper) / _TAPER for end in nuisances.bounds("taper"))
         defaults["taper"] = stats.truncnorm(*ends, loc=rod.taper, scale=_TAPER)
+    if "length" in defaults:
+        defaults["length"] = stats.norm(rod.length, _LENGTH * rod.length)
     if "stem" in defaults:
         deviation = _STEM * rod.length
         defaults["stem"] = stats.truncnorm(-rod.stem / deviation, np.inf, loc=rod.stem, scale=deviation)

@@ -351,8 +351,8 @@ def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
 @compiled
 def with_friction(scene: Scene, angle: float) -> Scene:
     """Scene with friction that acts in the other sense."""
-    _, compliance, offset, sign, rigidity = scene.rig
-    rig = Rig(angle, compliance, offset, sign, rigidity)
+    _, compliance, offset, sign, moment_unit, force_unit = scene.rig
+    rig = Rig(angle, compliance, offset, sign, moment_unit, force_unit)
     return Scene(scene.outline, rubbed_otherwise(scene.beam), rig, scene.exact, scene.line)
 
 

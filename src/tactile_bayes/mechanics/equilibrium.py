@@ -89,8 +89,9 @@ class Rig(NamedTuple):
     """Encoder offset in the sweep frame [rad]."""
     sign: float
     """−1 in backward sweeps, else 1."""
-    rigidity: float
-    """Factor on loads: flexural rigidity over the rigidity in their unit."""
+    moment_unit: float
+    force_unit: float
+    """EI/L and EI/L² of the rod, in the units of loads."""
 
 
 class Scene(NamedTuple):

@@ -32,7 +32,8 @@ __all__ = [
 ]
 
 LINE_COLUMNS = 8
-"""Columns of a line in an array: its beginning (x, y, drive angle), its direction, and travel at beginning and end."""
+"""Columns of a line in an array: its beginning (x, y, drive angle), the change of these with the travel, and travel at
+beginning and end."""
 
 
 class Offset(NamedTuple):
@@ -48,10 +49,12 @@ class Line(NamedTuple):
 
     begin: Offset
     along: Offset
-    """Direction of the drive, of length one."""
+    """Change of the pose with the travel."""
+    onward: Offset
+    """Change of the travel with the pose."""
     across: Offset
     other: Offset
-    """Directions of length one across it and each other."""
+    """Directions across the line and each other."""
     travel: float
     """Travel at its beginning."""
     end: float
@@ -62,7 +65,7 @@ _STRAIGHT = 1e-9
 """Distance from a line that is rounding [L and rad]."""
 
 _ORIGIN = Offset(0.0, 0.0, 0.0)
-NO_LINE = Line(_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, 0.0, 0.0)
+NO_LINE = Line(_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, 0.0, 0.0)
 
 
 class LinePath(NamedTuple):
@@ -126,17 +129,19 @@ def _corners(points: Floats, off: float) -> Index:
 
 @compiled
 def line_of(lines: Floats, k: int) -> Line:
-    """Line in a row of an array."""
+    """Line in a row of an array, whose direction may have any length: the travel is in its unit."""
     row = lines[k]
     begin, along = Offset(row[0], row[1], row[2]), Offset(row[3], row[4], row[5])
     level = math.hypot(along.x, along.y)
+    square = level * level + along.angle * along.angle
+    onward = Offset(along.x / square, along.y / square, along.angle / square)
     across = Offset(-along.y / level, along.x / level, 0.0) if level > 0.0 else Offset(1.0, 0.0, 0.0)
     other = Offset(
         along.y * across.angle - along.angle * across.y,
         along.angle * across.x - along.x * across.angle,
         along.x * across.y - along.y * across.x,
     )
-    return Line(begin, along, across, other, row[6], row[7])
+    return Line(begin, along, onward, across, other, row[6], row[7])
 
 
 @compiled
@@ -155,7 +160,7 @@ def off_line(line: Line, x: float, y: float, angle: float) -> Offset:
     return Offset(
         _component(line.across, x, y, angle),
         _component(line.other, x, y, angle),
-        line.travel + _component(line.along, x, y, angle),
+        line.travel + _component(line.onward, x, y, angle),
     )
 
 
@@ -165,7 +170,7 @@ def components(line: Line, x: float, y: float, angle: float) -> Offset:
     return Offset(
         _component(line.across, x, y, angle),
         _component(line.other, x, y, angle),
-        _component(line.along, x, y, angle),
+        _component(line.onward, x, y, angle),
     )
 
 

@@ -229,6 +229,7 @@ def trace(
         stem=_each(sweep_frame.stem, count),
         offset=np.zeros(count),
         rigidity=np.ones(count),
+        relative_length=np.ones(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
     of_rod: dict[str, Any] = {"profile": profile, "tolerance": tolerance}

@@ -169,12 +169,12 @@ def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
     """Write the loads of the samples on a stretch, from the series."""
     count, rig, curves, workspace = samples.rows.size, part.scene.rig, part.curves, part.workspace
     _look_for(part, count)
-    sideward = rig.sign * rig.rigidity
+    moment, force_x = rig.sign * rig.moment_unit, rig.sign * rig.force_unit
     at_all(curves.series[:REST], workspace.twice, count, workspace.now, workspace.before, workspace.found)
     for j in range(count):
         row = samples.rows[j]
-        out[row, 0], out[row, 1] = sideward * workspace.found[0, j], sideward * workspace.found[1, j]
-        out[row, 2] = rig.rigidity * workspace.found[2, j]
+        out[row, 0], out[row, 1] = moment * workspace.found[0, j], force_x * workspace.found[1, j]
+        out[row, 2] = rig.force_unit * workspace.found[2, j]
 
 
 @compiled
@@ -203,8 +203,8 @@ def _note(row: int, p: float, q: float, tip: bool, scene: Scene, out: Found) -> 
     """Write phase and place of a state, and the loads of its row."""
     states, rig = out.states[row], scene.rig
     _write_place(p, q, tip, scene, states)
-    for c in range(3):
-        out.loads[row, c] = rig.rigidity * (1.0 if c == 2 else rig.sign) * states[6 + c]
+    out.loads[row, 0] = rig.moment_unit * rig.sign * states[6]
+    out.loads[row, 1], out.loads[row, 2] = rig.force_unit * rig.sign * states[7], rig.force_unit * states[8]
 
 
 @compiled

@@ -321,11 +321,29 @@ class Rod:
             words.append(f"rigidity at the tip {float(self.rigidity_profile(self.length)):.4g} of that at the base")
         return words
 
-    def reshaped(self, mean_rest_curvature: float, taper: float, stem: float | None = None) -> Rod:
-        """Return a rod of another mean rest curvature [1/m], taper and, if given, stem [m]."""
-        more, curvature = mean_rest_curvature - self.mean_rest_curvature, self.rest_curvature
+    def reshaped(
+        self, mean_rest_curvature: float, taper: float, stem: float | None = None, length: float | None = None
+    ) -> Rod:
+        """Return a rod of another mean rest curvature [1/m], taper and, if given, stem [m] and length [m].
+
+        The rod of another length keeps the proportions of that of this length: rest curvature times length, taper, and
+        rigidity along it.
+        """
+        more = mean_rest_curvature - self.mean_rest_curvature
+        curvature, rigidity = self.rest_curvature, self.rigidity_profile
         curvature = curvature.plus(more) if isinstance(curvature, Along) else mean_rest_curvature
-        return replace(self, rest_curvature=curvature, taper=taper, stem=self.stem if stem is None else stem)
+        longer = 1.0 if length is None else length / self.length
+        return replace(
+            self,
+            length=longer * self.length,
+            rest_curvature=curvature.scaled(longer, 1.0 / longer)
+            if isinstance(curvature, Along)
+            else curvature / longer,
+            taper=taper,
+            rigidity_profile=rigidity.scaled(longer, 1.0) if isinstance(rigidity, Along) else rigidity,
+            rest_curvature_deviation=self.rest_curvature_deviation / longer,
+            stem=self.stem if stem is None else stem,
+        )
 
     @property
     def is_uniform(self) -> bool:

@@ -89,7 +89,9 @@ class Sweeps(NamedTuple):
     offset: Floats
     """Encoder offset in the laboratory frame [rad]."""
     rigidity: Floats
-    """Flexural rigidity over the rigidity in the unit of loads."""
+    """Flexural rigidity over the rigidity in the units of loads."""
+    relative_length: Floats
+    """Length of the rod over the length in the units of loads and drives."""
 
 
 class Segments(NamedTuple):
@@ -198,7 +200,8 @@ def _scene(
     """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
     sign = -1.0 if sweep.backward else 1.0
     offset = sign * sweep.offset if line is None else 0.0  # it is in the lines
-    rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, sweep.rigidity)
+    moment = sweep.rigidity / sweep.relative_length
+    rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, moment, moment / sweep.relative_length)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
     return Scene(outline, beam, rig, exact, line)
@@ -206,12 +209,12 @@ def _scene(
 
 @compiled
 def _place_lines(lines: Floats | None, sweep: Any, room: Floats | None) -> None:
-    """Write the lines of a sweep with its encoder offset to the room."""
+    """Write the lines of a sweep with its encoder offset, and in lengths of its rod, to the room."""
     if room is not None and lines is not None:
         offset = -sweep.offset if sweep.backward else sweep.offset
         for k in range(room.shape[0]):
             for c in range(room.shape[1]):
-                room[k, c] = lines[sweep.segment, k, c]
+                room[k, c] = lines[sweep.segment, k, c] / (sweep.relative_length if c in (0, 1, 3, 4) else 1.0)
             room[k, 2] -= offset
 
 

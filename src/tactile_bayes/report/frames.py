@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
+from tactile_bayes.inference.found_rig import rod_with
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, record_of
@@ -20,7 +21,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.record import rod_of
-from tactile_bayes.sweep import ManyUnits, to_lab_frame
+from tactile_bayes.sweep import to_lab_frame
 
 __all__ = ["Motion", "motion_of"]
 
@@ -117,15 +118,13 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     angle = (read - likelihood.misread(rig)[0])[samples]
     angle_in_sweep_frame = np.where(mirrored, np.pi - angle, angle)
     states = paths.states(batch_index, likelihood.travels(read, rig)[0, samples])
-    rod, stiffer = rod_of(record), float(np.ravel(rig.rigidity_scale)[0])
-    units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
-    in_lab_frame = to_lab_frame(paths.sweep_frame, batch_index, states, units)
+    rod = rod_with(rod_of(record), {name: float(draw[name]) for name in nuisances.names})
+    in_lab_frame = to_lab_frame(paths.sweep_frame, batch_index, states, likelihood.units(rig, batch_index))
     loaded = states.wrench.phase != NONE
     slope = np.where(loaded, states.wrench.drive_angle, angle_in_sweep_frame)
     wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))
     sign = np.where(mirrored, -1.0, 1.0)
-    rods = rod.mirrored(sign)._replace(stem=rod.stem / rod.length + float(np.ravel(rig.stem)[0]))
-    x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rods)
+    x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rod.mirrored(sign))
     loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
     base_x, base_y = (record[name].values[samples] for name in ("base_x", "base_y"))
     of_sample = likelihood.segment_of_sample

@@ -40,6 +40,7 @@ _MEANINGS = {
     "friction": "Coulomb's coefficient",
     "rest_curvature": "mean curvature of the unloaded rod",
     "stem": "length of the rigid piece between pivot and rod",
+    "length": "length of the rod",
     "taper": "part of its diameter that the rod loses toward its tip",
     "suspension_compliance": "rotation of the pivot per holding moment",
     "gap width": "width of the arc that no sweep touches",
