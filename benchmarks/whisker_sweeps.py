@@ -48,6 +48,8 @@ AT_POINTS, ON_SWEEPS = 0.0025, 0.01
 COUNTS = 5e6
 """Roughly, counts to N m; the calibration finds them."""
 
+SENSOR = tb.LoadCell(moment_noise=3.0, gain=((COUNTS, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
 RINGS = range(3, 9)
 """Distances of the probe from the clamp: closer points do not fit any rod, and the outermost is at the tip."""
 
@@ -142,7 +144,7 @@ def _table(name: str) -> Floats:
     return np.genfromtxt(MEASURED / name, delimiter=",", names=NAMES, skip_header=1)
 
 
-def calibrated(folder: Path, rod: tb.Rod, cell: tb.LoadCell) -> xr.DataTree:
+def calibrated(folder: Path, rod: tb.Rod) -> xr.DataTree:
     """Return the rig, from the probe, whose place is uncertain by some millimetres."""
     path = folder / "rig.nc"
     if not path.exists():
@@ -161,10 +163,28 @@ def calibrated(folder: Path, rod: tb.Rod, cell: tb.LoadCell) -> xr.DataTree:
             priors["stem"] = stats.truncnorm(-STEM[0] / STEM[1], np.inf, *STEM)
             known |= {"nuisances": (*known["nuisances"], "discrepancy"), "checkpoint": folder / "rig", "settings": LONG}
         probe = tb.contours.Circle(r=1e-5, q=-1e-5)
-        rig = tb.infer_rig(points(rod), contour=probe, load_cell=cell, priors=priors, **known)
+        rig = tb.infer_rig(points(rod), contour=probe, load_cell=SENSOR, priors=priors, **known)
         if not rig.attrs["converged"]:
             raise SystemExit(f"rig: {rig.attrs['message']}; the same command goes on")
         tb.write_result(rig, path)
+    return tb.read_result(path)
+
+
+def measured(folder: Path, name: str, rod: tb.Rod, rig: xr.DataTree) -> xr.DataTree:
+    """Return the posterior of the cylinder of a sweep, or of all sweeps of a session."""
+    path = folder / f"{name.replace('/', '-')}.nc"
+    if not path.exists():
+        found = tb.infer_contour(
+            record_of(name, rod),
+            family="circle",
+            load_cell=SENSOR,
+            nuisances=("moment_bias", "friction", "discrepancy"),
+            priors={"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(ON_SWEEPS, rod)},
+            rig=rig,
+            seed=1,
+            settings=ENOUGH,
+        )
+        tb.write_result(found, path)
     return tb.read_result(path)
 
 
@@ -173,29 +193,13 @@ def main() -> None:
     folder, names = Path(arguments[0]), arguments[1:] or SWEEPS
     folder.mkdir(parents=True, exist_ok=True)
     rod, began = whisker(on_stem="--stem" in sys.argv), perf_counter()
-    cell = tb.LoadCell(moment_noise=3.0, gain=((COUNTS, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
-    rig = calibrated(folder, rod, cell)
+    rig = calibrated(folder, rod)
     print(f"rig: {rig.attrs['message']} ({perf_counter() - began:.0f} s)")
     for name, draws in rig["posterior"].mean().items():
         print(f"  {name:24s} {float(draws):12.5g} ± {float(rig['posterior'][name].std()):.2g}")
-    unknown = ("moment_bias", "friction", "discrepancy")
-    priors = {"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(ON_SWEEPS, rod)}
     for name in names:
-        path, began = folder / f"{name.replace('/', '-')}.nc", perf_counter()
-        if not path.exists():
-            record = record_of(name, rod)
-            found = tb.infer_contour(
-                record,
-                family="circle",
-                load_cell=cell,
-                nuisances=unknown,
-                priors=priors,
-                rig=rig,
-                seed=1,
-                settings=ENOUGH,
-            )
-            tb.write_result(found, path)
-        found = tb.read_result(path)
+        began = perf_counter()
+        found = measured(folder, name, rod, rig)
         r, friction = (found["posterior"][one].values.ravel() for one in ("r", "friction"))
         predicted = found["posterior_predictive"].holding_moment.mean(("chain", "draw"))
         off = found["observed_data"].holding_moment - predicted

@@ -8,7 +8,6 @@ from scipy.optimize import least_squares
 from tactile_bayes.contours import Circle
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.gauge import Gauge
-from tactile_bayes.load_cell import LoadCell
 
 RIG = {
     "moment_gain": 0.928,
@@ -37,12 +36,9 @@ ON_STEM = {
 }
 """The likeliest rig with a stem before the whisker, with the benchmark's priors and white noise of 7 counts."""
 
-COUNTS = ((whisker_sweeps.COUNTS, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
 
 def model_of(record, nuisances, **contour):
-    cell = LoadCell(moment_noise=3.0, gain=COUNTS)
-    model = Experiment(record, load_cell=cell, nuisances=list(nuisances), **contour).model
+    model = Experiment(record, load_cell=whisker_sweeps.SENSOR, nuisances=list(nuisances), **contour).model
     model.likelihood.exact = True  # a table would pay from a thousand evaluations on
     return model
 

@@ -13,12 +13,12 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.stored_experiment import points_of
 from tactile_bayes.uncertainty.band import contour_heights
 
-__all__ = ["COMPONENTS", "SENSITIVE", "prior_sensitivity", "what_sets"]
+__all__ = ["prior_sensitivity"]
 
-COMPONENTS = ("contour", "rig", "likelihood")
+_COMPONENTS = ("contour", "rig", "likelihood")
 """Components that are scaled: the prior of the contour, that of rig and noise, and the likelihood."""
 
-SENSITIVE = 0.05
+_SENSITIVE = 0.05
 """Sensitivity from which a component matters (Kallioinen et al. 2024)."""
 
 _POWERS = (0.99, 1.01)
@@ -43,8 +43,8 @@ def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapp
     -------
     xr.Dataset
         Over "quantity" (parameters, and a band for each region, as "band in_gap") and "component" (the prior of the
-        contour, that of rig and noise, the likelihood): sensitivity. Over "quantity": set_by, "record", "both" or
-        "prior", see `what_sets`.
+        contour, that of rig and noise, the likelihood): sensitivity. Over "quantity": set_by, "record" where those to
+        the priors are below 0.05, else "both", or "prior" where one of them is the largest.
 
     Notes
     -----
@@ -67,30 +67,30 @@ def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapp
     rows = {name: points[..., i][None] for i, name in enumerate(model.names)}
     rows |= {f"band {name}": values for name, values in heights.items()}
     kept = np.flatnonzero((every > np.median(every) - _LOST).all(axis=0))
-    found = np.zeros((len(rows), len(COMPONENTS)))
-    for k, name in enumerate(COMPONENTS):
+    found = np.zeros((len(rows), len(_COMPONENTS)))
+    for k, name in enumerate(_COMPONENTS):
         weights = [_weights(parts[name][:, kept], power) for power in _POWERS]
         for row, values in zip(found, rows.values(), strict=True):
             row[k] = max(_sensitivity(each[:, kept], weights) for each in values)
     return xr.Dataset(
         {
             "sensitivity": (("quantity", "component"), found, {"units": "1"}),
-            "set_by": ("quantity", [what_sets(*row) for row in found]),
+            "set_by": ("quantity", [_what_sets(*row) for row in found]),
         },
-        coords={"quantity": list(rows), "component": list(COMPONENTS)},
+        coords={"quantity": list(rows), "component": list(_COMPONENTS)},
     )
 
 
-def what_sets(contour: float, rig: float, likelihood: float) -> str:
+def _what_sets(contour: float, rig: float, likelihood: float) -> str:
     """Return "record", "both" or "prior", whichever sets a quantity, from the sensitivities to the three components.
 
     Examples
     --------
-    >>> what_sets(0.01, 0.02, 0.2), what_sets(0.01, 0.06, 0.2), what_sets(0.1, 0.0, 0.06)
+    >>> _what_sets(0.01, 0.02, 0.2), _what_sets(0.01, 0.06, 0.2), _what_sets(0.1, 0.0, 0.06)
     ('record', 'both', 'prior')
     """
     prior = max(contour, rig)
-    if prior < SENSITIVE:
+    if prior < _SENSITIVE:
         return "record"
     return "both" if likelihood > prior else "prior"
 

@@ -10,10 +10,10 @@ import xarray as xr
 
 from tactile_bayes.assessment.sampling_error import WANTED_SHARE
 
-__all__ = ["HOLDS", "NOT", "PRIOR", "conclusion", "sentences"]
+__all__ = ["NOT", "conclusion", "sentences"]
 
-HOLDS = "holds"
-PRIOR = "holds, but the prior sets the gap"
+_HOLDS = "holds"
+_PRIOR = "holds, but the prior sets the gap"
 NOT = "do not rely on it"
 
 _LARGEST = 2.0
@@ -61,11 +61,11 @@ def conclusion(
     if reasons:
         return NOT, f"Do not rely on the band, because {'; '.join(reasons)}."
     if "band in_gap" in found.quantity and str(found.set_by.sel(quantity="band in_gap").values) == "prior":
-        return PRIOR, (
+        return _PRIOR, (
             f"The band of probability {share} holds beside the gap, as far as this record shows, but in the gap it is "
             "set by the prior: it is as right as the prior is there."
         )
-    return HOLDS, f"The band of probability {share} holds, as far as this record shows."
+    return _HOLDS, f"The band of probability {share} holds, as far as this record shows."
 
 
 def _worst_part(parts: xr.Dataset) -> str:

@@ -27,7 +27,6 @@ __all__ = [
     "ContourOptimum",
     "certainly_loaded",
     "contact_fit",
-    "fitted_discrepancy",
     "fitted_noise",
     "optima_of",
     "optimum_of",
@@ -275,7 +274,7 @@ class _Search:
         point = self.points(found.point[None])[0]
         residuals = found.residuals[: self.measured.size].reshape(self.measured.shape)
         drawn = self.candidates[:, len(model.names) - len(model.noise.of_discrepancy) :]
-        noise = np.append(fitted_noise(model, residuals), fitted_discrepancy(model, point, residuals, drawn))
+        noise = np.append(fitted_noise(model, residuals), _fitted_discrepancy(model, point, residuals, drawn))
         if not np.isfinite(model.log_prior(np.append(point, noise)[None]))[0]:
             possible = self.candidates[:, size:]
             noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
@@ -328,7 +327,7 @@ def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
     return np.array([np.median([ratio[c] for c in channels if c in ratio]) for channels in model.noise.channels])
 
 
-def fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, drawn: Floats) -> Floats:
+def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, drawn: Floats) -> Floats:
     """Return parameters of the discrepancy, if it is inferred, that fit residuals as in `fitted_noise`.
 
     They are the root mean square of the residuals in contact over the largest load, within the range of prior draws,

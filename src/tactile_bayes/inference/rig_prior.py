@@ -17,7 +17,7 @@ from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import posterior_draws
 
-__all__ = ["RigPrior", "lasting", "refuse_other_rig", "rig_prior"]
+__all__ = ["RigPrior", "refuse_other_rig", "rig_prior"]
 
 _PASSING = ("bias", "drift", "friction", "base", "gauge")
 """Parameters, by parts of their names, that belong to one record (zeros, pivots and gauge) or to rod and object
@@ -109,12 +109,12 @@ class RigPrior:
         return np.stack(columns, axis=1)
 
 
-def lasting(nuisances: Collection[str]) -> tuple[str, ...]:
+def _lasting(nuisances: Collection[str]) -> tuple[str, ...]:
     """Return the names of the parameters that a rig keeps from one record to the next.
 
     Examples
     --------
-    >>> lasting(["rigidity_scale", "moment_bias", "lever_x", "base_2_x", "friction"])
+    >>> _lasting(["rigidity_scale", "moment_bias", "lever_x", "base_2_x", "friction"])
     ('rigidity_scale', 'lever_x')
     """
     return tuple(name for name in nuisances if not any(part in _PASSING for part in name.split("_")))
@@ -133,7 +133,7 @@ def rig_prior(rig: xr.DataTree) -> RigPrior:
     if not rig.attrs.get("converged"):
         raise InferenceError(f"the posterior of the rig has not converged ({rig.attrs.get('message')}): infer it again")
     draws = posterior_draws(rig)
-    names = lasting(json.loads(rig.attrs["nuisances"]))
+    names = _lasting(json.loads(rig.attrs["nuisances"]))
     names = tuple(name for name in names if name in draws and "discrepancy" not in name)
     if not names:
         raise InferenceError("no parameter of the rig lasts beyond its record: infer it with nuisances=['standard']")

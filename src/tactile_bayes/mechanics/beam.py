@@ -54,7 +54,6 @@ __all__ = [
     "varied",
     "varied_of",
     "whole_pose",
-    "with_profile",
     "with_sign",
     "with_stem",
 ]
@@ -161,11 +160,11 @@ def _mirrored(varied: Varied | None) -> Varied | None:
 def with_sign(varied: Varied, sign: float) -> Varied:
     """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
     edges, curvature, rigidity, taper, bend, _ = varied.profile
-    return with_profile(varied, Profile(edges, curvature, rigidity, taper, bend, sign))
+    return _with_profile(varied, Profile(edges, curvature, rigidity, taper, bend, sign))
 
 
 @compiled
-def with_profile(varied: Varied, profile: Profile) -> Varied:
+def _with_profile(varied: Varied, profile: Profile) -> Varied:
     """Rod with another profile."""
     _, work, own, slenderness, sign, other, other_slenderness = varied
     return Varied(profile, work, own, slenderness, sign, other, other_slenderness)

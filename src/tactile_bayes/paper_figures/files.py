@@ -16,9 +16,9 @@ from tactile_bayes.tasks import write_atomically
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FORMATS", "draw_all"]
+__all__ = ["draw_all"]
 
-FORMATS = ("pdf", "svg", "png")
+_FORMATS = ("pdf", "svg", "png")
 
 
 def draw_all(
@@ -71,9 +71,9 @@ def draw_all(
     """
     numbers = list(dict.fromkeys(NUMBERS if only is None else only))
     wanted = list(dict.fromkeys(formats))
-    absent = [name for name in wanted if name not in FORMATS]
+    absent = [name for name in wanted if name not in _FORMATS]
     if absent or not wanted:
-        raise ParameterError(f"formats are {list(formats)!r}: choose from {', '.join(FORMATS)}")
+        raise ParameterError(f"formats are {list(formats)!r}: choose from {', '.join(_FORMATS)}")
     captions = {number: caption(number, **options) for number in numbers}  # refuses before anything is written
     drive = options.get("drive")
     kind = "" if drive is None else f"_{type(drive).__name__.lower()}"

@@ -45,10 +45,10 @@ from tactile_bayes.planning.knowledge import (
 from tactile_bayes.sweep import Drive, Rotation, drives_of
 from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
 
-__all__ = ["CRITERIA", "design"]
+__all__ = ["design"]
 
 Criterion = Literal["band", "gap", "information"]
-CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")
+_CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy")
 
@@ -178,7 +178,7 @@ def design(
     >>> bool(found.width[1] > found.width[0])  # farther away
     True
     """
-    check_choice("criterion", criterion, CRITERIA)
+    check_choice("criterion", criterion, _CRITERIA)
     check_whole_number("draws", draws, 2)
     check_seed(seed)
     check_probability("probability", probability)

@@ -25,7 +25,7 @@ from tactile_bayes.reconstruction.estimate import (
 )
 from tactile_bayes.reconstruction.samples import Samples
 
-__all__ = ["are_weighed", "constrained_estimate", "principal_steps", "refuse_without_noise"]
+__all__ = ["are_weighed", "constrained_estimate", "principal_steps"]
 
 _CLEARANCE = 2.0
 """Standard deviations from the edge between the phases below which the phase of a contact is uncertain."""
@@ -45,7 +45,7 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     ParameterError
         If a channel has no noise, or noise without a variance.
     """
-    refuse_without_noise(samples)
+    _refuse_without_noise(samples)
     count = delta.size
     place, covariance = np.full((count, 4), np.nan), np.full((count, 4, 4), np.nan)
     misfit, distance = np.full(count, np.nan), np.full(count, np.nan)
@@ -84,7 +84,7 @@ def are_weighed(samples: Samples) -> bool:
     return bool(np.all(np.isfinite(covariance)) and np.all(np.diagonal(covariance, axis1=1, axis2=2) > 0.0))
 
 
-def refuse_without_noise(samples: Samples) -> None:
+def _refuse_without_noise(samples: Samples) -> None:
     """Refuse a load cell without a finite variance of every channel."""
     if not np.all(np.isfinite(samples.reading.covariance)):
         raise ParameterError(

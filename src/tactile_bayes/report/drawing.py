@@ -14,9 +14,9 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.plotting.labels import number
 from tactile_bayes.report.wording import Shown
 
-__all__ = ["WIDTH", "Plot", "Scale", "dots", "element", "figure", "legend", "outline_path"]
+__all__ = ["Plot", "Scale", "dots", "element", "figure", "legend"]
 
-WIDTH = 640
+_WIDTH = 640
 """Width of every drawing, in its own units, in which letters are 13 high."""
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 96, 24, 12, 46
@@ -50,7 +50,7 @@ def figure(identity: str, title: str, description: str, height: float, *content:
         element("desc", description, id=f"{identity}-desc"),
         *content,
         id=identity,
-        viewBox=f"0 0 {WIDTH} {height:g}",
+        viewBox=f"0 0 {_WIDTH} {height:g}",
         role="img",
         aria_labelledby=f"{identity}-title",
         aria_describedby=f"{identity}-desc",
@@ -117,14 +117,14 @@ class Plot:
         cls, x: ArrayLike, y: ArrayLike, labels: tuple[str, str], height: float, powers: tuple[int, int] = (0, 0)
     ) -> Plot:
         """Return a plot of the full width and a given height that holds all points."""
-        across = scale_of(x, _LEFT, WIDTH - _RIGHT, room=0.02)
+        across = scale_of(x, _LEFT, _WIDTH - _RIGHT, room=0.02)
         up = scale_of(y, height - _BOTTOM, _TOP, room=0.06)
         return cls(across, up, *labels, *powers)
 
     @classmethod
     def map_of(cls, x: ArrayLike, y: ArrayLike, unit: Shown) -> tuple[Plot, float]:
         """Return a plot with equal scales, in a unit of length, that holds all points, and its height."""
-        across = scale_of(x, _LEFT, WIDTH - _RIGHT, room=0.03)
+        across = scale_of(x, _LEFT, _WIDTH - _RIGHT, room=0.03)
         per_unit = (across.end - across.start) / (across.high - across.low)
         up = scale_of(y, 0.0, 1.0, room=0.05)
         wanted = (up.high - up.low) * per_unit
@@ -149,7 +149,7 @@ class Plot:
 
     def path(self, x: ArrayLike, y: ArrayLike, class_: str) -> None:
         """Put a line through points, interrupted at points that are not finite."""
-        self.put(element("path", d=outline_path(self.x(x), self.y(y)), class_=class_))
+        self.put(element("path", d=_outline_path(self.x(x), self.y(y)), class_=class_))
 
     def area(self, x: ArrayLike, lower: ArrayLike, upper: ArrayLike, class_: str) -> None:
         """Fill the area between two edges, in a piece for each run of points at which both are finite."""
@@ -157,7 +157,7 @@ class Plot:
         known = np.isfinite(across) & np.isfinite(low) & np.isfinite(high)
         pieces = np.split(np.arange(known.size), np.flatnonzero(np.diff(known)) + 1)
         outlines = [
-            outline_path(np.r_[across[run], across[run][::-1]], np.r_[low[run], high[run][::-1]]) + "Z"
+            _outline_path(np.r_[across[run], across[run][::-1]], np.r_[low[run], high[run][::-1]]) + "Z"
             for run in pieces
             if run.size and known[run[0]]
         ]
@@ -190,7 +190,7 @@ class Plot:
         return *parts, element("rect", **frame, class_="frame")
 
 
-def outline_path(x: Floats, y: Floats) -> str:
+def _outline_path(x: Floats, y: Floats) -> str:
     """Return points in a drawing as path data, interrupted at points that are not finite."""
     out, pen = [], "M"
     for across, down in zip(np.round(x, 1), np.round(y, 1), strict=True):

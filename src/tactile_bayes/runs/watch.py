@@ -25,9 +25,9 @@ from tactile_bayes.tasks import alone_in
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.summary import reach, summary
 
-__all__ = ["STATE", "Watch", "WatchUpdate", "open_watch"]
+__all__ = ["Watch", "WatchUpdate", "open_watch"]
 
-STATE = "stream.nc"
+_STATE = "stream.nc"
 """File of the stream in a folder, from which a watch goes on."""
 
 _POINTS = 201
@@ -161,7 +161,7 @@ class Watch:
     @property
     def state(self) -> Path:
         """File of the stream."""
-        return self.folder.path / STATE
+        return self.folder.path / _STATE
 
     @property
     def samples(self) -> int:

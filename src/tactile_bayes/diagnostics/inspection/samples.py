@@ -11,7 +11,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.diagnostics.inspection.stretches import centred
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, robust_deviation
 
-__all__ = ["outliers", "repeat_chance", "repeated", "runs_of_equals", "stuck", "uneven_steps"]
+__all__ = ["outliers", "repeat_chance", "repeated", "stuck", "uneven_steps"]
 
 _FEWEST = 8
 """Number of unloaded samples below which their scatter does not identify outliers."""
@@ -86,7 +86,7 @@ def repeat_chance(reading: Floats, stretches: list[Index], step: float, noise: f
     return max(by_steps, found)
 
 
-def runs_of_equals(reading: Floats, rows: Index) -> list[Index]:
+def _runs_of_equals(reading: Floats, rows: Index) -> list[Index]:
     """Return runs of two and more equal consecutive readings of a sweep, as rows of readings, shape (n_samples,)."""
     parts = np.split(rows, np.flatnonzero(np.diff(reading[rows]) != 0.0) + 1)
     return [part for part in parts if part.size > 1]
@@ -96,7 +96,7 @@ def stuck(reading: Floats, sweeps: list[Index], chance: float, *, false_alarm: f
     """Flag readings, shape (n_samples,), that stay equal for longer than the limited resolution explains."""
     flags = np.zeros(reading.size, dtype=bool)
     for rows in sweeps:
-        for run in runs_of_equals(reading, rows):
+        for run in _runs_of_equals(reading, rows):
             if run.size >= _SHORTEST and reading.size * chance ** (run.size - 1) < false_alarm:
                 flags[run] = True
     return flags

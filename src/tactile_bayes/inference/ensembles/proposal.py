@@ -17,7 +17,7 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["ANYTHING", "GOOD", "Ends", "Mixture", "Proposal", "Random", "approximate", "effective", "flattened"]
+__all__ = ["ANYTHING", "Ends", "Mixture", "Proposal", "Random", "approximate", "effective", "flattened"]
 
 _DEGREES_OF_FREEDOM = 10.0
 """Degrees of freedom of the t distribution: its tails are heavier than normal tails, at little cost."""
@@ -31,7 +31,7 @@ _ROUNDS = 8
 _DRAWS = 60
 """Number of draws per parameter in each round."""
 
-GOOD = 0.6
+_GOOD = 0.6
 """Efficiency from which no further round is made."""
 
 _MAX_REDRAWS = 40
@@ -256,7 +256,7 @@ def approximate(
                 within = ends.hold(proposal.draw_unbounded(rng, _MASS_DRAWS)).mean()
                 log_mass += float(np.log(max(within, 1.0 / _MASS_DRAWS)))
             best = replace(proposal, efficiency=efficiency, log_mass=log_mass)
-        if best.efficiency >= GOOD:
+        if best.efficiency >= _GOOD:
             break
         try:
             proposal = Proposal.fitted(points, flattened(surplus, _MIN_EFFECTIVE * centre.size), ends)
