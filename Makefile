@@ -36,7 +36,7 @@ test-lowest: $(READY)
 	NUMBA_CACHE_DIR=.venv-lowest/numba .venv-lowest/bin/python -m pytest -n auto -o filterwarnings=default
 
 test-slow: notebooks
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -m slow --doctest-modules src tests
 
 bench: $(READY)
 	$(BIN)/python -m benchmarks

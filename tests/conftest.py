@@ -24,6 +24,20 @@ def pytest_configure(config):
         settings.load_profile("few")
 
 
+SAMPLING = ("infer_contour(", "infer_rig(", "infer_point_load(", "calibrate(", "compare_families(", "Stream(")
+"""Calls that take a second or more."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Examples of docstrings that sample a posterior are slow, but for that of `infer_contour` itself."""
+    for item in items:
+        if isinstance(item, pytest.DoctestItem) and not item.name.endswith("inference.contour.infer_contour"):
+            source = "".join(example.source for example in item.dtest.examples)
+            if any(call in source for call in SAMPLING):
+                item.add_marker("slow")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def interruptible():
     """Processes that tests start hear interrupts, also where the tests run in the background and ignore them."""

@@ -13,6 +13,7 @@ from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import Rig
+from tactile_bayes.inference.nuisances import BIASES, DRIFTS
 from tactile_bayes.inference.priors import Prior, check_priors
 from tactile_bayes.load_cell import LoadCell
 
@@ -46,6 +47,8 @@ _ENDS, _KNOTS = 1.5, 121
 @dataclass(frozen=True)
 class Misspecification:
     """Differences between the simulated rig and what inference assumes, by default none.
+
+    The truth of an inferred parameter of the rig is what the simulated rig has.
 
     Parameters
     ----------
@@ -141,6 +144,27 @@ class Misspecification:
         x, y = (np.ravel(np.asarray(value, dtype=float))[0] for value in drawn.point(0.0))
         flatter = np.log(radius) + np.log(factor) * np.exp(-0.5 * ((slopes - at) / _SPOT) ** 2)
         return ShapeFree(slopes, flatter[None], x=x, y=y, at=0.0)
+
+    def truth(self, drawn: Mapping[str, float], curvature_unit: float) -> dict[str, float]:
+        """Return the true values of inferred parameters from drawn ones, by name, in the record's units.
+
+        What inference can find, like friction that it infers, it ought to find.
+        """
+        more = {
+            "friction": self.friction,
+            "drive_angle_offset": self.drive_angle_offset,
+            "rest_curvature": self.rest_curvature * curvature_unit,
+            "taper": self.taper,
+            **dict(zip(BIASES, self.bias, strict=True)),
+            **dict(zip(DRIFTS, self.drift, strict=True)),
+        }
+        found = {name: value + more.get(name, 0.0) for name, value in drawn.items()}
+        if "rigidity_scale" in found:
+            found["rigidity_scale"] *= self.rigidity_scale
+        for name in found:
+            if name.startswith("base_"):
+                found[name] += self.further_base_shift["xy".index(name[-1])]
+        return found
 
     def rig(self, drawn: Rig, pivots: int) -> Rig:
         """Return the misspecified rig of one contour from the drawn one."""

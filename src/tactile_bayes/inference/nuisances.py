@@ -45,7 +45,7 @@ _GROUPS["lever"] = ("lever_x", "lever_y")
 _GROUPS["moment_curve"] = ("moment_curve_quadratic", "moment_curve_cubic")
 _GROUPS["gauge"] = ("gauge_x", "gauge_y")
 
-BIASES, CURVE = _GROUPS["bias"], _GROUPS["moment_curve"]
+BIASES, DRIFTS, CURVE = _GROUPS["bias"], _GROUPS["drift"], _GROUPS["moment_curve"]
 
 BIAS = 0.1
 """Standard deviation of the prior of a bias, in EI/L and EI/L²."""
