@@ -10,8 +10,8 @@ NOTEBOOKS = sorted(
 )
 
 
-def test_there_are_eleven_in_order():
-    assert [int(path.name.split("_")[0]) for path in NOTEBOOKS] == list(range(1, 12))
+def test_there_are_twelve_in_order():
+    assert [int(path.name.split("_")[0]) for path in NOTEBOOKS] == list(range(1, 13))
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -35,7 +35,6 @@ from tactile_bayes.record import (
     to_dimensionless,
     turned,
 )
-from tactile_bayes.sweep import ManyUnits
 
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.forward_table import Tables
@@ -228,13 +227,6 @@ class RecordLikelihood:
     def contacts(self) -> list[tuple[tuple[float, float], bool, float]]:
         """Pivot [length], whether contact is on the side of a backward sweep, and sense of the drive, by segment."""
         return [(segment.base, segment.backward, segment.sense) for segment in self.segments]
-
-    def units(self, rig: Rig, index: Index) -> ManyUnits:
-        """Return the units of rods by their batch index, as in `paths`."""
-        length, rigidity = (np.tile(v, len(self.segments))[index] for v in (rig.length, rig.rigidity_scale))
-        moment = rigidity / length
-        rod = self.rod
-        return ManyUnits(rod.length_unit * length, rod.moment_unit * moment, rod.force_unit * moment / length)
 
     @property
     def is_carried(self) -> bool:

@@ -21,7 +21,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.record import rod_of
-from tactile_bayes.sweep import to_lab_frame
+from tactile_bayes.sweep import ManyUnits, to_lab_frame
 
 __all__ = ["Motion", "motion_of"]
 
@@ -119,7 +119,9 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     angle_in_sweep_frame = np.where(mirrored, np.pi - angle, angle)
     states = paths.states(batch_index, likelihood.travels(read, rig)[0, samples])
     rod = rod_with(rod_of(record), {name: float(draw[name]) for name in nuisances.names})
-    in_lab_frame = to_lab_frame(paths.sweep_frame, batch_index, states, likelihood.units(rig, batch_index))
+    stiffer = float(np.ravel(rig.rigidity_scale)[0])
+    units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
+    in_lab_frame = to_lab_frame(paths.sweep_frame, batch_index, states, units)
     loaded = states.wrench.phase != NONE
     slope = np.where(loaded, states.wrench.drive_angle, angle_in_sweep_frame)
     wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))

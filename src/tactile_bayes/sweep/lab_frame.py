@@ -15,10 +15,8 @@ __all__ = ["RodUnits", "to_lab_frame"]
 
 
 class RodUnits(Protocol):
-    """Units of dimensionless quantities: a `Rod`, or arrays for many rods."""
+    """Units of dimensionless loads: a `Rod`, or arrays for many rods."""
 
-    @property
-    def length_unit(self) -> Any: ...
     @property
     def moment_unit(self) -> Any: ...
     @property
@@ -36,7 +34,7 @@ def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: Rod
     states : States
         Dimensionless states, shape (...).
     rod : RodUnits
-        Units of the rod, or of each state's rod.
+        Units of the rod, or of each state's rod; lengths are those of the sweep frame.
 
     Returns
     -------
@@ -45,6 +43,7 @@ def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: Rod
     """
     mirrored = sweep_frame.mirrored[index]
     sign = np.where(mirrored, -1.0, 1.0)
+    length = sweep_frame.length[index] if isinstance(sweep_frame.length, np.ndarray) else sweep_frame.length
     wrench = states.wrench
 
     def turned(angle: Floats) -> Floats:
@@ -55,10 +54,10 @@ def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: Rod
         "holding_moment": sign * wrench.holding_moment * rod.moment_unit + 0.0,  # never −0
         "force_x": sign * wrench.force_x * rod.force_unit + 0.0,
         "force_y": wrench.force_y * rod.force_unit,
-        "contact_arclength": wrench.contact_arclength * rod.length_unit,
+        "contact_arclength": wrench.contact_arclength * length,
         "contact_phase": wrench.phase,
-        "contact_x": sweep_frame.base_x[index] + sign * states.x * rod.length_unit,
-        "contact_y": sweep_frame.base_y[index] + states.y * rod.length_unit,
+        "contact_x": sweep_frame.base_x[index] + sign * states.x * length,
+        "contact_y": sweep_frame.base_y[index] + states.y * length,
         "tip_angle": turned(wrench.tip_angle),
         "slope_angle": sign * states.slope_angle,
     }

@@ -193,7 +193,7 @@ def contacts_of(
         of_segment[:, : segment.samples.size] = travels[:, segment.samples]
     paths = likelihood.paths(contours, rig, exact=exact, drive_angles=in_sweep_frame.reshape(-1, shape[1]))
     batch_index, rank, states = paths.loaded_states()
-    columns = to_lab_frame(paths.sweep_frame, batch_index, states, likelihood.units(rig, batch_index))
+    columns = to_lab_frame(paths.sweep_frame, batch_index, states, likelihood.rod)
     columns["tangential"] = (states.wrench.phase == TANGENTIAL).astype(float)
     out = {name: np.full(travels.shape, np.nan) for name in (*PLACE, "drive_angle", "tangential")}
     for name, values in out.items():
