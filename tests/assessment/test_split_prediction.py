@@ -28,6 +28,7 @@ def test_friction_shows_as_a_disagreement_of_early_and_late_contacts():
     assert float(found["sd"].sel(part="earlier half")) > 5.0
 
 
+@pytest.mark.slow
 def test_a_zero_that_moves_between_sweeps_shows_though_zeros_are_not_inferred():
     record = measured().copy(deep=True)
     course = np.linspace(-1.0, 1.0, record.sizes["sample"])

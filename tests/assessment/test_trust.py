@@ -38,6 +38,7 @@ def test_a_wrong_family_is_not_to_be_relied_on():
     assert "the parts of the record contradict one another" in found.attrs["summary"]
 
 
+@pytest.mark.slow
 def test_a_narrow_prior_of_the_vertex_sets_the_gap():
     deviation = float(posterior()["posterior"]["q"].std())
     priors = {"q": stats.norm(0.5, 0.2 * deviation)}

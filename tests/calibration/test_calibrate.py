@@ -237,6 +237,7 @@ def test_the_error_is_raised_where_a_replicate_is_lost(monkeypatch):
     assert (made.truth, made.measured, made.posterior) == ({}, None, None)
 
 
+@pytest.mark.slow
 def test_what_has_not_converged_is_run_again_with_more_walkers(monkeypatch):
     """By default alone: settings that are given are those of the only run."""
     runs = []

@@ -74,6 +74,7 @@ def test_several_records_add_up(records, calibrated, tmp_path):
     assert both["posterior"].rigidity_scale.std() < 0.85 * first["posterior"].rigidity_scale.std()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_infer_takes_the_rig_over(records, calibrated, tmp_path):
     folder = calibrated[1]

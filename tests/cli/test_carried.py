@@ -102,8 +102,9 @@ def test_a_run_draws_every_figure_over_what_moves(request, name, kind):
         assert (run / f"{figure}.png").is_file(), figure
 
 
-def test_a_report_moves_the_rod_with_its_base(mixed):
-    _, run = mixed
+@pytest.mark.parametrize("name", ["carried", pytest.param("mixed", marks=pytest.mark.slow)])
+def test_a_report_moves_the_rod_with_its_base(request, name):
+    _, run = request.getfixturevalue(name)
     posterior = read_result(run / "posterior.nc")
     motion = motion_of(posterior)
     record = findings_of(run).record
@@ -111,13 +112,17 @@ def test_a_report_moves_the_rod_with_its_base(mixed):
     np.testing.assert_allclose(motion.rod_y[:, 0], record.base_y.values[motion.samples], atol=1e-12)
 
 
-def test_a_report_says_travels(carried, mixed):
+def test_a_report_says_travels(carried):
     page = page_of(findings_of(carried[1]), "run")
     assert "carried 1.6\xa0L" in page["sweeps"].rows[0]
     assert page["all_readings"].heads[3] == "travel [L]"
     assert "an arc without a gap" in page["gap"][0]
     frames = page["data"]["frames"]["said"]
     assert frames["travel"][-1].startswith(", travel 1.6")
+
+
+@pytest.mark.slow
+def test_a_report_says_which_sweep_is_carried(mixed):
     both = page_of(findings_of(mixed[1]), "run")
     assert [sweep["name"] for sweep in both["data"]["frames"]["sweeps"]][-1] == "sweep 2, forward, carried"
     assert both["data"]["frames"]["said"]["travel"][0] == ""

@@ -272,6 +272,7 @@ def amplification_at_once(plan):
     return amplification(replace(plan, drive_angles=np.radians(np.arange(-30.0, 211.0, 10.0))))
 
 
+@pytest.mark.slow
 def test_a_material_asks_for_the_rod(tmp_path, monkeypatch):
     monkeypatch.setattr(sensitivity_run, "_LENGTHS", np.array([1.0]))
     monkeypatch.setattr(sensitivity_run, "_DIAMETERS", np.array([0.7, 1.0, 2.0]))

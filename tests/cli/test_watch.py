@@ -173,6 +173,7 @@ def test_the_same_command_goes_on_with_the_same_numbers(path, lines, follow):
     commands.assert_refused(follow(), "samples (was '60', now '20')")
 
 
+@pytest.mark.slow
 def test_of_a_long_record_every_other_sample_is_taken(path, lines, follow):
     """The posterior is that of a stream of these samples, also after a stop before they were too many."""
     head, rows = lines
@@ -203,15 +204,17 @@ def test_of_a_long_record_every_other_sample_is_taken(path, lines, follow):
 
 
 def test_samples_of_a_load_cell_that_drifts_are_all_taken(record, tmp_path):
-    """The steps of its drift are those from one sample to the next."""
+    """The steps of its drift are those from one sample to the next; of another cell every other sample is taken."""
     measured = read_record(record)
-    cell = replace(LoadCell.from_record(measured), drift=RandomWalk(force=1e-4))
-    options = {"record_file": record, "seed": 1, "nuisances": [], "particles": 100, "most_samples": 100}
-    with open_watch(tmp_path / "run", **options) as watched:
-        update = watched.take(measured, cell, "")
-    assert (update.samples, update.every) == (measured.sizes["sample"], 1)
+    steady = LoadCell.from_record(measured)
+    size, options = measured.sizes["sample"], {"record_file": record, "seed": 1, "nuisances": [], "particles": 100}
+    for cell, every in ((steady, 2), (replace(steady, drift=RandomWalk(force=1e-4)), 1)):
+        with open_watch(tmp_path / f"run {every}", most_samples=100, **options) as watched:
+            update = watched.take(measured, cell, "")
+        assert (update.samples, update.every) == (-(-size // every), every)
 
 
+@pytest.mark.slow
 def test_samples_that_do_not_go_on_in_order_are_taken_anew(path, lines, follow):
     """The backward sweep, of which some samples came before, now with the whole forward sweep before them."""
     head, rows = lines

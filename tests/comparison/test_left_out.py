@@ -44,6 +44,7 @@ def inferred_without(problem, sample):
     return logsumexp(of_sample) - np.log(of_sample.size), 3.0 * np.std(weights) / np.mean(weights) / weights.size**0.5
 
 
+@pytest.mark.slow
 def test_samples_at_events_are_predicted_as_if_inferred_without_them(problem, predicted):
     """After snap-off, where importance sampling from the posterior is off; 3 times the error for autocorrelation."""
     events = problem.model.likelihood.event_samples(problem.loaded)

@@ -123,7 +123,7 @@ def test_few_predictions_say_so_or_bound_the_false_alarms():
         check_record(predicted(chains=1, draws=100), false_alarm=1.0)
 
 
-@pytest.mark.parametrize(("profile", "passes"), [("II", True), ("III", False)])
+@pytest.mark.parametrize(("profile", "passes"), [("II", True), pytest.param("III", False, marks=pytest.mark.slow)])
 def test_a_parabola_is_told_from_what_is_none(profile, passes):
     check = check_record(taken_for_a_parabola(profile))
     assert check.passed == passes

@@ -414,6 +414,7 @@ def test_flat_ellipses_mix_although_only_a_ratio_is_told(a, b, q):
     assert result["sample_stats"].attrs["evaluations"] < 60_000
 
 
+@pytest.mark.slow
 def test_a_prior_that_ends_before_what_the_record_wants_is_named():
     """Far beyond it that is a mistake, and near its end the posterior lies there."""
     record, deviation = coarse(), 3e-4  # by Fisher information

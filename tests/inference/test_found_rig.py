@@ -180,6 +180,7 @@ def test_noise_that_was_inferred_is_the_load_cells():
     assert (cell.moment_noise, cell.force_noise) == (0.03, 0.06)
 
 
+@pytest.mark.slow
 def test_a_stiffer_rod_that_was_inferred_raises_no_alarm():
     """Its single samples agree with one another once its stiffness is known."""
     read, _ = read_with({"rigidity_scale": 1.05})

@@ -68,6 +68,7 @@ def test_what_a_drive_does_not_tell_is_left_out():
     assert "backlash" in model(TURNS).names
 
 
+@pytest.mark.slow
 def test_a_posterior_of_a_carried_rod_finds_the_circle():
     measured = CELL.measure(tb.scan(CIRCLE, drive=SHIFTS).record, seed=3)
     posterior = tb.infer_contour(

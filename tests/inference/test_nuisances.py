@@ -485,6 +485,7 @@ def test_of_what_is_standard_a_record_is_asked_for_what_it_can_tell():
     assert "backlash" not in json.loads(result.attrs["nuisances"])
 
 
+@pytest.mark.slow
 def test_a_lever_and_a_backlash_are_found_beside_all_that_is_standard():
     """Within 4.5 standard deviations; half a millimetre and a fifth of a degree, on a rod of 200 mm."""
     flaws = {"lever_x": 0.0025, "lever_y": 0.0025, "backlash": float(np.radians(0.2))}

@@ -283,6 +283,7 @@ def found_nothing():
     return tree
 
 
+@pytest.mark.slow
 def test_a_sensor_in_counts_is_calibrated_on_a_gauge_whose_place_is_uncertain():
     """From the moment alone, whose reading is a curve; the object is then inferred with it."""
     true = {"moment_gain": 1.1, "moment_curve_quadratic": 0.06, "moment_curve_cubic": 0.03}

@@ -59,7 +59,7 @@ def exact(x, y):
     return s, c, d, r, mp.quad(lambda t: s_at(t) ** 2, [0, mp.mpf(1) / 2, 1])
 
 
-@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 10])
+@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 40])
 def test_values_are_those_of_mpmath(every):
     """Of the ordinary parameters only some, unless there is time; of the special ones all."""
     x, y = (np.append(values[:40:every], values[40:]) for values in parameters())
@@ -75,7 +75,7 @@ def test_with_slopes_they_are_the_same():
     np.testing.assert_allclose(found, by_number(_values, 5)(x, y), rtol=0, atol=64 * EPS)
 
 
-@pytest.mark.parametrize("every", [pytest.param(4, marks=pytest.mark.slow), 20])
+@pytest.mark.parametrize("every", [pytest.param(4, marks=pytest.mark.slow), 60])
 @pytest.mark.parametrize("number", [0, 1], ids=["x", "y"])
 def test_slopes_are_those_of_differences(number, every):
     x, y = (values[:40] for values in parameters())

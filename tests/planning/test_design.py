@@ -164,6 +164,7 @@ def test_it_goes_on_where_it_was_stopped(tmp_path):
         designed(out=tmp_path, **asked, seed=2)
 
 
+@pytest.mark.slow
 def test_the_seed_decides():
     one = designed(draws=2, bases=[(0.0, 0.0)])
     assert one.identical(designed(draws=2, bases=[(0.0, 0.0)]))

@@ -249,6 +249,7 @@ def test_who_wants_less_motion_gets_the_slider_alone(driver, path):
     assert by(page, "sample").is_displayed()
 
 
+@pytest.mark.slow
 def test_no_text_of_a_record_runs_or_becomes_an_element(driver, tmp_path_factory):
     from selenium.common.exceptions import NoAlertPresentException
 

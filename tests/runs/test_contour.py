@@ -200,8 +200,8 @@ def broken(*arguments, **options):
     ("function", "what", "file"),
     [
         ("contact_points", "contacts", "contacts.csv"),
-        ("contour_band", "band", "band.csv"),
-        ("gap_if_any", "gap", None),
+        pytest.param("contour_band", "band", "band.csv", marks=pytest.mark.slow),
+        pytest.param("gap_if_any", "gap", None, marks=pytest.mark.slow),
         ("verdicts", "verdicts", None),
     ],
 )

@@ -78,6 +78,7 @@ def test_blocks_and_looks_make_no_difference():
         assert second_half(other)[-1] > 1
 
 
+@pytest.mark.slow
 def test_a_thinned_run_is_the_same_run(monkeypatch, tmp_path):
     """Steps, acceptance and autocorrelation time are of all steps, also where a run goes on from a checkpoint."""
     settings = SamplerSettings(ensembles=2, walkers=8, block_steps=200, max_steps=1600, min_ess=1e9)
