@@ -33,6 +33,8 @@ AROUND = np.linspace(-0.1, 0.1, 9)
 """Positions, relative to the vertex as the whole record shows it [L]."""
 TOLERANCES = (0.02, 0.01, 0.005)
 """Largest widths of the band [L] at which a rule stops."""
+ALARMS = (0.2, 0.05, 0.01, 0.001)
+"""Rates of false alarms that an e-value may have at most."""
 
 Row = Mapping[str, Any]
 RECORDS = Kind("records", StudyError, dict, lambda row: {name: v for name, v in row.items() if name != "number"})
@@ -83,6 +85,7 @@ def compared(measured: xr.Dataset, truth: Mapping[str, float], posterior: xr.Dat
     row["wider"] = float(np.mean((high - low) / (band["upper"] - band["lower"]).values))
     row["held_by_infer"] = bool(np.all((band["lower"] <= height) & (height <= band["upper"])))
     row["shift"] = float(now.log_density_shift)
+    row["e_value"] = float(now.e_value)
     row["converged"] = bool(posterior.attrs["converged"])
     return row
 
@@ -108,6 +111,9 @@ def report(rows: list[Row], errors: list[str]) -> None:
         smallest = f"{min(values):.2g} of {len(values)}"
         print(f"{name:<18}{smallest:>12}{_share(held):>12}{np.median(width):>12.4f}")
     print(f"{'infer_contour':<18}{'':>12}{_share(np.array([row['held_by_infer'] for row in rows])):>12}")
+    surprised = [np.mean([row["e_value"] > 1.0 / rate for row in rows]) for rate in ALARMS]
+    limits = ", ".join(f"{1.0 / rate:g} in {share:.1%}" for rate, share in zip(ALARMS, surprised, strict=True))
+    print(f"\nthe largest e-value of a record, whose model is right, exceeds {limits} of records")
     lost = [row for row in rows if row["shift"] > SETTLED]
     print(f"\n{len(lost)} records told that the particles had lost the posterior; without them:")
     sure = [row for row in rows if row["converged"] and row["shift"] <= SETTLED]
