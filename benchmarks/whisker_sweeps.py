@@ -7,15 +7,18 @@ the peak, over some 6 mm. Taken from that README are the direction of the whiske
 coordinates, and 4.1 mm between the hinge of the sensor and the first traced point. From that point the rod is 51 mm
 long: there it lets go of the smaller cylinder. Its rigidity is that of a wire of 0.24 mm, and scales the gain.
 
-    python -m benchmarks.whisker_sweeps [--stem] FOLDER [SWEEP ...]
+    python -m benchmarks.whisker_sweeps [--stem] [--length] FOLDER [SWEEP ...]
 
 keeps the rig and every posterior in FOLDER, and goes on from there. SWEEP is like cylinder_may25/trial0, or
 cylinder_may25, the sweeps of a session in one record, which have one hysteresis if they repeat each other. With --stem
-the piece before the first traced point is rigid, and its length inferred, with a prior of 4.1 ± 2 mm.
+the piece before the first traced point is rigid, and its length inferred, with a prior of 4.1 ± 2 mm. With --length the
+length of the rod is inferred from the sweeps, with a prior of ± 1.5 mm. Where a table shows that the rod lets go, after
+its record has ended, that is compared with what the posterior predicts.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from pathlib import Path
@@ -28,6 +31,9 @@ from scipy import stats
 
 import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
+from tactile_bayes.inference.contour_events import events_of
+from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.nuisances import Nuisances
 
 ROOT = Path(__file__).resolve().parents[1]
 MEASURED = Path(os.environ.get("TACTILE_BAYES_MEASURED", ROOT.parent / "shared" / "data")) / "whisker-sweeps"
@@ -41,6 +47,9 @@ DRIVE_ANGLE = np.radians(180.0 - 115.3)
 HINGE, LENGTH, DIAMETER, RIGIDITY = 4.1, 51.0, 0.24e-3, 1e-5
 STEM = 4.1e-3, 2e-3
 """Length of a rigid piece before the first traced point, and its standard deviation [m]."""
+
+FREE = 1.5e-3
+"""Standard deviation of the rod's length where it is inferred [m]."""
 
 AT_POINTS, ON_SWEEPS = 0.0025, 0.01
 """Hysteresis over the peak: of a mean of readings there and back, which differ by 6 counts, and of a sweep."""
@@ -96,10 +105,10 @@ def points(rod: tb.Rod) -> xr.Dataset:
     return _record(rod, sweep.astype(int), x, y, counts)
 
 
-def record_of(name: str, rod: tb.Rod) -> xr.Dataset:
-    """Return the record of a cylinder, of one sweep or of all of a session, without what follows the release.
+def record_of(name: str, rod: tb.Rod, whole: bool = False) -> xr.Dataset:
+    """Return the record of a cylinder, of one sweep or of all of a session, whole or without what follows the release.
 
-    A sweep ends where its reading has fallen to 60 % of its peak, and those that repeat each other where the first
+    Then a sweep ends where its reading has fallen to 60 % of its peak, and those that repeat each other where the first
     does. In the record of a session the zero of each is that of its first readings.
     """
     tables = [_table(f"{one}.csv") for one in SWEEPS if one == name or one.startswith(f"{name}/")]
@@ -109,7 +118,7 @@ def record_of(name: str, rod: tb.Rod) -> xr.Dataset:
     distances = [float(table["y"][-1]) for table in tables]
     ends: dict[float, int] = {}
     for at, each in zip(distances, counts, strict=True):
-        ends[at] = min(ends.get(at, each.size), _end(each))
+        ends[at] = min(ends.get(at, each.size), each.size if whole else _end(each))
     rows = []
     for k, (table, each, at) in enumerate(zip(tables, counts, distances, strict=True)):
         end = ends[at]
@@ -170,16 +179,19 @@ def calibrated(folder: Path, rod: tb.Rod) -> xr.DataTree:
     return tb.read_result(path)
 
 
-def measured(folder: Path, name: str, rod: tb.Rod, rig: xr.DataTree) -> xr.DataTree:
+def measured(folder: Path, name: str, rod: tb.Rod, rig: xr.DataTree, of_any_length: bool = False) -> xr.DataTree:
     """Return the posterior of the cylinder of a sweep, or of all sweeps of a session."""
-    path = folder / f"{name.replace('/', '-')}.nc"
+    path = folder / f"{name.replace('/', '-')}{'-length' if of_any_length else ''}.nc"
     if not path.exists():
+        priors = {"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(ON_SWEEPS, rod)}
+        if of_any_length:
+            priors["length"] = stats.norm(rod.length, FREE)
         found = tb.infer_contour(
             record_of(name, rod),
             family="circle",
             load_cell=SENSOR,
             nuisances=("moment_bias", "friction", "discrepancy"),
-            priors={"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(ON_SWEEPS, rod)},
+            priors=priors,
             rig=rig,
             seed=1,
             settings=ENOUGH,
@@ -188,8 +200,29 @@ def measured(folder: Path, name: str, rod: tb.Rod, rig: xr.DataTree) -> xr.DataT
     return tb.read_result(path)
 
 
+def releases(found: xr.DataTree, name: str, rod: tb.Rod) -> list[str]:
+    """Return the ways of the stage at which the rod lets go, as read and as a posterior predicts them (95 %)."""
+    draws = found["posterior"].dataset.stack(every=("chain", "draw"))
+    draws = draws.isel(every=slice(None, None, max(1, draws.sizes["every"] // 200)))
+    inferred = [one for one in json.loads(found.attrs["nuisances"]) if not one.startswith("discrepancy")]
+    rig = Nuisances(tuple(inferred), {}, rod, 0.0).rig({one: draws[one].values for one in inferred})
+    record = record_of(name, rod, whole=True)
+    contours = tb.contours.Circle(draws.r.values, draws.q.values, draws.x_c.values)
+    ways = 1e3 * events_of(RecordLikelihood(record, SENSOR), contours, rig)["snap_off_travel"]
+    words = []
+    for number, predicted in zip(np.unique(record.sweep), ways.T, strict=True):
+        own = record.isel(sample=record.sweep.values == number)
+        counts = own.holding_moment.values - own.holding_moment.values[:UNTOUCHED].mean()
+        loaded = np.flatnonzero(counts > 0.1 * counts.max())[-1]
+        if loaded + 1 < counts.size:
+            way = 1e3 * np.append(0.0, np.cumsum(np.hypot(np.diff(own.base_x), np.diff(own.base_y))))
+            low, high = np.nanquantile(predicted, [0.025, 0.975])
+            words.append(f"{way[loaded]:.1f} to {way[loaded + 1]:.1f} mm (predicted {low:.1f} to {high:.1f})")
+    return words
+
+
 def main() -> None:
-    arguments = [argument for argument in sys.argv[1:] if argument != "--stem"]
+    arguments = [argument for argument in sys.argv[1:] if argument not in ("--stem", "--length")]
     folder, names = Path(arguments[0]), arguments[1:] or SWEEPS
     folder.mkdir(parents=True, exist_ok=True)
     rod, began = whisker(on_stem="--stem" in sys.argv), perf_counter()
@@ -199,7 +232,7 @@ def main() -> None:
         print(f"  {name:24s} {float(draws):12.5g} ± {float(rig['posterior'][name].std()):.2g}")
     for name in names:
         began = perf_counter()
-        found = measured(folder, name, rod, rig)
+        found = measured(folder, name, rod, rig, "--length" in sys.argv)
         r, friction = (found["posterior"][one].values.ravel() for one in ("r", "friction"))
         predicted = found["posterior_predictive"].holding_moment.mean(("chain", "draw"))
         off = found["observed_data"].holding_moment - predicted
@@ -210,6 +243,11 @@ def main() -> None:
             f"{perf_counter() - began:.0f} s; {found.attrs['message']}",
             flush=True,
         )
+        if "length" in found["posterior"]:
+            length = 1e3 * found["posterior"].length
+            print(f"  length {float(length.mean()):.1f} ± {float(length.std()):.1f} mm of {1e3 * rod.length:.1f} mm")
+        for words in releases(found, name, rod):
+            print(f"  lets go at {words}")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import functools
 import os
+import re
 import signal
 from dataclasses import replace
 
@@ -24,7 +25,9 @@ def pytest_configure(config):
         settings.load_profile("few")
 
 
-SAMPLING = ("infer_contour(", "infer_rig(", "infer_point_load(", "calibrate(", "compare_families(", "Stream(")
+SAMPLING = re.compile(
+    r"\b(infer_(contour|rig|point_load)|calibrat(e|ion_replicate)|compare_families|Stream(Comparison)?)\("
+)
 """Calls that take a second or more."""
 
 
@@ -34,7 +37,7 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if isinstance(item, pytest.DoctestItem) and not item.name.endswith("inference.contour.infer_contour"):
             source = "".join(example.source for example in item.dtest.examples)
-            if any(call in source for call in SAMPLING):
+            if SAMPLING.search(source):
                 item.add_marker("slow")
 
 

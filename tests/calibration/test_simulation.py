@@ -333,10 +333,18 @@ def test_the_truth_of_what_is_inferred_is_what_the_misspecified_rig_has():
         bias=(1e-6, 0.0, -2e-5),
         drift=(0.0, 1e-5, 0.0),
         further_base_shift=(1e-3, -2e-3),
-        load_cell=replace(QUIET, drive_angle_backlash=0.02, drive_angle_offset=-0.01),
+        load_cell=replace(
+            QUIET,
+            drive_angle_backlash=0.02,
+            drive_angle_offset=-0.01,
+            bias=(0.0, 2e-5, 0.0),
+            lever=(1e-4, -2e-4),
+            gain=((1.05, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        ),
     )
     shape = ("rest_curvature", "taper", "base")
-    names = ("friction", "rigidity_scale", "drive_angle_offset", "backlash", "bias", "drift", *shape)
+    of_cell = ("drive_angle_offset", "backlash", "bias", "drift", "lever", "moment_gain")
+    names = ("friction", "rigidity_scale", *of_cell, *shape)
     priors = {"a": stats.lognorm(s=0.4, scale=6.0), "q": stats.uniform(0.03, 0.04), "x_c": stats.norm(0.0, 0.01)}
     options = {"rod": SI, "base": [(0.0, 0.0), (0.02, 0.0)], "nuisances": names, "priors": priors, "friction": None}
     made = simulated(world=world, **options)

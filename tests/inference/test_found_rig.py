@@ -135,12 +135,15 @@ def test_contacts_are_true_if_the_faults_are_found(names, frame):
 def test_the_length_of_the_rod_is_found(bent, units):
     """It keeps its proportions; a record in lengths of the stated rod has another rod's then."""
     stated = tb.Rod(1.0, 2.0, rest_curvature=bent)
-    longer = stated.reshaped(stated.mean_rest_curvature, 0.0, length=1.03)
+    longer = stated.reshaped(stated.mean_rest_curvature / 1.03, 0.0, length=1.03)
     truth = tb.scan(CONTOUR, rod=longer, drive_step=np.radians(8.0)).record
     read = truth.drop_vars([name for name in truth.data_vars if str(name).startswith("truth_")])
     read, cell = with_rod(read, stated), tb.LoadCell(force_noise=0.05, moment_noise=0.02)
     if units == "dimensionless":
         read, cell = to_dimensionless(read), cell.dimensionless(stated)
+    contacts = found_rig(read, cell, posterior_of(length=1.03)).contacts()
+    assert contacts.attrs["units"] == units
+    assert contacts.contact_x.attrs["units"] == {"SI": "m", "dimensionless": "1"}[units]
     distance, misfit = off(read, truth, cell, posterior_of(length=1.03))
     assert distance < 1e-6
     assert misfit < 1e-6

@@ -18,12 +18,15 @@ from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import default_priors
+from tactile_bayes.inference.found_rig import rod_with
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.forward_table import NO_TABLE
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record
+from tactile_bayes.record.attributes import same_rod
 from tactile_bayes.sweep import Translation, scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -331,6 +334,44 @@ def test_the_stem_is_inferred_about_the_stated_one(bent):
             loads = np.stack([expected.record[name].values for name in CHANNELS], axis=-1) / stated.load_units
             found = model.loads(np.array([[5.0, 0.06, 0.0, true, 0.1]]))[0]
             np.testing.assert_allclose(found, loads, atol=1e-6 * np.abs(loads).max())
+
+
+@pytest.mark.parametrize("bent", [0.0, lambda s: 30.0 * s], ids=["straight", "traced"])
+def test_the_length_is_inferred_about_the_stated_one(bent):
+    """In loads of scans, in SI; alone it keeps the turn from base to tip, which beside the rest curvature is free."""
+    angles, contour = np.linspace(0.3, 2.8, 59), Parabola(5.0, 0.06)
+    cell, stated = LoadCell(force_noise=5e-5, moment_noise=2e-6), Rod(0.1, 1e-5, rest_curvature=bent, stem=0.002)
+    record = cell.measure(scan(contour, rod=stated, drive_angles=angles).record, seed=1)
+    mean = stated.mean_rest_curvature
+    for names, curvature in ((["length"], mean / 1.02), (["length", "rest_curvature"], mean + 0.5)):
+        model = model_of(record, names, cell)
+        prior = model.priors["length"]
+        assert (prior.mean(), prior.std()) == pytest.approx((0.1, 0.001))
+        assert model.nuisances.unit("length") == "m"
+        longer = stated.reshaped(curvature, 0.0, length=0.102)
+        assert (longer.stem, longer.mean_rest_curvature) == pytest.approx((0.002, curvature))
+        values = dict(zip(names, (0.102, curvature), strict=False))
+        assert same_rod(rod_with(stated, values), longer)
+        expected = scan(contour, rod=longer, drive_angles=angles).record
+        loads = np.stack([expected[name].values for name in CHANNELS], axis=-1) / stated.load_units
+        found = model.loads(np.array([[5.0, 0.06, 0.0, *values.values()]]))[0]
+        np.testing.assert_allclose(found, loads, atol=1e-6 * np.abs(loads).max())
+
+
+def test_cones_of_another_length_are_served_by_a_table():
+    """They have another half angle, and with it another angle of friction at the centreline."""
+    likelihood = RecordLikelihood(scanned(rod=Rod(diameter=0.01, taper=0.5)), CELL)
+    contours = stack()
+    for length in (0.97, 1.0, 1.03):
+        rig = Rig(length=length, friction=0.2)
+        loads, usable = likelihood.predict(contours, rig)
+        (key,) = (key for key in likelihood._tables.made if key[3] == (length != 1.0))
+        assert likelihood._tables.made[key] is not NO_TABLE
+        likelihood.exact = True
+        exact, usable_exactly = likelihood.predict(contours, rig)
+        likelihood.exact = False
+        np.testing.assert_array_equal(usable, usable_exactly)
+        np.testing.assert_allclose(loads, exact, atol=3e-4 * np.abs(exact).max())
 
 
 def test_a_stem_that_is_a_shift_and_a_lever_is_refused():

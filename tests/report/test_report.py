@@ -360,6 +360,7 @@ def test_the_rig_of_the_most_probable_draw_moves_it(posterior):
         "friction": 0.2,
         "base_2_x": 0.002,
         "moment_bias": 1e-4,
+        "length": 1.01 * rod_of(record_of(posterior)).length,
     }
     tree = with_rig(posterior, rig)
     motion, record = motion_of(tree), record_of(tree)
@@ -373,6 +374,11 @@ def test_the_rig_of_the_most_probable_draw_moves_it(posterior):
     np.testing.assert_allclose(motion.cell_angle, driven, atol=1e-9)
     np.testing.assert_allclose(motion.rod_x[:, 0], np.where(motion.sweep == 1, 0.052, 0.0))
     np.testing.assert_allclose(motion.pivots, [[0.0, 0.0], [0.052, 0.0]])
+    lengths = np.hypot(np.diff(motion.rod_x, axis=1), np.diff(motion.rod_y, axis=1)).sum(axis=1)
+    np.testing.assert_allclose(lengths, rig["length"], rtol=2e-3)
+    touching = motion.phase == "tip"
+    off = [motion.rod_x[:, -1] - motion.contact_x, motion.rod_y[:, -1] - motion.contact_y]
+    assert np.all(np.hypot(*off)[touching] < 0.51 * rod_of(record).diameter)
 
 
 def test_loads_are_shown_along_the_axes_of_a_cell_that_turns_with_the_drive(findings):

@@ -13,7 +13,7 @@ from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import Rig
-from tactile_bayes.inference.nuisances import BIASES, DRIFTS
+from tactile_bayes.inference.nuisances import BIASES, DRIFTS, GAINS, LEVERS
 from tactile_bayes.inference.priors import Prior, check_priors
 from tactile_bayes.load_cell import LoadCell
 
@@ -145,22 +145,25 @@ class Misspecification:
         flatter = np.log(radius) + np.log(factor) * np.exp(-0.5 * ((slopes - at) / _SPOT) ** 2)
         return ShapeFree(slopes, flatter[None], x=x, y=y, at=0.0)
 
-    def truth(self, drawn: Mapping[str, float], curvature_unit: float) -> dict[str, float]:
+    def truth(self, drawn: Mapping[str, float], stated: LoadCell, curvature_unit: float) -> dict[str, float]:
         """Return the true values of inferred parameters from drawn ones, by name, in the record's units.
 
-        What inference can find, like friction that it infers, it ought to find.
+        What inference can find, like friction that it infers, it ought to find. It knows the stated load cell.
         """
+        cell = stated if self.load_cell is None else self.load_cell
         more = {
             "friction": self.friction,
-            "drive_angle_offset": self.drive_angle_offset,
+            "drive_angle_offset": self.drive_angle_offset + cell.drive_angle_offset - stated.drive_angle_offset,
+            "backlash": cell.drive_angle_backlash - stated.drive_angle_backlash,
             "rest_curvature": self.rest_curvature * curvature_unit,
             "taper": self.taper,
-            **dict(zip(BIASES, self.bias, strict=True)),
+            **dict(zip(BIASES, np.add(self.bias, np.subtract(cell.bias, stated.bias)).tolist(), strict=True)),
             **dict(zip(DRIFTS, self.drift, strict=True)),
+            **dict(zip(LEVERS, np.subtract(cell.lever, stated.lever).tolist(), strict=True)),
         }
-        found = {name: value + more.get(name, 0.0) for name, value in drawn.items()}
-        if "rigidity_scale" in found:
-            found["rigidity_scale"] *= self.rigidity_scale
+        times = {"rigidity_scale": self.rigidity_scale}
+        times |= dict(zip(GAINS, (cell.own_gains / stated.own_gains).tolist(), strict=True))
+        found = {name: times.get(name, 1.0) * (value + more.get(name, 0.0)) for name, value in drawn.items()}
         for name in found:
             if name.startswith("base_"):
                 found[name] += self.further_base_shift["xy".index(name[-1])]

@@ -116,6 +116,8 @@ class SimulatedExperiment:
         }
         if self.drives:
             entries["drives"] = json.dumps([_described(drive) for drive in self.drives])
+        if repr(world) != repr(Misspecification()):
+            entries["world_truth"] = "of the simulated rig"
         entries["world_family"] = world.family or self.assumed.family
         entries |= {f"world_{name}": repr(getattr(world, name)) for name in NUMBERS}
         entries["world_load_cell"] = "as stated" if world.load_cell is None else json.dumps(world.load_cell.entries())

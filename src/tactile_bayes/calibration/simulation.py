@@ -94,8 +94,5 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     columns = {name: ("sample", readings[:, i], template[name].attrs) for i, name in enumerate(CHANNELS)}
     measured = template.assign(columns).assign(drive_angle=("sample", angles, template.drive_angle.attrs))
     events = {name: found[0] for name, found in events_of(likelihood, contour, rig).items()}
-    truth = world.truth({name: float(value[0]) for name, value in values.items()}, rod.curvature_unit)
-    for name, off in zip(("drive_angle_offset", "backlash"), misread.values(), strict=True):
-        if name in truth:
-            truth[name] += off
+    truth = world.truth({name: float(value[0]) for name, value in values.items()}, stated, rod.curvature_unit)
     return Simulation(measured, truth, contour, rig, events)

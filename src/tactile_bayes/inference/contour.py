@@ -105,11 +105,12 @@ def infer_contour(
         "suspension_compliance" (turn of the pivot per holding moment), "rest_curvature" (mean curvature of the unloaded
         rod; how it varies along the rod stays as stated), "taper", "stem" (rigid piece between pivot and rod; beside
         the lever it is refused if the base is only carried without turning), "length" (of the rod, which keeps its
-        proportions: rest curvature times length, and taper). By default the first five and friction, except those that
-        are not identifiable (the lever without the moment, the backlash in a single direction) and a given friction;
-        "standard" stands for these, and an empty list takes all as stated. "base": shifts of the second and further
-        pivots of a record, as "base_2_x", "base_2_y", "base_3_x" and so on. The position of the first pivot is not
-        identifiable, since a common shift of pivots and object changes no reading: results are relative to it.
+        taper and, unless it is inferred as well, its rest curvature times length). By default the first five and
+        friction, except those that are not identifiable (the lever without the moment, the backlash in a single
+        direction) and a given friction; "standard" stands for these, and an empty list takes all as stated. "base":
+        shifts of the second and further pivots of a record, as "base_2_x", "base_2_y", "base_3_x" and so on. The
+        position of the first pivot is not identifiable, since a common shift of pivots and object changes no reading:
+        results are relative to it.
         "discrepancy": a smooth deviation of the readings in contact from those of any contour and rig, as by
         hysteresis, stick-slip or a lean out of the plane (Kennedy and O'Hagan 2001, doi 10.1111/1467-9868.00294), with
         "discrepancy_scale" and "discrepancy_length"; see Notes. nuisances=["standard", "discrepancy"] infers it beside
@@ -131,11 +132,11 @@ def infer_contour(
         the prior), so that it can be stored before they can fail.
     rig : xr.DataTree, optional
         Result of `infer_rig` for the same rig, whose posterior is the prior of the parameters that last: stiffness,
-        encoder offset, backlash, lever, gains, curve of the moment, compliance, and the rod's curvature, taper and
-        stem. They are inferred without being named, with their correlations. Zeros, drifts, noise and shifts of pivots
-        belong to a record, and friction to the surfaces of rod and object: they keep their own priors. The attribute
-        `rig_density_error` of the result is the largest difference between quantiles of the rig's draws and of the
-        density fitted to them, along each parameter and principal axis, in standard deviations.
+        encoder offset, backlash, lever, gains, curve of the moment, compliance, and the rod's curvature, taper, stem
+        and length. They are inferred without being named, with their correlations. Zeros, drifts, noise and shifts of
+        pivots belong to a record, and friction to the surfaces of rod and object: they keep their own priors. The
+        attribute `rig_density_error` of the result is the largest difference between quantiles of the rig's draws and
+        of the density fitted to them, along each parameter and principal axis, in standard deviations.
 
     Returns
     -------

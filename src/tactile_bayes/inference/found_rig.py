@@ -19,6 +19,9 @@ from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod
 
 __all__ = ["FoundRig", "contact_points", "found_rig", "rig_with", "rod_with"]
 
+_PHYSICAL = ("m", "N", "N m", "1/m")
+"""Units of what is dimensionless in a dimensionless record."""
+
 _CHANNEL_NAMES = ("moment", "force_x", "force_y")
 
 
@@ -35,17 +38,25 @@ class FoundRig(NamedTuple):
     friction: float
     """Coulomb's coefficient."""
     suspension_compliance: float
+    units: str
+    """Units of the record that was measured. Where it is dimensionless and the rod's length was inferred, `record` is
+    in lengths of the stated rod, and SI by name."""
     """Compliance relative to the stated rod, as in `reconstruct`."""
 
     def contacts(self) -> xr.Dataset:
         """Return contact points from `reconstruct`, constrained if the noise is known, else raw."""
-        return reconstruct(
+        contacts = reconstruct(
             self.record,
             method="constrained" if self.load_cell.has_variances else "raw",
             load_cell=self.load_cell,
             friction=self.friction,
             suspension_compliance=self.suspension_compliance,
         )
+        if self.units == "dimensionless":
+            for variable in contacts.variables.values():
+                if variable.attrs.get("units") in _PHYSICAL:
+                    variable.attrs["units"] = "1"
+        return contacts.assign_attrs(units=self.units)
 
 
 def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> FoundRig:
@@ -111,20 +122,22 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
             columns[name] = columns.get(name, measured[name]) + shift * at_pivot
     record = measured.assign({name: values.assign_attrs(measured[name].attrs) for name, values in columns.items()})
     rod = rod_of(measured)
-    if "length" in rig:  # no record in lengths of its own rod any more
+    if "length" in rig:
         record = to_si(record, rod)
     return FoundRig(
         with_rod(record, rod_with(rod, rig)),
         cell,
         rig.get("friction", friction),
         rig.get("suspension_compliance", 0.0) * rig.get("rigidity_scale", 1.0),
+        str(measured.attrs["units"]),
     )
 
 
 def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
     """Return a rod of the shape that nuisance parameters by name give it, others than those of shape without effect."""
-    curvature, taper = rig.get("rest_curvature", rod.mean_rest_curvature), rig.get("taper", rod.taper)
-    return rod.reshaped(curvature, taper, rig.get("stem"), rig.get("length"))
+    length = rig.get("length", rod.length)
+    curvature = rig.get("rest_curvature", rod.mean_rest_curvature * rod.length / length)
+    return rod.reshaped(curvature, rig.get("taper", rod.taper), rig.get("stem"), length)
 
 
 def contact_points(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> xr.Dataset | None:

@@ -315,7 +315,7 @@ class RecordLikelihood:
         profile = self._profile(rig)
         if self.exact or profile is None or self._tolerance.min() < _TABULATED:
             return NO_TABLES
-        return self._tables.known(profile, rig.taper, rig.rest_curvature, rig.friction)
+        return self._tables.known(profile, rig.taper, rig.rest_curvature, rig.friction, rig.length)
 
     def _bases(self, rig: Rig) -> Floats:
         """Return the pivots, shape (segments, n, 2)."""

@@ -45,7 +45,7 @@ _GROUPS["lever"] = ("lever_x", "lever_y")
 _GROUPS["moment_curve"] = ("moment_curve_quadratic", "moment_curve_cubic")
 _GROUPS["gauge"] = ("gauge_x", "gauge_y")
 
-BIASES, DRIFTS, CURVE = _GROUPS["bias"], _GROUPS["drift"], _GROUPS["moment_curve"]
+BIASES, DRIFTS, GAINS, LEVERS, CURVE = (_GROUPS[what] for what in ("bias", "drift", "gain", "lever", "moment_curve"))
 
 BIAS = 0.1
 """Standard deviation of the prior of a bias, in EI/L and EI/L²."""
@@ -170,15 +170,16 @@ class Nuisances:
     def rig(self, values: Mapping[str, Floats]) -> Rig:
         """Return the rig of every point, from values by name in the record's units, each of shape (n,)."""
         known: dict[str, Any] = {"friction": self.friction} if "friction" not in self.names else {}
+        if "length" in self.names:
+            known["length"] = values["length"] / self.rod.length
         if "rest_curvature" in self.names:
-            off = values["rest_curvature"] - self.rod.mean_rest_curvature
+            longer = known.get("length", 1.0)  # the rod of another length has the stated turn from base to tip
+            off = longer * values["rest_curvature"] - self.rod.mean_rest_curvature
             known["rest_curvature"] = off / self.units["rest_curvature"]
         if "taper" in self.names:
             known["taper"] = values["taper"] - self.rod.taper
         if "stem" in self.names:
             known["stem"] = (values["stem"] - self.rod.stem) / self.units["stem"]
-        if "length" in self.names:
-            known["length"] = values["length"] / self.rod.length
         return Rig(
             base_shifts=self._base_shifts(values),
             **known,

@@ -326,19 +326,19 @@ class Rod:
     ) -> Rod:
         """Return a rod of another mean rest curvature [1/m], taper and, if given, stem [m] and length [m].
 
-        The rod of another length keeps the proportions of that of this length: rest curvature times length, taper, and
-        rigidity along it.
+        In another length it has the same course of rest curvature and rigidity along it, in proportion.
         """
-        more = mean_rest_curvature - self.mean_rest_curvature
         curvature, rigidity = self.rest_curvature, self.rigidity_profile
-        curvature = curvature.plus(more) if isinstance(curvature, Along) else mean_rest_curvature
         longer = 1.0 if length is None else length / self.length
+        if isinstance(curvature, Along):
+            curvature = curvature.scaled(longer, 1.0 / longer)
+            curvature = curvature.plus(mean_rest_curvature - curvature.mean)
+        else:
+            curvature = mean_rest_curvature
         return replace(
             self,
             length=longer * self.length,
-            rest_curvature=curvature.scaled(longer, 1.0 / longer)
-            if isinstance(curvature, Along)
-            else curvature / longer,
+            rest_curvature=curvature,
             taper=taper,
             rigidity_profile=rigidity.scaled(longer, 1.0) if isinstance(rigidity, Along) else rigidity,
             rest_curvature_deviation=self.rest_curvature_deviation / longer,

@@ -23,7 +23,7 @@ from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
-from tactile_bayes.inference.found_rig import contact_points
+from tactile_bayes.inference.found_rig import contact_points, rod_with
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
@@ -295,18 +295,22 @@ class _Figures:
         """A scan of the most probable contour."""
         best = self.result["sample_stats"]["lp"].argmax(("chain", "draw"))  # the medians may be out of reach
         draw, attrs = self.draws.isel(best), self.result.attrs
+        found = {name: float(draw[name]) for name in json.loads(attrs["nuisances"]) if name in draw}
+        if self.measured.attrs["units"] == "dimensionless":
+            found.pop("length", None)  # a scan would be in lengths of that rod
+        rod = rod_with(rod_of(self.measured), found)
         if carried_sweeps(self.measured):
             return scan(
                 contours_of(draw, attrs["family"]).take(np.array(0)),
                 drive=recorded_drives(self.measured),
-                rod=rod_of(self.measured),
+                rod=rod,
                 friction=float(draw.get("friction", attrs["friction"])),
             )
         return scan(
             contours_of(draw, attrs["family"]).take(np.array(0)),
             direction="both" if len(self.directions) == 2 else self.directions[0],
             base=self.base,
-            rod=rod_of(self.measured),
+            rod=rod,
             friction=float(draw.get("friction", attrs["friction"])),
         )
 
