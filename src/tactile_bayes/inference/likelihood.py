@@ -109,15 +109,14 @@ class Rig(NamedTuple):
     after the last given one are not shifted."""
 
 
-def _repeated(measured: xr.Dataset, angle: Floats) -> Index:
-    """Return for each sample one more than the first sweep that is carried through the same poses as its own; 0 if its
-    sweep is not carried."""
-    sweep, found = measured.sweep.values, np.zeros(angle.size, dtype=np.intp)
-    poses = np.column_stack([measured.base_x.values, measured.base_y.values, angle, measured.direction == "backward"])
-    first: dict[bytes, int] = {}
+def _repeated(measured: xr.Dataset, poses: Floats) -> Index:
+    """Return for each sample one more than the first sweep that is carried through the same poses, shape (samples, 3),
+    as its own; 0 if its sweep is not carried."""
+    sweep, backward = measured.sweep.values, measured.direction.values == "backward"
+    found, first = np.zeros(len(poses), dtype=np.intp), dict[tuple[bytes, bytes], int]()
     for number in carried_sweeps(measured):
         own = sweep == number
-        found[own] = 1 + first.setdefault(poses[own].tobytes(), number)
+        found[own] = 1 + first.setdefault((poses[own].tobytes(), backward[own].tobytes()), number)
     return found
 
 
@@ -177,7 +176,8 @@ class RecordLikelihood:
         self._turn = angle if frame_of(record) == "turning" else None
         backward = contact_sides(without_errors(measured, load_cell), load_cell) < 0.0
         bases, of_sample = base_of_sample(measured)
-        carried = _repeated(measured, angle)
+        poses = np.column_stack([measured.base_x.values, measured.base_y.values, angle])
+        carried = _repeated(measured, poses)
         sense = np.where(carried > 0, 0.0, np.where(measured.direction.values == "backward", -1.0, 1.0))
         places = np.array(bases)[of_sample]
         kinds, which = np.unique(np.column_stack([places, backward, sense, carried]), axis=0, return_inverse=True)
@@ -196,9 +196,9 @@ class RecordLikelihood:
             read = angle[segment.samples]
             row[: read.size] = np.pi - read if segment.backward else read
         self._ways: dict[int, Floats] = {}
-        self._lines = self._drives(measured, angle) if np.any(carried) else None
+        self._lines = self._drives(measured.sweep.values, poses) if np.any(carried) else None
 
-    def _drives(self, measured: xr.Dataset, angle: Floats) -> Floats:
+    def _drives(self, sweep: Index, poses: Floats) -> Floats:
         """Return the lines of all drives, as in `Segments`; travels take the place of drive angles in those that carry.
 
         A rotation is a line along the drive angle.
@@ -210,13 +210,12 @@ class RecordLikelihood:
                 drives.append(_TURNS)
                 continue
             own = segment.samples
-            once = own[measured.sweep.values[own] == measured.sweep.values[own[0]]]
-            poses = np.column_stack([measured.base_x.values[once], measured.base_y.values[once], angle[once]])
-            if np.ptp(poses[:, 2]) <= _SCATTER * noise:
-                poses[:, 2] = poses[:, 2].mean()
-            path = lines_through(poses, self.rod.length, backward=segment.backward, off=max(_OFF, 3.0 * noise))
-            row[: own.size] = np.tile(path.travels, own.size // once.size)
-            self._ways[k] = np.append(0.0, np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T)))
+            once = poses[own[sweep[own] == sweep[own[0]]]]
+            if np.ptp(once[:, 2]) <= _SCATTER * noise:
+                once[:, 2] = once[:, 2].mean()
+            path = lines_through(once, self.rod.length, backward=segment.backward, off=max(_OFF, 3.0 * noise))
+            row[: own.size] = np.tile(path.travels, own.size // len(once))
+            self._ways[k] = np.append(0.0, np.cumsum(np.hypot(*np.diff(once[:, :2], axis=0).T)))
             drives.append(path.lines)
         lines = np.full((len(drives), max(map(len, drives)), LINE_COLUMNS), np.nan)
         for of_segment, drive in zip(lines, drives, strict=True):
