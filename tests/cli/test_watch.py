@@ -95,6 +95,7 @@ def test_it_follows_a_file_and_ends_with_the_answer_of_a_run(path, lines, follow
     assert "Have the particles moved enough?" in page.texts["h3"]
 
 
+@pytest.mark.slow
 def test_its_page_loads_itself_again_until_the_end(path, lines, follow):
     head, rows = lines
     pages = []
@@ -138,6 +139,7 @@ def test_each_update_is_a_line_for_programs(path, lines, follow):
     assert end["words"][0].startswith("All is well")
 
 
+@pytest.mark.slow
 def test_a_file_that_is_replaced_begins_again(path, lines, follow):
     head, rows = lines
     write(path, head, rows[:40])

@@ -147,6 +147,7 @@ def test_the_gauge_predicts_as_its_family():
     np.testing.assert_allclose(known.log_likelihood(points), expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_band_with_the_rig_lies_between_those_of_no_and_of_full_knowledge():
     x = np.linspace(-0.3, 0.3, 7)
     bands = [contour_band(found(which), x, 0.9) for which in ("truth", "rig", "default")]

@@ -61,6 +61,7 @@ def test_the_last_update_agrees_with_the_whole_record(streamed, whole):
     assert last.correlation < 0.2
 
 
+@pytest.mark.slow
 def test_the_evidence_agrees_with_bridge_sampling(streamed, whole):
     problem, found = whole
     expected = contour_evidence(problem.model, found, np.random.default_rng(3)).log_evidence[1]

@@ -45,6 +45,7 @@ def test_fewer_samples_add_less(measured, stream):
     assert np.all(more < few)
 
 
+@pytest.mark.slow
 def test_no_more_draws_are_taken_than_there_are(measured, stream):
     angles = measured.drive_angle[SO_FAR:44]
     every, more = (tb.rest_of_sweep(stream.posterior(), angles, X, seed=1, draws=count) for count in (500, 600))

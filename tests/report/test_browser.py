@@ -264,6 +264,7 @@ def test_no_text_of_a_record_runs_or_becomes_an_element(driver, tmp_path_factory
     assert state(page)["rod"] != before["rod"]
 
 
+@pytest.mark.slow
 def test_a_script_that_was_put_in_would_not_run(driver, path, tmp_path):
     """That the page's own policy holds, were an escape ever forgotten."""
     text = path.read_text(encoding="utf-8").replace("<main>", "<main><script>document.title = 'broken in'</script>", 1)
