@@ -31,6 +31,7 @@ from scipy import stats
 
 import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
+from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import Nuisances
@@ -205,9 +206,10 @@ def releases(found: xr.DataTree, name: str, rod: tb.Rod) -> list[str]:
     draws = found["posterior"].dataset.stack(every=("chain", "draw"))
     draws = draws.isel(every=slice(None, None, max(1, draws.sizes["every"] // 200)))
     inferred = [one for one in json.loads(found.attrs["nuisances"]) if not one.startswith("discrepancy")]
-    rig = Nuisances(tuple(inferred), {}, rod, 0.0).rig({one: draws[one].values for one in inferred})
+    nuisances = Nuisances(tuple(inferred), {}, rod, found.attrs["friction"])
+    rig = nuisances.rig({one: draws[one].values for one in inferred})
     record = record_of(name, rod, whole=True)
-    contours = tb.contours.Circle(draws.r.values, draws.q.values, draws.x_c.values)
+    contours = contours_of(draws, found.attrs["family"])
     ways = 1e3 * events_of(RecordLikelihood(record, SENSOR), contours, rig)["snap_off_travel"]
     words = []
     for number, predicted in zip(np.unique(record.sweep), ways.T, strict=True):

@@ -8,8 +8,8 @@ from helpers.comparisons import made_up
 from tactile_bayes.comparison.verdict import NONE_FITS, verdict_on
 from tactile_bayes.inference.misfit import what_to_try
 
-EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance", "rest_curvature", "taper", "stem"]
-EVERY += ["length"]
+OF_ROD = ["rest_curvature", "taper", "stem", "length"]
+EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance", *OF_ROD]
 
 
 def suggested(nuisances, **stated):

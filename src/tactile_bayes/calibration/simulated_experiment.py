@@ -116,7 +116,7 @@ class SimulatedExperiment:
         }
         if self.drives:
             entries["drives"] = json.dumps([_described(drive) for drive in self.drives])
-        if repr(world) != repr(Misspecification()):
+        if world != Misspecification():
             entries["world_truth"] = "of the simulated rig"
         entries["world_family"] = world.family or self.assumed.family
         entries |= {f"world_{name}": repr(getattr(world, name)) for name in NUMBERS}

@@ -57,12 +57,17 @@ class SweepFrame:
     def size(self) -> int:
         return int(self.base_x.size)
 
+    def length_at(self, index: Index) -> Parameter:
+        """Lengths of the rods of contours."""
+        return self.length[index] if isinstance(self.length, np.ndarray) else self.length
+
     def locate(self, index: Index, parameter: Floats) -> Locus:
         """Points in the sweep frame; `index` and `parameter` broadcast. The parameter is in the sweep frame too: it
         grows from left to right."""
         sign = np.where(self.mirrored[index], -1.0, 1.0)
         x, y, slope, arclength_rate, slope_rate = self.contour.take(index).locate(sign * parameter)
-        length, standoff = (v[index] if isinstance(v, np.ndarray) else v for v in (self.length, self.standoff))
+        length = self.length_at(index)
+        standoff = self.standoff[index] if isinstance(self.standoff, np.ndarray) else self.standoff
         if np.any(standoff):
             x = x + standoff * np.sin(slope)
             y = y - standoff * np.cos(slope)
@@ -105,5 +110,5 @@ class SweepFrame:
     def _parameter_at(self, index: Index, x: float) -> Floats:
         """Parameters at which the contour itself, without standoff, is at x in the sweep frame."""
         sign = np.where(self.mirrored[index], -1.0, 1.0)
-        length = self.length[index] if isinstance(self.length, np.ndarray) else self.length
-        return np.asarray(sign * self.contour.take(index).parameter_of_x(self.base_x[index] + sign * x * length))
+        from_base = sign * x * self.length_at(index)
+        return np.asarray(sign * self.contour.take(index).parameter_of_x(self.base_x[index] + from_base))

@@ -38,10 +38,10 @@ class FoundRig(NamedTuple):
     friction: float
     """Coulomb's coefficient."""
     suspension_compliance: float
+    """Compliance relative to the stated rod, as in `reconstruct`."""
     units: str
     """Units of the record that was measured. Where it is dimensionless and the rod's length was inferred, `record` is
     in lengths of the stated rod, and SI by name."""
-    """Compliance relative to the stated rod, as in `reconstruct`."""
 
     def contacts(self) -> xr.Dataset:
         """Return contact points from `reconstruct`, constrained if the noise is known, else raw."""

@@ -103,7 +103,7 @@ class Rig(NamedTuple):
     stem: Any = 0.0
     """Rigid piece between pivot and rod in addition to the stated one [L]."""
     length: Any = 1.0
-    """Length of the rod, which keeps its proportions (rest curvature times length, taper), over the stated one."""
+    """Length of the rod over the stated one; its rest curvature, and what is added to it, are then per that length."""
     base_shifts: Any = None
     """Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
     after the last given one are not shifted."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from tactile_bayes.inference.discrepancy import is_discrepancy
+from tactile_bayes.inference.nuisances import belongs
 
 __all__ = ["CHECK_RIG", "GAUGE", "is_inferred", "what_to_try"]
 
@@ -39,8 +39,7 @@ def is_inferred(suspect: str, nuisances: Collection[str]) -> bool:
     >>> is_inferred("gain", ["force_x_gain"]), is_inferred("lever", ["lever_x", "lever_y"]), is_inferred("drift", [])
     (True, True, False)
     """
-    of_rig = [name for name in nuisances if not is_discrepancy(name)]
-    return any(name == suspect or name.startswith(f"{suspect}_") or name.endswith(f"_{suspect}") for name in of_rig)
+    return any(belongs(name, suspect) for name in nuisances)
 
 
 def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, friction: float = 0.0) -> str:

@@ -27,7 +27,7 @@ from tactile_bayes.record import LOAD_CELL_UNITS, bases_of, carried_sweeps, pres
 if TYPE_CHECKING:
     from tactile_bayes.inference.rig_prior import RigPrior
 
-__all__ = ["BIAS", "BIASES", "CURVE", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
+__all__ = ["BIAS", "BIASES", "CURVE", "MAY_VANISH", "STANDARD", "Nuisances", "belongs", "nuisances_of"]
 
 STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
 """Default nuisance parameters, of which those that a record cannot identify are left out."""
@@ -236,6 +236,17 @@ class Nuisances:
         """Return the loads that the cell reads as the named zeros, shape (n, 3)."""
         read = [values[name] / self.units[name] if name in self.names else 0.0 for name in names]
         return np.linalg.solve(cell.gain_matrix, np.array(np.broadcast_arrays(*read))).T
+
+
+def belongs(name: str, group: str) -> bool:
+    """Return True for the name of a nuisance parameter, or of one of a group.
+
+    Examples
+    --------
+    >>> belongs("force_x_gain", "gain"), belongs("base_2_x", "base"), belongs("discrepancy_length", "length")
+    (True, True, False)
+    """
+    return name == group or name in _GROUPS.get(group, ()) or (group == "base" and bool(_BASE.fullmatch(name)))
 
 
 def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:

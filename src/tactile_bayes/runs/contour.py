@@ -298,21 +298,12 @@ class _Figures:
         found = {name: float(draw[name]) for name in json.loads(attrs["nuisances"]) if name in draw}
         if self.measured.attrs["units"] == "dimensionless":
             found.pop("length", None)  # a scan would be in lengths of that rod
-        rod = rod_with(rod_of(self.measured), found)
+        contour = contours_of(draw, attrs["family"]).take(np.array(0))
+        rod, friction = rod_with(rod_of(self.measured), found), float(draw.get("friction", attrs["friction"]))
         if carried_sweeps(self.measured):
-            return scan(
-                contours_of(draw, attrs["family"]).take(np.array(0)),
-                drive=recorded_drives(self.measured),
-                rod=rod,
-                friction=float(draw.get("friction", attrs["friction"])),
-            )
-        return scan(
-            contours_of(draw, attrs["family"]).take(np.array(0)),
-            direction="both" if len(self.directions) == 2 else self.directions[0],
-            base=self.base,
-            rod=rod,
-            friction=float(draw.get("friction", attrs["friction"])),
-        )
+            return scan(contour, drive=recorded_drives(self.measured), rod=rod, friction=friction)
+        direction = "both" if len(self.directions) == 2 else self.directions[0]
+        return scan(contour, direction=direction, base=self.base, rod=rod, friction=friction)
 
     def observables(self) -> Any:
         axes = panels(3, 1, 7.0, 5.4, sharex=True)

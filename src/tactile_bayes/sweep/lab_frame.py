@@ -43,7 +43,7 @@ def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: Rod
     """
     mirrored = sweep_frame.mirrored[index]
     sign = np.where(mirrored, -1.0, 1.0)
-    length = sweep_frame.length[index] if isinstance(sweep_frame.length, np.ndarray) else sweep_frame.length
+    length = sweep_frame.length_at(index)
     wrench = states.wrench
 
     def turned(angle: Floats) -> Floats:
