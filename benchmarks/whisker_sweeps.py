@@ -9,7 +9,7 @@ long: there it lets go of the smaller cylinder. Its rigidity is that of a wire o
 
     python -m benchmarks.whisker_sweeps [--stem] [--length] FOLDER [SWEEP ...]
 
-keeps the rig and every posterior in FOLDER, and goes on from there. SWEEP is like cylinder_may25/trial0, or
+keeps the rig, every posterior and its figure in FOLDER, and goes on from there. SWEEP is like cylinder_may25/trial0, or
 cylinder_may25, the sweeps of a session in one record, which have one hysteresis if they repeat each other. With --stem
 the piece before the first traced point is rigid, and its length inferred, with a prior of 4.1 ± 2 mm. With --length the
 length of the rod is inferred from the sweeps, with a prior of ± 1.5 mm. Where a table shows that the rod lets go, after
@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 from scipy import stats
 
 import tactile_bayes as tb
@@ -223,6 +224,36 @@ def releases(found: xr.DataTree, name: str, rod: tb.Rod) -> list[str]:
     return words
 
 
+def picture(posterior: xr.DataTree) -> Figure:
+    """Draw a sweep, and what it tells of the cylinder."""
+    draws = posterior["posterior"]
+    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
+    readings, plane, pairs = figure.subplots(1, 3)
+    x, y = (posterior["constant_data"][name].values for name in ("base_x", "base_y"))
+    way, predicted = 1e3 * np.hypot(x - x[0], y - y[0]), posterior["posterior_predictive"].holding_moment
+    low, high = predicted.quantile([0.025, 0.975], ("chain", "draw")).values
+    readings.fill_between(way, low, high, color="#0072B2", alpha=0.4, linewidth=0, label="predicted, 95 %")
+    readings.plot(way, posterior["observed_data"].holding_moment, color="black", linewidth=1.0, label="read")
+    readings.set(xlabel="way of the stage / mm", ylabel="reading / counts", ylim=(-100, None))
+    readings.legend(frameon=False, loc="lower right")
+
+    turn = np.linspace(0.0, 2.0 * np.pi, 200)
+    r, x_c, q, friction = (draws[name].values.ravel() for name in ("r", "x_c", "q", "friction"))
+    some = slice(None, None, r.size // 40)
+    for radius, middle, lowest in zip(r[some], x_c[some], q[some], strict=True):
+        circle = 1e3 * (middle + radius * np.cos(turn)), 1e3 * (lowest + radius + radius * np.sin(turn))
+        plane.plot(*circle, color="#0072B2", linewidth=0.6, alpha=0.4)
+    touched = tb.implied_contacts(posterior, draws=20)["posterior"]
+    at = (1e3 * touched[name].values.ravel() for name in ("contact_x", "contact_y"))
+    plane.plot(*at, ".", markersize=1.5, color="#D55E00", rasterized=True)
+    plane.set(xlabel="$x$ / mm", ylabel="$y$ / mm", aspect="equal")
+
+    pairs.plot(1e3 * r[:: r.size // 1500], friction[:: r.size // 1500], ".", markersize=1.5, color="#0072B2")
+    pairs.axvline(15.12, color="0.4", linewidth=1.0)
+    pairs.set(xlabel="radius / mm", ylabel="coefficient of friction", ylim=(0.0, None))
+    return figure
+
+
 def main() -> None:
     arguments = [argument for argument in sys.argv[1:] if argument not in ("--stem", "--length")]
     folder, names = Path(arguments[0]), arguments[1:] or SWEEPS
@@ -248,6 +279,7 @@ def main() -> None:
         if "length" in found["posterior"]:
             length = 1e3 * found["posterior"].length
             print(f"  length {float(length.mean()):.1f} ± {float(length.std()):.1f} mm of {1e3 * rod.length:.1f} mm")
+        picture(found).savefig(folder / f"{name.replace('/', '-')}.png", dpi=110, bbox_inches="tight")
         for words in releases(found, name, rod):
             print(f"  lets go at {words}")
 

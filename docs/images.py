@@ -1,11 +1,10 @@
-"""Draw the figures of the pages into docs/images, except that of the demonstration: `python docs/images.py [RUN]`.
+"""Draw the figures of the pages into docs/images, except that of the demonstration: `python docs/images.py`.
 
-RUN is a folder of `python -m benchmarks.whisker_sweeps RUN`; without it the figure of a real cylinder stays as it is.
+That of a real cylinder is one of `python -m benchmarks.whisker_sweeps FOLDER`.
 """
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import matplotlib as mpl
@@ -97,40 +96,7 @@ def whisker() -> Figure:
     return figure
 
 
-def cylinder(folder: Path) -> Figure:
-    """A sweep of a real whisker, and what it tells of a real cylinder."""
-    posterior = tb.read_result(folder / "cylinder_may25-trial0.nc")
-    draws = posterior["posterior"]
-    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
-    readings, plane, pairs = figure.subplots(1, 3)
-    x, y = (posterior["constant_data"][name].values for name in ("base_x", "base_y"))
-    way, predicted = 1e3 * np.hypot(x - x[0], y - y[0]), posterior["posterior_predictive"].holding_moment
-    low, high = predicted.quantile([0.025, 0.975], ("chain", "draw")).values
-    readings.fill_between(way, low, high, color="#0072B2", alpha=0.4, linewidth=0, label="predicted, 95 %")
-    readings.plot(way, posterior["observed_data"].holding_moment, color="black", linewidth=1.0, label="read")
-    readings.set(xlabel="way of the stage / mm", ylabel="reading / counts", ylim=(-100, None))
-    readings.legend(frameon=False, loc="lower right")
-
-    turn = np.linspace(0.0, 2.0 * np.pi, 200)
-    r, x_c, q, friction = (draws[name].values.ravel() for name in ("r", "x_c", "q", "friction"))
-    some = slice(None, None, r.size // 40)
-    for radius, middle, lowest in zip(r[some], x_c[some], q[some], strict=True):
-        circle = 1e3 * (middle + radius * np.cos(turn)), 1e3 * (lowest + radius + radius * np.sin(turn))
-        plane.plot(*circle, color="#0072B2", linewidth=0.6, alpha=0.4)
-    touched = tb.implied_contacts(posterior, draws=20)["posterior"]
-    at = (1e3 * touched[name].values.ravel() for name in ("contact_x", "contact_y"))
-    plane.plot(*at, ".", markersize=1.5, color="#D55E00", rasterized=True)
-    plane.set(xlabel="$x$ / mm", ylabel="$y$ / mm", aspect="equal")
-
-    pairs.plot(1e3 * r[:: r.size // 1500], friction[:: r.size // 1500], ".", markersize=1.5, color="#0072B2")
-    pairs.axvline(15.12, color="0.4", linewidth=1.0)
-    pairs.set(xlabel="radius / mm", ylabel="coefficient of friction", ylim=(0.0, None))
-    return figure
-
-
 if __name__ == "__main__":
     with mpl.rc_context({"font.size": 12.0}):
         for draw in (bases, contacts, whisker):
             draw().savefig(IMAGES / f"{draw.__name__}.png", dpi=140, bbox_inches="tight")
-        for folder in sys.argv[1:2]:
-            cylinder(Path(folder)).savefig(IMAGES / "cylinder.png", dpi=110, bbox_inches="tight")
