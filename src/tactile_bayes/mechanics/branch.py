@@ -19,13 +19,13 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.beam import free_end, from_tip, is_straight, loaded_part, rest_curvature, rubbed_otherwise
+from tactile_bayes.mechanics.beam import is_straight
+from tactile_bayes.mechanics.beginning import beginning
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
     DIP,
     LOST,
-    REST,
     Accuracy,
     Course,
     Curves,
@@ -43,8 +43,8 @@ from tactile_bayes.mechanics.equilibrium import (
     balance,
     dot,
     in_phase,
-    less,
     nowhere,
+    on_line,
     settle,
     settle_at,
     tangential_psi1,
@@ -52,10 +52,8 @@ from tactile_bayes.mechanics.equilibrium import (
 )
 from tactile_bayes.mechanics.leg import (
     NUDGE,
-    PLACE,
     Leg,
     LegCurves,
-    first_equilibrium,
     guess,
     leg_curves,
     leg_from,
@@ -63,9 +61,15 @@ from tactile_bayes.mechanics.leg import (
     settle_on,
     shortened,
 )
-from tactile_bayes.mechanics.limits import Approach, approach, arrival
-from tactile_bayes.mechanics.line import Line, line_of, only_turns, pose_at
-from tactile_bayes.mechanics.outline import Outline, Place, ends, from_base, is_inside, narrower, place
+from tactile_bayes.mechanics.leg_events import (
+    change_of_phase,
+    end_of_line,
+    first_knot,
+    polished_fold,
+    release,
+    share_of,
+)
+from tactile_bayes.mechanics.line import Line, only_turns
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability, SnapOff
 from tactile_bayes.mechanics.readings import (
     Asked,
@@ -78,24 +82,11 @@ from tactile_bayes.mechanics.readings import (
     write_loads,
     write_states,
 )
-from tactile_bayes.mechanics.series import (
-    change_of,
-    copy_rows,
-    crossing,
-    tail,
-    value,
-    weighted,
-)
+from tactile_bayes.mechanics.second_contact import second_contact
+from tactile_bayes.mechanics.series import change_of, copy_rows, tail, value
+from tactile_bayes.mechanics.slip import held
 
-__all__ = [
-    "MOST_CHANGES",
-    "BranchWorkspace",
-    "Ends",
-    "branch_workspace",
-    "follow_branch",
-    "on_line",
-    "with_friction",
-]
+__all__ = ["MOST_CHANGES", "BranchWorkspace", "Ends", "branch_workspace", "follow_branch"]
 
 MOST_CHANGES = 16
 """Largest number of phases of a branch that are recorded."""
@@ -139,6 +130,9 @@ _NO_MOMENT = 1e-7
 _ROUNDING = 1e-14
 """Tail of the series of a drive angle that its rounding leaves [rad]."""
 
+_LEAST_TRAVEL = 1e-12
+"""Travel of a path that rounding may leave of none."""
+
 _RESOLVED_LOADS = 1e-10
 """Error of loads that no tolerance is below, over the loads: rounding may leave it where the rod bears on its base."""
 
@@ -147,28 +141,13 @@ _TOUCHES_TWICE, _SLIPS_OFF = int(Reachability.TOUCHES_TWICE), int(Reachability.S
 _STICKS, _TOO_CLOSE, _CLEARANCE = int(Reachability.STICKS), int(Reachability.TOO_CLOSE), CLEARANCE
 _NEVER, _FOLD, _CORNER, _THRUST, _RELEASE = (int(kind) for kind in SnapOff)
 
-_BODY = 8
-"""Number of parts of the rod between which a second contact is looked for."""
-
-_SHORT_END = 1e-3
-"""Length of a free end [L] up to which its curvature at the contact tells whether it is in the object."""
-
 _ACROSS = 0.5 * math.pi
 
-_BY_Q, _BY_FORCE, _NO_FORCE = Equilibrium(0.0, 1.0, 0.0), Equilibrium(0.0, 0.0, 1.0), Equilibrium(0.0, 0.0, 0.0)
-
-_WEAK = 0.5
-"""Share of its force that a leg loses along its tangent for a release to be looked for on it."""
-
-_NOT_TURNED = 1e-3
-"""Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried."""
+_BY_Q = Equilibrium(0.0, 1.0, 0.0)
 
 _NO_LOAD = 1e-8
 """Force [EI/L²] at the end of a leg on which a release was found that is zero. There may be another state without force
 on the plane across its end."""
-
-_HELD = 1e-9
-"""Slip per length of a leg, in the sense of the friction, that rounding may cause."""
 
 
 class Ends(NamedTuple):
@@ -210,20 +189,6 @@ def branch_workspace(samples: int, order: int, knots: int, lines: int) -> Branch
 
 
 @compiled
-def _knot(leg: Leg, knots: Floats, low: float, work: LegCurves) -> tuple[float, float]:
-    """First knot or end of the contour that a leg passes, and about where; a position above 1 if it passes none."""
-    before, old = leg.begin.p, 0.0
-    for k in range(1, work.nodes.size):
-        after = work.at_nodes[PLACE, k]
-        for i in range(-1, knots.size):
-            knot = low if i < 0 else knots[i]
-            if (before - knot) * (after - knot) < 0.0 and abs(leg.begin.p - knot) > NUDGE:
-                return knot, old + (work.nodes[k] - old) * (before - knot) / (before - after)
-        before, old = after, work.nodes[k]
-    return math.nan, 2.0
-
-
-@compiled
 def _excess(accuracy: Accuracy, tolerance: Floats, dips: bool, work: LegCurves) -> float:
     """Estimated error of the drive angle, the loads or the states over the tolerated one."""
     curves = work.curves
@@ -239,48 +204,6 @@ def _excess(accuracy: Accuracy, tolerance: Floats, dips: bool, work: LegCurves) 
         for c in range(ANGLE):
             found = max(found, tail(curves.series[c]) / (accuracy.resolved * max(change_of(curves.series[c]), 1.0)))
     return found
-
-
-@compiled
-def _change(leg: Leg, psi1: float, accuracy: Accuracy, work: LegCurves) -> float:
-    """Position at which the phase changes; above 1 if it does not."""
-    curves, limit, sign = work.curves, 1.0, 1.0
-    if leg.tip:
-        limit, sign = psi1, -1.0
-    on, rest = curves.on, curves.series[REST]
-    weighted(on.on_grid, rest, curves.on_grid)
-    for cell in range(1, on.grid.size):
-        if sign * (curves.on_grid[cell] - limit) > 0.0:
-            weighted(on.slopes, rest, work.rest_slope)
-            left, right = on.grid[cell - 1], on.grid[cell]
-            if not leg.tip:
-                left, right = right, left
-            return crossing(rest, work.rest_slope, limit, left, right, 0.5 * (left + right), accuracy.last_step)
-    return 2.0
-
-
-@compiled
-def _polished_fold(loaded: Loaded, leg: Leg, stop: float, work: LegCurves) -> float:
-    """Position at which the exact derivative of the drive angle vanishes, by secants from the interpolant."""
-    curves = work.curves
-    weighted(curves.on.slopes, curves.series[ANGLE + 1], curves.bend)
-    bend = value(curves.bend, stop)
-    at_stop, last = settle_on(loaded, leg, stop, guess(work, stop), SETTLED).travel_rate, 2e-2
-    for _ in range(7):
-        step = at_stop / bend
-        if not abs(step) < 0.5 * last:
-            break
-        new = min(max(stop - step, 0.0), 1.0)
-        at_new = settle_on(loaded, leg, new, guess(work, new), SETTLED).travel_rate
-        bend = (at_new - at_stop) / (new - stop)
-        stop, at_stop, last = new, at_new, abs(step)
-    return stop
-
-
-@compiled
-def _share(leg: Leg, found: Balance) -> float:
-    """Position on a leg."""
-    return dot(leg.normal, less(found.at, leg.begin))
 
 
 @compiled
@@ -331,114 +254,6 @@ def _bent(stop: float, loaded: Loaded, curves: Curves) -> float:
     return largest_curvature(stop, loaded, curves)
 
 
-class _Arrived(NamedTuple):
-    """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
-
-    near: Approach
-    scene: Scene
-    line: int
-    seen: Outline
-
-
-@compiled
-def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
-    """Scene with another line of the drive."""
-    if lines is None:
-        return scene
-    return Scene(scene.outline, scene.beam, scene.rig, scene.exact, line_of(lines, k))
-
-
-@compiled
-def with_friction(scene: Scene, angle: float) -> Scene:
-    """Scene with friction that acts in the other sense."""
-    _, compliance, offset, sign, moment_unit, force_unit = scene.rig
-    rig = Rig(angle, compliance, offset, sign, moment_unit, force_unit)
-    return Scene(scene.outline, rubbed_otherwise(scene.beam), rig, scene.exact, scene.line)
-
-
-@compiled
-def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> _Arrived:
-    if lines is None:
-        return _Arrived(approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline)
-    near, k, travel = arrival(scene.outline, scene.beam, lines)
-    pose = pose_at(line_of(lines, k), travel)
-    return _Arrived(near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y))
-
-
-@compiled
-def _first_state(
-    scene: Scene, lines: Floats | None, seen: Outline, near: Approach
-) -> tuple[int, Scene, Loaded, Balance]:
-    """State at first contact, with the friction that it has: it opposes the slip of the rod along the contour."""
-    loaded = in_phase(scene, near.tip_first)
-    guessed = first_equilibrium(loaded, seen, near)
-    if lines is None:
-        return _TOUCHES, scene, loaded, balance(loaded, guessed)[0]
-    begin = settle(loaded, guessed, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
-    if not loaded.tip and begin.at.q > 1.0:  # the approach is not exact
-        near = Approach(near.reach, near.distance, near.begin, True, near.low)
-        loaded = in_phase(scene, True)
-        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
-    delta = scene.rig.friction_angle
-    if delta > 0.0 and not only_turns(scene.line) and _slip(loaded, begin) > 0.0:
-        scene = with_friction(scene, -delta)
-        loaded = in_phase(scene, loaded.tip)
-        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
-        if not _slip(loaded, begin) > 0.0:
-            return _STICKS, scene, loaded, begin
-    pushed = begin.travel_rate * begin.tangent.force > 0.0
-    return _TOUCHES if pushed else _SLIPS_OFF, scene, loaded, begin
-
-
-@compiled
-def _slip(loaded: Loaded, found: Balance) -> float:
-    """Slip of the rod along the contour, to greater parameters, per travel."""
-    spot = narrower(loaded.outline, place(loaded.outline, found.at.p), 1.0 if loaded.tip else found.at.q)
-    slip = spot.speed * found.tangent.p - (0.0 if loaded.tip else found.tangent.q)
-    return slip / found.travel_rate
-
-
-@compiled
-def _sticks(loaded: Loaded, stop: float, work: LegCurves) -> float:
-    """Contact up to a position on a leg where the rod does not slip against its friction; NaN if there is none."""
-    half = work.nodes.size
-    for k in range(half):
-        if loaded.friction_angle == 0.0 or (k > 0 and work.nodes[k] > stop):
-            break
-        p = work.at_nodes[PLACE, k]
-        spot = narrower(loaded.outline, place(loaded.outline, p), 1.0 if loaded.tip else work.at_nodes[REST, k])
-        along_rod = 0.0 if loaded.tip else work.at_nodes[REST, half + k]
-        slip = spot.speed * work.at_nodes[PLACE, half + k] - along_rod
-        if math.copysign(slip, slip * loaded.friction_angle) > _HELD:
-            return p
-    return math.nan
-
-
-@compiled
-def _released(loaded: Loaded, leg: Leg) -> float:
-    """Share of a leg at which the force vanishes; NaN if it hardly falls, or if that is not on the leg."""
-    if not leg.along.force < -_WEAK * leg.begin.force:
-        return math.nan
-    share = -leg.begin.force / leg.along.force
-    begin, along = leg.begin, leg.along
-    start = Equilibrium(begin.p + share * along.p, begin.q + share * along.q, 0.0)
-    found = settle(loaded, start, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
-    share = _share(leg, found)
-    return share if 0.0 < share <= 1.0 else math.nan
-
-
-@compiled
-def _over(line: Line | None, last: float, accuracy: Accuracy, work: LegCurves) -> float:
-    """Position on a leg, up to a last one, at which the line of the drive ends; above 1 if it does not."""
-    if line is None:
-        return 2.0
-    series, end = work.curves.series, line.end
-    if value(series[ANGLE], last) < end:
-        return 2.0
-    weighted(work.curves.on.slopes, series[ANGLE], series[ANGLE + 1])
-    return crossing(series[ANGLE], series[ANGLE + 1], end, last, 0.0, 0.5 * last, accuracy.last_step)
-
-
 @compiled
 def _ending(line: Line | None, found: Balance) -> Balance:
     """Equilibrium at the end of a line, to which it was found with rounding errors."""
@@ -482,17 +297,13 @@ def follow_branch(
     """
     work = workspace.leg
     curves = work.curves
-    near, scene, line, seen = _arrive(scene, lines, accuracy.first_step)
-    if near.reach != _TOUCHES:
-        return _nothing(near.reach, near.distance, math.nan)
-    reach, scene, loaded, begin = _first_state(scene, lines, seen, near)
+    start = beginning(scene, lines, accuracy.first_step)
+    near, scene, line, seen, loaded, begin = start.near, start.scene, start.line, start.seen, start.loaded, start.state
     z, rig = begin.at, scene.rig
-    if reach != _TOUCHES:
-        return _nothing(reach, near.distance, z.p)
+    if start.reach != _TOUCHES:
+        return _nothing(start.reach, near.distance, z.p)
     low, psi1, first = near.low, tangential_psi1(scene), begin.travel
     onward_from, nothing = Equilibrium(0.0, 0.0, 1.0), nowhere()
-    if loaded.tip and z.q < psi1 - (0.0 if lines is None else _NOT_TURNED):
-        return _nothing(_TOUCHES_TWICE, near.distance, z.p)
     grazes = _SLIPS_OFF if loaded.tip and z.q > _ACROSS else _GRAZES
     behind_begin, length, known = nothing, _FIRST, 0.0
     settled, power = max(SETTLED, 0.1 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
@@ -509,17 +320,17 @@ def follow_branch(
         if known == 0.0 and scene.beam.varied is not None:
             share = _share_in_phase(leg, psi1)
             leg, length = shortened(leg, share), share * length
-        share = _released(loaded, leg) if may_release else math.nan
+        share = release(loaded, leg) if may_release else math.nan
         released = share <= 1.0
         if released:
             leg, length, known = shortened(leg, share), share * length, share * known
         sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, known, settled, work)
         known, knot, at_knot = 0.0, math.nan, begin
         if sound:
-            knot, node = _knot(leg, knots, low, work)
+            knot, node = first_knot(leg, knots, low, work)
             if node <= 1.0:  # rates at the end are those before the knot
                 at_knot = settle_at(loaded, knot, guess(work, node))
-                share = _share(leg, at_knot) * (1.0 - NUDGE)
+                share = share_of(leg, at_knot) * (1.0 - NUDGE)
                 if not share > 0.0:
                     length *= _LEAST_PACE
                     continue
@@ -535,10 +346,10 @@ def follow_branch(
         if not (excess <= _ACCEPT or noisy) and length > (shortest if sound else _SHORTEST):
             share = min(pace, _BACK)
             if sound and not leg.tip and scene.beam.varied is not None:  # such rods are not smooth at their tip
-                change = _change(leg, psi1, accuracy, work)
+                change = change_of_phase(leg, psi1, accuracy, work)
                 if change < _BACK:
                     at_tip = settle(loaded, guess(work, change), Equilibrium(0.0, 1.0, 0.0), _BY_Q, 0.0, SETTLED)
-                    change = _share(leg, at_tip) + _PAST_TIP
+                    change = share_of(leg, at_tip) + _PAST_TIP
                     share = change if _PAST_TIP < change < _BACK else share
             length *= share
             known = share if sound else 0.0
@@ -546,26 +357,26 @@ def follow_branch(
         if not sound:
             break
         excess_before = math.inf
-        change, at_change = _change(leg, psi1, accuracy, work), begin
+        change, at_change = change_of_phase(leg, psi1, accuracy, work), begin
         if change <= 1.0:
             limit = Equilibrium(0.0, psi1 if leg.tip else 1.0, 0.0)
             at_change = settle(loaded, guess(work, change), limit, _BY_Q, 0.0, SETTLED)
-            change = min(max(_share(leg, at_change), 0.0), 1.0)
+            change = min(max(share_of(leg, at_change), 0.0), 1.0)
         last, behind, twice, stuck, over, at_over = min(change, 1.0), -1.0, math.nan, math.nan, 2.0, begin
         stop, goes_on = 2.0, math.isfinite(behind_begin.at.p)
         if fate == _NEVER:
             stop = first_fall(accuracy, is_first, curves)
-            over = _over(scene.line, min(stop, last), accuracy, work)
+            over = end_of_line(scene.line, min(stop, last), accuracy, work)
             if over <= 1.0:
                 at_over = _ending(scene.line, settle_on(loaded, leg, over, guess(work, over), SETTLED))
                 stop, last, change = 2.0, over, 2.0
             if stop == 0.0:
-                twice = _second_contact(scene, seen, leg, goes_on, stop, work)
+                twice = second_contact(scene, seen, leg, goes_on, stop, work)
                 fate, behind = _THRUST if abs(begin.holding_moment) <= _NO_MOMENT else _CORNER, 0.0
             else:
                 folds, stop = stop <= last, min(stop, last)
                 if folds and scene.exact:
-                    stop = _polished_fold(loaded, leg, stop, work)
+                    stop = polished_fold(loaded, leg, stop, work)
                 until = end if math.isnan(knot) else at_knot
                 if change <= 1.0:
                     until = at_change
@@ -573,7 +384,7 @@ def follow_branch(
                     until = at_over
                 if folds:
                     until = settle_on(loaded, leg, stop, guess(work, stop), SETTLED)
-                twice = _second_contact(scene, seen, leg, goes_on, stop, work)
+                twice = second_contact(scene, seen, leg, goes_on, stop, work)
                 last_at, last_tip, steadiness = until.at, leg.tip, 0.0
                 if folds:
                     fate = _THRUST if abs(until.holding_moment) <= _NO_MOMENT else _FOLD
@@ -582,7 +393,7 @@ def follow_branch(
                     steadiness = min(max(rate * stop / (until.travel - begin_angle), 0.0), 1.0)
                     if released and end.at.force < _NO_LOAD and change > 1.0 and over > 1.0:
                         fate = _RELEASE
-                stuck = math.nan if only_turns(loaded.line) else _sticks(loaded, stop, work)
+                stuck = math.nan if only_turns(loaded.line) else held(loaded, stop, work)
                 if not leg.tip and lines is not None and until.at.q < _CLEARANCE:
                     return _nothing(_TOO_CLOSE, near.distance, until.at.p)
                 if wants_states:
@@ -646,7 +457,7 @@ def follow_branch(
             break
     if fate == _NEVER and not is_over:
         return _nothing(_RUNS_OUT if runs_out else grazes, near.distance, math.nan)
-    if not begin_angle > first:
+    if not begin_angle - first > _LEAST_TRAVEL:
         return _nothing(grazes, near.distance, math.nan)
     if wants_states:
         _note_event(last_at, last_tip, line, rig, found.changes[changes])
@@ -670,66 +481,6 @@ def follow_branch(
 @compiled
 def _note_event(at: Equilibrium, tip: bool, line: int, rig: Rig, out: Floats) -> None:
     out[0], out[1], out[2], out[3], out[4], out[5] = at.p, at.q, at.force, tip, line, rig.friction_angle
-
-
-@compiled
-def _second_contact(scene: Scene, seen: Outline, leg: Leg, goes_on: bool, stop: float, work: LegCurves) -> float:
-    """Contact up to a position on a leg at which a rod curved toward the object would touch it twice; NaN without one.
-
-    Unless the branch is exact, it is wholly looked for at the beginning and the end only.
-    """
-    if scene.beam.most_curvature <= 0.0:
-        return math.nan
-    low, high = ends(seen)
-    for k in range(1 if goes_on else 0, work.nodes.size):  # a leg that goes on begins where the last one was checked
-        if k > 0 and work.nodes[k] > stop:
-            break
-        p, q = work.at_nodes[PLACE, k], work.at_nodes[REST, k]
-        force = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k])
-        if _touches_twice(scene, leg.tip, Equilibrium(p, q, force), scene.exact or k == 0, low, high):
-            return p
-    at = guess(work, stop)
-    return at.p if _touches_twice(scene, leg.tip, at, True, low, high) else math.nan
-
-
-@compiled
-def _touches_twice(scene: Scene, tip: bool, at: Equilibrium, wholly: bool, low: float, high: float) -> bool:
-    """Whether a rod touches the object at another point too, between the ends of the contour.
-
-    In tangential contact the free end goes on in its rest shape. It is in the object at once where the contour is less
-    curved than the rod, or further on, at its tip, which is looked for if all is. In tip contact it may be the loaded
-    part.
-    """
-    outline, beam, q = scene.outline, scene.beam, at.q
-    spot = narrower(outline, place(outline, at.p), 1.0 if tip else q)
-    if not tip and spot.bend <= rest_curvature(beam, q) * spot.speed:
-        return True
-    if not wholly:
-        return False
-    if tip:
-        turned = q - tangential_psi1(scene)
-        if 0.5 * beam.most_curvature <= turned <= _ACROSS:  # the rod is bent toward the object no more than at rest
-            return False
-        part, (cos, sin) = from_tip(beam, q), _along(spot, scene.rig.friction_angle)
-        for j in range(1, _BODY):
-            part = loaded_part(beam, q, at.force, j / _BODY, part)
-            u, v = part.state.u, part.state.v
-            x, y = -u * cos + v * sin, -u * sin - v * cos
-            if y * spot.cos > x * spot.sin and is_inside(outline, 1.0 - j / _BODY, spot.x + x, spot.y + y, low, high):
-                return True
-    elif q < 1.0 - _SHORT_END:
-        along, across = free_end(beam, q)
-        cos, sin = _along(spot, outline.half_angle)
-        x, y = along * cos - across * sin, along * sin + across * cos
-        return is_inside(outline, 1.0, spot.x + x, spot.y + y, low, high)
-    return False
-
-
-@compiled
-def _along(spot: Place, turn: float) -> tuple[float, float]:
-    """Direction turned from that of the contour."""
-    cos, sin = math.cos(turn), math.sin(turn)
-    return spot.cos * cos - spot.sin * sin, spot.sin * cos + spot.cos * sin
 
 
 @compiled

@@ -20,9 +20,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from tactile_bayes.mechanics.beam import Beam, beam_pose
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.beam import Beam, beam_pose, rubbed_otherwise
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.line import Line, components, off_line
+from tactile_bayes.mechanics.line import Line, components, line_of, off_line
 from tactile_bayes.mechanics.outline import Outline, Place, narrower, place
 from tactile_bayes.mechanics.pose import Pose
 
@@ -38,10 +39,12 @@ __all__ = [
     "in_phase",
     "less",
     "nowhere",
+    "on_line",
     "settle",
     "settle_at",
     "tangential_psi1",
     "times",
+    "with_friction",
 ]
 
 _MOST_STEPS = 25
@@ -150,6 +153,22 @@ def in_phase(scene: Scene, tip: bool) -> Loaded:
 def tangential_psi1(scene: Scene) -> float:
     """ψ1 of a rod that lies along the contour with its surface [rad]."""
     return scene.outline.half_angle - scene.rig.friction_angle
+
+
+@compiled
+def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
+    """Scene with another line of the drive."""
+    if lines is None:
+        return scene
+    return Scene(scene.outline, scene.beam, scene.rig, scene.exact, line_of(lines, k))
+
+
+@compiled
+def with_friction(scene: Scene, angle: float) -> Scene:
+    """Scene with friction that acts in the other sense."""
+    _, compliance, offset, sign, moment_unit, force_unit = scene.rig
+    rig = Rig(angle, compliance, offset, sign, moment_unit, force_unit)
+    return Scene(scene.outline, rubbed_otherwise(scene.beam), rig, scene.exact, scene.line)
 
 
 @compiled

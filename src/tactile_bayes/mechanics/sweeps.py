@@ -17,12 +17,10 @@ from tactile_bayes.mechanics.branch import (
     Ends,
     branch_workspace,
     follow_branch,
-    on_line,
-    with_friction,
 )
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.curves import Accuracy
-from tactile_bayes.mechanics.equilibrium import Equilibrium, Rig, Scene, balance, in_phase
+from tactile_bayes.mechanics.equilibrium import Equilibrium, Rig, Scene, balance, in_phase, on_line, with_friction
 from tactile_bayes.mechanics.forward_table import NO_TABLES, Tables, prepare
 from tactile_bayes.mechanics.limits import clear_angle, is_clear
 from tactile_bayes.mechanics.line import NO_LINE, Line, line_at, line_of, pose_at
