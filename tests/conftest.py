@@ -6,13 +6,16 @@ import re
 import signal
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import typer.testing
 from hypothesis import settings
 
 from helpers.contour_posteriors import QUICK
+from tactile_bayes.contours import Circle
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
-from tactile_bayes.sweep import scan
+from tactile_bayes.sweep import Translation, scan
 
 os.environ["MPLBACKEND"] = "Agg"  # figures need no screen
 
@@ -23,6 +26,24 @@ def pytest_configure(config):
     """Fewer examples of everything, the same each time, but where all tests or the slow ones are asked for."""
     if config.getoption("markexpr") == "not slow":
         settings.load_profile("few")
+
+
+CARRIED = Translation(base=(0.9, 0.0), heading=np.pi, drive_angle=1.5, travel=1.8)
+FORWARD_MODELS = (
+    {"rod": Rod(taper=0.5), "drive": [CARRIED]},
+    {"drive": [CARRIED]},
+    {"direction": "forward"},
+    {"rod": Rod(taper=0.5), "direction": "forward"},
+)
+"""Arguments of sweeps for which numba compiles different functions, a quarter of a minute each."""
+
+
+def pytest_sessionstart(session):
+    """Of processes that share the tests, each compiles others of the forward models, which are cached on disk."""
+    worker = getattr(session.config, "workerinput", None)
+    if worker is not None and worker["workercount"] > 1:
+        for arguments in FORWARD_MODELS[int(worker["workerid"][2:]) :: worker["workercount"]]:
+            scan(Circle(0.1, 0.6, 0.1), **arguments)
 
 
 SAMPLING = re.compile(

@@ -77,6 +77,7 @@ def test_bands_are_compared_and_errors_are_outcomes(monkeypatch, tmp_path):
     assert band_by_assumption(posterior(), experiment, x, seed=1, out=tmp_path, workers=1).equals(found)
 
 
+@pytest.mark.slow
 def test_an_alternative_without_a_posterior_is_named(monkeypatch):
     from tactile_bayes.errors import InferenceError
 

@@ -17,6 +17,7 @@ def test_the_joint_density_has_the_prior_once_and_both_likelihoods():
     assert joint.log_probability(points) == pytest.approx(2.0 * model.log_probability(points) - prior)
 
 
+@pytest.mark.slow
 def test_replicates_are_kept_and_resume(tmp_path):
     experiment = experiment_of(posterior())
     two, three = (

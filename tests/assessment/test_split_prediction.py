@@ -21,6 +21,7 @@ def test_parts_of_a_record_of_the_model_agree():
     assert (np.abs(found["moves"].values[:-1]) < 4.0).all()
 
 
+@pytest.mark.slow
 def test_friction_shows_as_a_disagreement_of_early_and_late_contacts():
     record = CELL.measure(swept(Parabola(0.5, 0.5), friction=0.007), seed=3)
     found = found_of(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND))

@@ -30,6 +30,7 @@ def test_a_record_of_the_model_holds_and_says_so():
     assert found["lower"].equals(band["lower"].drop_attrs(deep=False)) or np.allclose(found["lower"], band["lower"])
 
 
+@pytest.mark.slow
 def test_a_wrong_family_is_not_to_be_relied_on():
     record = CELL.measure(swept(tb.contours.paper_profile("III", q=0.5)), seed=2)
     found = trust(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND), replicates=0, assumptions=False)
@@ -50,6 +51,7 @@ def test_a_narrow_prior_of_the_vertex_sets_the_gap():
     assert said.startswith("The band of probability 0.95 holds beside the gap")
 
 
+@pytest.mark.slow
 def test_replicates_give_ranks_coverage_and_factors():
     found = trust(posterior(), replicates=2, assumptions=False, workers=1)
     assert found.attrs["calibration"] == "too few"
@@ -84,6 +86,7 @@ def test_a_band_is_corrected_about_its_median_where_it_is_too_narrow():
     assert _corrected(found.assign(corrected=("region", [0, 0])), x) == {}
 
 
+@pytest.mark.slow
 def test_a_run_and_its_file_are_taken_and_other_things_refused(tmp_path):
     write_result(posterior(), tmp_path / "posterior.nc")
     assert trust(tmp_path, replicates=0, assumptions=False).equals(right())

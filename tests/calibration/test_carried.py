@@ -14,6 +14,7 @@ DRIVE = [tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6), tb.Motion([-0.8, 0.8], 0.0
 OPTIONS = {"family": "circle", "seed": 1, "drive": DRIVE, "priors": PRIORS, "nuisances": []}
 
 
+@pytest.mark.slow
 def test_a_replicate_is_scored_by_the_travel_of_its_end():
     replicate = tb.calibration_replicate(0, **OPTIONS)
     assert replicate.outcome.message.startswith("converged")

@@ -86,15 +86,8 @@ def most(sets):
     return stats.binom.isf(1e-4, sets, FALSE_ALARM)
 
 
-@pytest.mark.parametrize(
-    ("sets", "count"),
-    [
-        pytest.param(40, 100, marks=pytest.mark.slow),
-        pytest.param(200, 100, marks=pytest.mark.slow),
-        (30, 20),
-        pytest.param(300, 20, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("sets", "count"), [(40, 100), (200, 100), (300, 20)])
 def test_false_alarms_are_as_rare_as_stated(sets, count):
     """Over sets of right replicates; this test's own false alarm is 1e-4."""
     assert false_verdicts(sets, count) <= most(sets)
@@ -224,6 +217,7 @@ def test_a_fault_stands_however_many_are_lost():
     )
 
 
+@pytest.mark.slow
 def test_few_lost_ones_can_tip_the_scales():
     """Where a band holds five times more often than is a fault, and then ten of those are lost."""
     level = FALSE_ALARM / (len(NAMES) + 1)

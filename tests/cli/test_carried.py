@@ -80,6 +80,7 @@ def test_drives_that_contradict_each_other_are_refused(tmp_path, options, words)
     assert_refused(call("scan", *CIRCLE, *options, "--out", tmp_path / "scan.csv"), words)
 
 
+@pytest.mark.slow
 def test_an_inspection_and_contacts_of_a_carried_rod(carried, tmp_path):
     measured, _ = carried
     inspected = call("inspect", measured, "--out", tmp_path / "inspection")

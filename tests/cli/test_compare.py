@@ -91,6 +91,7 @@ def test_what_is_written_is_read_back(comparison, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == FILES
 
 
+@pytest.mark.slow
 def test_all_shapes_are_compared_unless_some_are_named(instead, record, tmp_path):
     asked = instead(made_up([0.3, 0.7]))
     call("compare", record, "--out", tmp_path)

@@ -6,6 +6,8 @@ import re
 import sys
 from contextlib import contextmanager, nullcontext, suppress
 
+import pytest
+
 from helpers import commands
 from helpers.report_pages import analysed_quickly, coarse_record
 from tactile_bayes.cli.task_bar import step_bar
@@ -50,6 +52,7 @@ def test_it_is_silent_where_it_is_told_to_be_and_where_nobody_looks(monkeypatch,
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_a_report_shows_its_steps(tmp_path, monkeypatch):
     analysed_quickly(coarse_record(), tmp_path, nuisances=[])
     steps = _steps_shown(monkeypatch, "report", ["report", str(tmp_path)])

@@ -152,6 +152,7 @@ def test_a_file_that_is_replaced_begins_again(path, lines, follow):
     assert end["samples_taken"] == 25
 
 
+@pytest.mark.slow
 def test_the_same_command_goes_on_with_the_same_numbers(path, lines, follow):
     head, rows = lines
     write(path, head, rows[:30])
@@ -205,6 +206,7 @@ def test_of_a_long_record_every_other_sample_is_taken(path, lines, follow):
     assert (whole["samples"], whole["every"]) == (len(rows), 1)
 
 
+@pytest.mark.slow
 def test_samples_of_a_load_cell_that_drifts_are_all_taken(record, tmp_path):
     """The steps of its drift are those from one sample to the next; of another cell every other sample is taken."""
     measured = read_record(record)
@@ -228,6 +230,7 @@ def test_samples_that_do_not_go_on_in_order_are_taken_anew(path, lines, follow):
     assert "do not go on in order" in two["warnings"][0]
 
 
+@pytest.mark.slow
 def test_it_ends_when_the_band_is_narrow(path, lines, follow):
     head, rows = lines
     write(path, head, rows[:20])
@@ -239,6 +242,7 @@ def test_it_ends_when_the_band_is_narrow(path, lines, follow):
     assert end["reason"] == "the band is narrow enough"
 
 
+@pytest.mark.slow
 def test_of_several_families_the_probabilities_are_told(path, lines, follow):
     head, rows = lines
     write(path, head, rows[:60])
@@ -322,6 +326,7 @@ def test_a_file_without_samples_is_said_to_have_none(path, lines, follow):
     commands.assert_refused(follow(), "there is no column 'sweep'")
 
 
+@pytest.mark.slow
 def test_a_rig_that_writes_100_rows_a_second(path, lines, monkeypatch):
     """In real time, with lines that are half written at any moment."""
     head, rows = lines

@@ -26,6 +26,7 @@ def compared(circle):
     )
 
 
+@pytest.mark.slow
 def test_the_simpler_of_two_shapes_that_fit_is_more_probable(compared):
     """An ellipse can be a circle, and is then one of many that it could have been."""
     probability = compared.probability.sel(family=["circle", "ellipse"]).values
@@ -40,6 +41,7 @@ def test_the_simpler_of_two_shapes_that_fit_is_more_probable(compared):
     assert (compared.log_evidence_error < 0.2).all()
 
 
+@pytest.mark.slow
 def test_a_band_can_be_averaged_over_families(compared):
     band = contour_band(compared, [-0.2, 0.0, 0.2], 0.9)
     assert band.attrs["averaged_by"] == "evidence"

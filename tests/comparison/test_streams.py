@@ -34,6 +34,7 @@ def compared(measured):
     return streams, fed(streams, measured, 3)
 
 
+@pytest.mark.slow
 def test_each_family_is_a_stream_of_its_own(compared, measured):
     alone = tb.Stream(family="ellipse", priors=matched_priors("ellipse", 1.0), **OPTIONS)
     for now, own in zip(compared[1], fed(alone, measured, 3), strict=True):
@@ -57,6 +58,7 @@ def test_the_last_evidences_agree_with_those_of_the_whole_record(measured):
     assert now.attrs["most_probable"] == whole.attrs["most_probable"] == "circle"
 
 
+@pytest.mark.slow
 def test_a_family_far_behind_is_given_up(compared):
     now = compared[1][-1]
     assert set(json.loads(now.attrs["lost"])) == {"parabola"}
@@ -75,6 +77,7 @@ def test_heights_are_averaged_over_families(compared):
     assert bool(now.may_stop)
 
 
+@pytest.mark.slow
 def test_resumed_streams_go_on_with_the_same_numbers(measured, tmp_path):
     first, block = measured.isel(sample=slice(0, 10)), measured.isel(sample=slice(10, 14))
     options = OPTIONS | {"particles": 100}

@@ -13,7 +13,11 @@ from tactile_bayes.sweep import scan
 
 STEP = 0.05
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
-RECORD = CELL.measure(scan(paper_profile("II", q=0.5), drive_step=STEP).record, seed=1)
+
+
+@pytest.fixture(scope="module")
+def record():
+    return CELL.measure(scan(paper_profile("II", q=0.5), drive_step=STEP).record, seed=1)
 
 
 @pytest.mark.parametrize(
@@ -26,12 +30,12 @@ def test_a_right_record_is_not_suspected(contour, direction):
     assert check_units_and_signs(in_frame(CELL.measure(record, seed=1), "turning")) == ()
 
 
-def test_what_is_unloaded_or_missing_is_not_suspected(measured):
+def test_what_is_unloaded_or_missing_is_not_suspected(measured, record):
     assert check_units_and_signs(measured, LOAD_CELL) == ()
-    alone = RECORD.copy(deep=True)
+    alone = record.copy(deep=True)
     alone["force_x"][:] = alone["force_y"][:] = np.nan
     assert check_units_and_signs(alone) == ()
-    nothing = RECORD.assign({name: 0.0 * RECORD[name] for name in ("holding_moment", "force_x", "force_y")})
+    nothing = record.assign({name: 0.0 * record[name] for name in ("holding_moment", "force_x", "force_y")})
     assert check_units_and_signs(nothing) == ()
 
 
@@ -47,8 +51,8 @@ def test_what_is_unloaded_or_missing_is_not_suspected(measured):
         ({"holding_moment": -1.0}, "The holding moment has the sign of contacts on the other side in every sweep"),
     ],
 )
-def test_wrong_units_and_signs_are_suspected(factors, words):
-    found = check_units_and_signs(RECORD.assign({name: factor * RECORD[name] for name, factor in factors.items()}))
+def test_wrong_units_and_signs_are_suspected(factors, words, record):
+    found = check_units_and_signs(record.assign({name: factor * record[name] for name, factor in factors.items()}))
     assert len(found) == 1
     assert words in found[0]
 

@@ -427,7 +427,11 @@ def test_a_prior_that_ends_before_what_the_record_wants_is_named():
     assert float(found["posterior"].q.mean()) == pytest.approx(TRUTH["q"] - deviation, abs=3.0 * deviation)
 
 
-@pytest.mark.parametrize("cell", [CELL, replace(CELL, drive_angle_noise=0.01)], ids=["plain", "encoder"])
+@pytest.mark.parametrize(
+    "cell",
+    [CELL, pytest.param(replace(CELL, drive_angle_noise=0.01), marks=pytest.mark.slow)],
+    ids=["plain", "encoder"],
+)
 def test_blocks_of_points_make_no_difference(cell, monkeypatch):
     """To the log-probability, and to all that is predicted: readings, densities, events."""
     draw = {"load_cell": cell, "seed": 1, "settings": replace(BRIEF, max_steps=2, block_steps=2)}
@@ -449,6 +453,7 @@ def test_blocks_of_points_make_no_difference(cell, monkeypatch):
                 np.testing.assert_allclose(parts[name][variable], values, rtol=1e-9, atol=1e-12, err_msg=variable)
 
 
+@pytest.mark.slow
 def test_of_a_long_record_fewer_predictions_are_stored(monkeypatch):
     """As few as the check of the record can do with, and the group says so; events are of as many draws as ever."""
     samples = measured().sizes["sample"]
@@ -485,7 +490,9 @@ class Clock:
 
 
 @pytest.mark.parametrize("family", ["parabola", pytest.param("shape-free", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("seconds", [0.5, 3.5, 8.5])
+@pytest.mark.parametrize(
+    "seconds", [pytest.param(0.5, marks=pytest.mark.slow), 3.5, pytest.param(8.5, marks=pytest.mark.slow)]
+)
 def test_the_time_bounds_the_search_too(family, seconds, monkeypatch):
     """Past it, only the step that is under way ends, a cloud is found, and walkers start and make one step."""
     clock, drawn = Clock(monkeypatch), []

@@ -36,6 +36,7 @@ def test_a_run_that_goes_on_gives_the_draws_of_one_that_was_not_stopped(tmp_path
             np.testing.assert_array_equal(rest[group][name].values, values.values)
 
 
+@pytest.mark.slow
 def test_a_run_out_of_time_goes_on_from_the_same_start(tmp_path):
     """However little time there is, the search for it is not cut short."""
     for steps in (1, 2, 3):

@@ -38,6 +38,7 @@ def test_contact_of_a_few_samples_brackets_its_events(brief):
     assert np.all(brackets.missed(events) == 0.0)
 
 
+@pytest.mark.slow
 def test_searches_find_what_explains_contact_of_a_few_samples(brief):
     _, model = brief
     usual = {"rigidity_scale": 1.0, "noise_scale": 1.0}

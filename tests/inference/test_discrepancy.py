@@ -180,6 +180,7 @@ def test_a_good_record_suggests_nothing():
     assert check_record(infer_contour(measured(), nuisances=(), seed=1, settings=MODEST)).attrs["suggestion"] == ""
 
 
+@pytest.mark.slow
 def test_simulated_readings_have_the_density_of_the_likelihood():
     """The mean of minus twice the quadratic form is the number of readings: 5 standard errors of 40 records."""
     priors = {name: stats.norm(value, 1e-12) for name, value in (("a", 0.5), ("q", 0.5), ("x_c", 0.0))}

@@ -161,6 +161,7 @@ def test_the_taper_of_a_rig_is_that_of_the_rod_in_addition(rod):
         assert with_rig.log_likelihood(contours).max() < expected.max() - 10.0
 
 
+@pytest.mark.slow
 def test_rods_that_vary_cost_no_accuracy_where_all_of_the_rig_is_inferred():
     """Draws of taper, rest curvature and friction in the ranges of the table and beyond them, as without a table."""
     cell, friction = RIGS["curved by a function"][3], RIGS["curved by a function"][5]

@@ -491,6 +491,7 @@ def test_half_a_millimetre_and_a_fifth_of_a_degree_mislead_where_they_are_not_in
     assert off(blind, TRUTH) > 4.5 or check_record(blind).overall_p_value < 0.01
 
 
+@pytest.mark.slow
 def test_what_is_standard_is_inferred_and_has_units():
     unit = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
     measured = unit.measure(scan(Parabola(5.0, 0.05), rod=SI, drive_step=0.1).record, seed=1)
@@ -515,6 +516,7 @@ def test_what_is_standard_is_inferred_and_has_units():
     assert result["prior"]["force_x_bias"].std() == pytest.approx(0.1 * SI.force_unit, rel=0.1)
 
 
+@pytest.mark.slow
 def test_of_what_is_standard_a_record_is_asked_for_what_it_can_tell():
     forward = scanned(direction="forward")
     silent = coarse().assign(holding_moment=np.nan * coarse().holding_moment)
@@ -589,6 +591,7 @@ def test_a_backlash_takes_two_directions(direction):
         default_priors(measured, nuisances=["bias", "backlash"])
 
 
+@pytest.mark.slow
 def test_friction_is_either_known_or_inferred():
     measured = coarse()
     assert "friction" in default_priors(measured, load_cell=CELL)

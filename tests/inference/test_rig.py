@@ -110,6 +110,7 @@ def test_a_stem_is_found_and_lasts():
     assert model.may_vanish[model.names.index("stem")]
 
 
+@pytest.mark.slow
 def test_two_records_tell_as_much_as_one_of_both():
     """Of one pin, touched from two pivots.
 
@@ -200,6 +201,7 @@ def test_draws_from_the_prior_have_the_correlations():
     assert np.corrcoef(points[:, i], points[:, j])[0, 1] == pytest.approx(0.8, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_stored_posterior_has_the_same_prior():
     tree = infer_contour(read(OBJECT, 2), load_cell=CELL, nuisances=(), rig=rig(), seed=1, settings=QUICK)
     model = experiment_of(tree).model
@@ -223,6 +225,7 @@ def test_families_are_compared_with_the_rig():
         compare_families(record, rig=drawn(rod_length=0.1), settings=QUICK, **known)
 
 
+@pytest.mark.slow
 def test_its_dependence_counts_as_the_prior_of_the_rig(monkeypatch):
     """What is left for the likelihood is the likelihood."""
     from tactile_bayes.assessment import prior_sensitivity as module

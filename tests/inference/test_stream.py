@@ -68,6 +68,7 @@ def test_the_evidence_agrees_with_bridge_sampling(streamed, whole):
     assert abs(float(streamed[1][-1].log_evidence) - expected) < 1.5
 
 
+@pytest.mark.slow
 def test_one_block_and_many_agree(streamed, measured):
     (once,) = fed(stream_of(seed=5), measured, 1)
     last = streamed[1][-1]
@@ -76,6 +77,7 @@ def test_one_block_and_many_agree(streamed, measured):
     assert abs(float(once.log_evidence - last.log_evidence)) < 1.5
 
 
+@pytest.mark.slow
 def test_the_result_grows_with_the_record(streamed, measured):
     results = streamed[1]
     assert [int(now.samples) for now in results] == [28, 56, 84, measured.sizes["sample"]]
@@ -93,6 +95,7 @@ def test_the_posterior_is_one_of_a_contour(streamed, measured):
     tb.to_arviz(tree)
 
 
+@pytest.mark.slow
 def test_particles_that_have_lost_the_posterior_are_told(streamed, measured):
     """They climb towards it as soon as they move."""
     assert 0.0 < float(streamed[1][-1].log_density_shift) < 1.0
@@ -110,6 +113,7 @@ def test_particles_that_have_lost_the_posterior_are_told(streamed, measured):
     assert "they have lost the posterior" in posterior.attrs["message"]
 
 
+@pytest.mark.slow
 def test_a_wrong_model_shows_early_and_a_right_one_never(streamed):
     assert all(float(now.e_value) < 2.0 for now in streamed[1])
     sliding = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.05, friction=0.2).record
@@ -138,6 +142,7 @@ def test_samples_without_contact_are_informative(measured):
     assert np.isfinite(float(now.log_evidence))
 
 
+@pytest.mark.slow
 def test_a_seed_reproduces(measured):
     one, other = (fed(stream_of(particles=100), measured.isel(sample=slice(0, 20)), 2)[-1] for _ in range(2))
     xr.testing.assert_identical(one.drop_vars("seconds"), other.drop_vars("seconds"))
@@ -184,6 +189,7 @@ def test_arguments_are_checked():
         stream_of().posterior()
 
 
+@pytest.mark.slow
 def test_the_backlash_enters_with_the_second_direction(measured):
     stream = stream_of(nuisances=["standard"], particles=100)
     turns = int((measured.direction.values == "forward").sum())

@@ -102,7 +102,7 @@ def test_poses_of_a_rod_with_a_bend_need_a_fine_table(sign):
     np.testing.assert_array_equal(found, poses(profile, NO_TABLE, 0.0, *far, True)[1])
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("sign", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
 def test_poses_of_rods_between_nodes_and_at_the_ends_of_ranges(sign):
     profile = profile_of(lambda s: 0.5 - s, 1.0, 0.5)
     table = tabulated(profile, Box((0.35, 0.65), (-0.2, 0.2), (0.0, 0.5)))
@@ -110,6 +110,7 @@ def test_poses_of_rods_between_nodes_and_at_the_ends_of_ranges(sign):
         compared(profile._replace(taper=taper, bend=bend, sign=sign), table, delta)
 
 
+@pytest.mark.slow
 def test_beyond_its_ranges_a_pose_is_integrated():
     """A table never extrapolates, in what differs between sweeps and in what differs in one."""
     profile = RODS["half cone"]

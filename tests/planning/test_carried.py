@@ -66,6 +66,7 @@ def test_sensitivity_tells_what_a_band_would_be(drive):
     assert np.all(both.sel(parameter=["r", "q", "x_c"]) <= bounds.sel(parameter=["r", "q", "x_c"]) + 1e-12)
 
 
+@pytest.mark.slow
 def test_drives_are_candidates_of_a_design():
     """Two translations tell more than one of them, and a pivot among drives is what it is among pivots."""
     priors = {"r": stats.uniform(0.25, 0.1), "q": stats.uniform(0.75, 0.1), "x_c": stats.norm(0.0, 0.02)}
@@ -80,6 +81,7 @@ def test_drives_are_candidates_of_a_design():
         tb.design("circle", drives=["left"], **options)
 
 
+@pytest.mark.slow
 def test_a_posterior_of_a_carried_rod_is_what_is_known():
     """Its drive is none of the pivots so far, and what it touched leaves no gap."""
     measured = CELL.measure(tb.scan(CIRCLE, drive=SHIFTS[0], drive_step=0.04).record, seed=1)

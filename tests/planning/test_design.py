@@ -92,6 +92,7 @@ def test_laplace_and_nested_monte_carlo_agree(posterior):
     assert np.all(found.nested_draws.values > 20.0)
 
 
+@pytest.mark.slow
 def test_a_record_more_makes_the_band_narrower_and_finer_steps_narrower_still(posterior):
     found = designed(posterior, bases=[(0.0, 0.0)], drive_steps=[STEP, 0.25 * STEP])
     coarse, fine = found.width.values
@@ -102,6 +103,7 @@ def test_a_record_more_makes_the_band_narrower_and_finer_steps_narrower_still(po
     assert np.all(found.information.values > 0.0)
 
 
+@pytest.mark.slow
 def test_from_the_same_pivot_the_gap_stays_and_from_beside_it_closes(posterior):
     found = designed(posterior, bases=[(0.0, 0.0), (0.3, 0.0)])
     sweeps = scan(Parabola(0.5, q=0.5)).events
@@ -144,6 +146,7 @@ def test_the_same_numbers_whatever_the_workers():
     assert designed(workers=1).identical(designed(workers=2))
 
 
+@pytest.mark.slow
 def test_it_goes_on_where_it_was_stopped(tmp_path):
     class StoppedError(Exception):
         pass
@@ -171,6 +174,7 @@ def test_the_seed_decides():
     assert not one.width.identical(designed(draws=2, bases=[(0.0, 0.0)], seed=2).width)
 
 
+@pytest.mark.slow
 def test_in_metres_and_newtons_it_is_the_same():
     rod = Rod(length=0.2, flexural_rigidity=2e-3)
     cell = LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)

@@ -28,6 +28,7 @@ def width(now):
     return (now.height.sel(level=0.975) - now.height.sel(level=0.025)).values
 
 
+@pytest.mark.slow
 def test_it_is_what_the_rest_then_adds(measured, stream):
     end = int((measured.direction == "forward").sum())
     rest = tb.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, seed=1)
@@ -38,6 +39,7 @@ def test_it_is_what_the_rest_then_adds(measured, stream):
     assert np.all(rest.width_error < 0.1 * rest.width)
 
 
+@pytest.mark.slow
 def test_fewer_samples_add_less(measured, stream):
     few, more = (
         tb.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, seed=1).width for end in (44, 56)

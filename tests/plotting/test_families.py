@@ -147,6 +147,7 @@ def test_the_same_contours_are_drawn_again(posterior):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_the_median_is_drawn_where_the_rod_touched(posterior):
     drawn = line(plotting.prior_contours(posterior, truth=CONTOUR), "posterior median, where touched")
     assert np.ptp(drawn.get_xdata()) < 2.0 * ROD.length

@@ -461,6 +461,7 @@ def test_the_frames_are_those_rods_in_the_drawing(page, posterior):
 # --- Other records ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_rig_that_measures_the_moment_only_has_no_contact_points(tmp_path):
     ideal = tb.scan(tb.contours.Parabola(0.5, 0.5), direction="backward", drive_step=0.1).record
     record = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(ideal, seed=1)

@@ -133,6 +133,7 @@ def test_a_dimensionless_record_with_unknown_noise(tmp_path):
     assert run.contacts.attrs["misfit_probability"] > 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_a_second_run_replaces_the_files_of_the_first(measured, tmp_path):
     (tmp_path / "band.csv").write_text("old", encoding="utf-8")
@@ -226,6 +227,7 @@ def test_what_fails_is_named_and_left_out_and_all_else_is_there(function, what, 
         assert (run.contacts if what == "contacts" else run.band) is None
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("drawn_before", "coarse_pictures")
 def test_a_figure_that_fails_is_named_and_the_others_are_drawn(measured, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "scan", broken)

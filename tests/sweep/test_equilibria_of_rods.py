@@ -13,6 +13,7 @@ from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.sweep import equilibria, scan
 
 RODS = given_rods()
+SLOW = ("cone", "parabolic", "tables")
 CONTOURS = {
     "I": paper_profile("I", 0.7),
     "II": paper_profile("II", 0.5),
@@ -35,7 +36,9 @@ def states_of_sweep(contour, direction, rod, friction=0.0, drive_step=np.pi / 18
     return record.rename({f"truth_{name}": name for name in names})
 
 
-@pytest.mark.parametrize("name", RODS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in RODS]
+)
 def test_states_of_sweeps_once_the_contact_comes_back(name):
     """While the contact moves outward, a load that does not bend the rod back only straightens it. There `equilibria`
     promises the other state. At the sample that is farthest out it may be either."""

@@ -117,6 +117,7 @@ def test_scales_that_lie_far_apart_leave_the_approximation_a_distribution():
     assert np.all(np.diagonal(root, axis1=1, axis2=2) > 0.0)
 
 
+@pytest.mark.slow
 def test_a_start_out_of_reach_leads_somewhere():
     """Where the rod touches nothing there is no snap-off to be made linear."""
     model = model_of([])
