@@ -28,7 +28,8 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import spawn
-from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.rig import Rig
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.record import make_record
 from tactile_bayes.runs.demonstration import CONTOUR as DEMONSTRATED

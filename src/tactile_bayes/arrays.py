@@ -1,13 +1,13 @@
-"""Array types for the whole package."""
+"""Types of arrays, and of what draws them, for the whole package."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Flags", "Floats", "Index"]
+__all__ = ["Draws", "Flags", "Floats", "Index"]
 
 Flags: TypeAlias = NDArray[np.bool_]
 """Truth values of any shape."""
@@ -17,3 +17,10 @@ Floats: TypeAlias = NDArray[np.float64]
 
 Index: TypeAlias = NDArray[np.intp]
 """Whole numbers of any shape that count along an axis."""
+
+
+class Draws(Protocol):
+    """Source of random numbers: a `Generator`, or many side by side."""
+
+    def standard_normal(self, size: tuple[int, ...], /) -> Any: ...
+    def chisquare(self, df: float, size: tuple[int, ...], /) -> Any: ...

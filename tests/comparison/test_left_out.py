@@ -47,7 +47,7 @@ def inferred_without(problem, sample):
 @pytest.mark.slow
 def test_samples_at_events_are_predicted_as_if_inferred_without_them(problem, predicted):
     """After snap-off, where importance sampling from the posterior is off; 3 times the error for autocorrelation."""
-    events = problem.model.likelihood.event_samples(problem.loaded)
+    events = problem.model.likelihood.segments.event_samples(problem.loaded)
     for sample in events[:1, 3]:
         exact, error = inferred_without(problem, sample)
         assert np.isnan(predicted.pareto_k[sample])
@@ -56,7 +56,7 @@ def test_samples_at_events_are_predicted_as_if_inferred_without_them(problem, pr
 
 @pytest.mark.slow
 def test_other_samples_are_predicted_by_importance_sampling(problem, predicted):
-    sample = int(problem.model.likelihood.event_samples(problem.loaded)[0, 1]) + 5
+    sample = int(problem.model.likelihood.segments.event_samples(problem.loaded)[0, 1]) + 5
     exact, error = inferred_without(problem, sample)
     assert predicted.pareto_k[sample] < 0.5
     assert abs(predicted.log_density[sample] - exact) < 4.0 * np.hypot(error, predicted.standard_error[sample])
@@ -70,5 +70,5 @@ def test_of_a_cell_that_drifts_samples_at_events_are_left_out():
     brief = SamplerSettings(ensembles=2, max_steps=40)
     found = predicted_samples(problem, sampled(problem, seed=1, settings=brief), seed=2, settings=brief)
     events = np.zeros(problem.loaded.size, dtype=bool)
-    events[problem.model.likelihood.event_samples(problem.loaded)] = True
+    events[problem.model.likelihood.segments.event_samples(problem.loaded)] = True
     np.testing.assert_array_equal(np.isnan(found.log_density), events)

@@ -121,7 +121,7 @@ def test_repeated_sweeps_have_it_in_common():
     again = one.assign(sweep=one.sweep + 2)
     both = xr.concat([one, again], "sample", combine_attrs="override")
     model = model_of(both)
-    course = model.likelihood.course
+    course = model.likelihood.segments.course
     assert np.count_nonzero(np.isinf(course.step)) == 2
     assert np.count_nonzero(course.step == 0.0) == one.sizes["sample"]
     drifting = replace(CELL, drift=RandomWalk(force=0.01))
@@ -134,7 +134,7 @@ def test_its_coordinate_is_the_travel_where_the_base_is_carried():
     drive = Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
     record = CELL.measure(scan(Circle(0.5, 0.5), drive=drive, drive_step=0.04).record, seed=1)
     model = Experiment(record, "circle", CELL, nuisances=SMOOTH).model
-    course = model.likelihood.course
+    course = model.likelihood.segments.course
     assert course.is_measured_order
     ways = np.hypot(np.diff(record.base_x.values), np.diff(record.base_y.values))
     np.testing.assert_allclose(course.step[1:], ways, rtol=1e-9)

@@ -16,7 +16,8 @@ from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_events import events_of
-from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.rig import Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.forward_table import NO_TABLE
 from tactile_bayes.mechanics.rod import Rod
@@ -382,37 +383,13 @@ def test_a_moment_that_is_counted_the_other_way_round_turns_no_side(missing):
     assert values[0] == pytest.approx(values[1], abs=4.0 * np.sqrt(2.0 * record.sizes["sample"]))
 
 
-def test_events_lie_where_most_samples_say():
-    """Also where some of them are taken for what they are not."""
-    record = scan(Parabola(0.5, 0.5), drive_step=0.05).record
-    likelihood = RecordLikelihood(record, LoadCell(force_noise=0.05, moment_noise=0.02))
-    loaded = (record.force_y != 0.0).values
-    events = likelihood.event_samples(loaded)
-    for row, direction in zip(events, ("forward", "backward"), strict=True):
-        own = np.flatnonzero((record.direction == direction).values)
-        inside = own[loaded[own]]
-        assert row.tolist() == [inside[0] - 1, inside[0], inside[-1], inside[-1] + 1]
-    mistaken = loaded.copy()
-    mistaken[[events[0, 3] + 3, events[1, 0] - 2, events[0, 1] + 4]] ^= True
-    np.testing.assert_array_equal(likelihood.event_samples(mistaken), events)
-    angles = likelihood.event_angles(loaded)
-    snap_offs = likelihood.snap_offs(Parabola(np.array([0.5]), np.array([0.5]), np.array([0.0])))[0]
-    assert np.all((angles[:, 2] < snap_offs) & (snap_offs < angles[:, 3]))
-
-
-def test_no_events_without_a_load():
-    record = scan(Parabola(0.5, 0.5), drive_step=0.05).record
-    likelihood = RecordLikelihood(record, LoadCell(force_noise=0.05, moment_noise=0.02))
-    assert (likelihood.event_samples(np.zeros(record.sizes["sample"], dtype=bool)) == -1).all()
-
-
 def exact_sensed(model, point):
     """What the cell senses of one point, (1, samples, 3), from states at the drive angles to rounding."""
     likelihood, rig = model.likelihood, model.rig(point)
     paths = likelihood.paths(model.contours(point), rig)
-    segment = likelihood.segment_of_sample
+    segment = likelihood.segments.of_sample
     signs = np.array([-1.0 if each.backward else 1.0 for each in likelihood.segments])[segment]
-    found = paths.states(segment, likelihood.angles_in_sweep_frame - signs * likelihood.misread(rig)[0]).wrench
+    found = paths.states(segment, likelihood.segments.angles_in_sweep_frame - signs * likelihood.misread(rig)[0]).wrench
     loads = np.stack([signs * found.holding_moment, signs * found.force_x, found.force_y], axis=-1)
     scaled = np.atleast_1d(rig.rigidity_scale)[:, None, None] * np.nan_to_num(loads)[None]
     return model.nuisances.sensed(scaled, model.values(point), likelihood.load_cell)
@@ -485,7 +462,7 @@ def test_loads_of_rods_that_vary_are_within_1e_5_of_the_largest(name):
     turned = exactly.predict(drawn, rig._replace(drive_angle_offset=turn))[0]
     assert np.count_nonzero(usable != usable_exactly) <= 2
     both = np.all([np.any(found != 0.0, axis=-1) for found in (loads, exact, turned)], axis=0)
-    sample = exactly.segment_of_sample
+    sample = exactly.segments.of_sample
     largest = np.stack([np.abs(exact[:, sample == k]).max(axis=1) for k in np.unique(sample)], axis=1)[:, sample]
     slack = 1e-5 * largest + 1e-6 / turn * np.abs(turned - exact)
     assert np.count_nonzero(both) > 5_000
@@ -506,9 +483,9 @@ def test_a_drive_that_repeats_itself_is_followed_once_and_has_one_discrepancy():
         once.predict(contours)[0][:, : measured.sizes["sample"] // 2],
         once.predict(contours)[0][:, measured.sizes["sample"] // 2 :],
     )
-    steps = [np.count_nonzero(np.isinf(each.course.step)) for each in (once, twice)]
+    steps = [np.count_nonzero(np.isinf(each.segments.course.step)) for each in (once, twice)]
     assert steps == [1, 2]
-    assert once.ways(np.array([[0.5]])) == pytest.approx(twice.ways(np.array([[0.5, 0.5]]))[:, :1])
+    assert once.segments.ways(np.array([[0.5]])) == pytest.approx(twice.segments.ways(np.array([[0.5, 0.5]]))[:, :1])
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

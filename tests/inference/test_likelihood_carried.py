@@ -7,8 +7,9 @@ import pytest
 
 import tactile_bayes as tb
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.rig import Rig
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 CIRCLE = tb.contours.Circle(0.3, 0.8)

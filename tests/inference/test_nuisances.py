@@ -19,9 +19,10 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import default_priors
 from tactile_bayes.inference.found_rig import rod_with
-from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of
+from tactile_bayes.inference.rig import Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.forward_table import NO_TABLE
 from tactile_bayes.mechanics.rod import Rod
@@ -204,7 +205,7 @@ def test_backlash_goes_by_the_way_that_the_drive_moves_and_not_by_the_side_of_co
 def test_snap_offs_are_where_they_are_read_whatever_the_encoder_reads_too_much():
     record = LoadCell(drive_angle_offset=0.01, drive_angle_backlash=0.1).measure(scanned(2.0), seed=1)
     likelihood = RecordLikelihood(record, CELL)
-    between = likelihood.event_angles((record.force_y != 0.0).values)[:, 2:]
+    between = likelihood.segments.event_angles((record.force_y != 0.0).values)[:, 2:]
     off = Rig(drive_angle_offset=0.01, drive_angle_backlash=0.1)
     found, without = (likelihood.snap_offs(stack(), rig)[0] for rig in (off, Rig(drive_angle_offset=0.01)))
     assert np.all((between[:, 0] < found) & (found < between[:, 1]))

@@ -14,8 +14,9 @@ from numba.core.errors import TypingError
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, Smooth
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.sweep_frame import SweepFrame
-from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.priors import default_priors
+from tactile_bayes.inference.rig import Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics import compiler, sweeps
 from tactile_bayes.mechanics.paths import trace

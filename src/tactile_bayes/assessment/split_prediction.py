@@ -108,7 +108,7 @@ def parts_of(model: ContourModel) -> dict[str, Flags]:
     the later half of the samples of every segment, which divide its contacts in the middle.
     """
     likelihood = model.likelihood
-    of_sample, count = likelihood.segment_of_sample, len(likelihood.segments)
+    of_sample, count = likelihood.segments.of_sample, len(likelihood.segments)
     parts = {f"sweep {k + 1}": of_sample == k for k in range(count)} if count > 1 else {}
     bases = list(dict.fromkeys(segment.base for segment in likelihood.segments))
     if 1 < len(bases) < count:

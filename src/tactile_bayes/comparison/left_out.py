@@ -49,7 +49,7 @@ def predicted_samples(
     model = problem.model
     logs = _densities(model, sampled.draws)
     found = left_out(logs)
-    events = model.likelihood.event_samples(problem.loaded)
+    events = model.likelihood.segments.event_samples(problem.loaded)
     chosen = np.unique(events[events >= 0])
     log_density, error, k = (np.array(part) for part in found)
     k[chosen] = np.nan

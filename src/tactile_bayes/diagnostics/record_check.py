@@ -11,7 +11,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.discrepancy import PARAMETERS
-from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_segments import RecordSegments
 from tactile_bayes.inference.result import record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.scatter import rough_noise
@@ -223,7 +223,7 @@ def _loaded(posterior: xr.DataTree) -> Flags:
     """Return True for samples between first contact and snap-off, at the posterior medians of these events."""
     record = record_of(posterior)
     events = posterior["events"].to_dataset().median(("chain", "draw"))
-    segments = RecordLikelihood(record, LoadCell.from_record(record) or LoadCell()).segments
+    segments = RecordSegments(record, LoadCell.from_record(record) or LoadCell())
     along, place = travels_of(record), "travel" if carried_sweeps(record) else "drive_angle"
     loaded = np.zeros(along.size, dtype=bool)
     ends = np.sort(np.stack([events[f"first_{place}"].values, events[f"snap_off_{place}"].values]), axis=0)

@@ -61,8 +61,8 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
     middle = np.array([float(model.priors[name].median()) for name in names])  # type: ignore[attr-defined]
     spread = np.array([float(model.priors[name].std()) for name in names])
     readings, deviation = likelihood.measured[loaded], model.deviation
-    sign = likelihood.signs_of_samples[loaded]
-    angle = likelihood.angles_in_sweep_frame[loaded]
+    sign = likelihood.segments.signs_of_samples[loaded]
+    angle = likelihood.segments.angles_in_sweep_frame[loaded]
     turning = frame_of(model.measured) == "turning"
 
     def residuals(steps: Floats) -> Floats:

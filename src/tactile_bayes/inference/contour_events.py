@@ -6,7 +6,8 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
-from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.rig import Rig
 
 __all__ = ["events_of"]
 
@@ -47,6 +48,6 @@ def events_of(
         turned = paths.drive_angles_at(angle)
         out[f"{label}_drive_angle"] = np.where(backward, np.pi - turned, turned)
         if paths.lines is not None:
-            out[f"{label}_travel"] = likelihood.ways(angle.reshape(-1, count).T).T.ravel()
+            out[f"{label}_travel"] = likelihood.segments.ways(angle.reshape(-1, count).T).T.ravel()
         out[f"{label}_contact_x"], out[f"{label}_contact_y"] = locus.x, locus.y
     return {name: values.reshape(-1, count).T for name, values in out.items()}

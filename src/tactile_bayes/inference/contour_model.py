@@ -16,11 +16,12 @@ from tactile_bayes.errors import DriftWarning, ParameterError, ReachError
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.discrepancy import load_in_contact
 from tactile_bayes.inference.ensembles import Ends, Logarithms
-from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.noise import Noise
-from tactile_bayes.inference.nuisances import MAY_VANISH, Nuisances
+from tactile_bayes.inference.nuisances import Nuisances
 from tactile_bayes.inference.prior_density import log_density_of
-from tactile_bayes.inference.priors import Prior, support_of
+from tactile_bayes.inference.priors import MAY_VANISH, Prior, support_of
+from tactile_bayes.inference.rig import Rig
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.numerics.blocks import blocks
@@ -212,7 +213,7 @@ class ContourModel:
         if not self.noise.of_discrepancy:
             return None
         scale, length = points[:, [self.names.index(name) for name in self.noise.of_discrepancy]].T
-        course = self.likelihood.course
+        course = self.likelihood.segments.course
         read = load_in_contact(loads, course) * self.likelihood.load_cell.own_gains
         return Discrepancy(course, scale[:, None, None] * read, length)
 

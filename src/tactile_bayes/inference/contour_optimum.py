@@ -112,8 +112,8 @@ def event_brackets(model: ContourModel) -> Brackets:
 
     Residuals of loads do not depend on the angle of snap-off until a sample changes sides; residuals of brackets do.
     """
-    angle = model.likelihood.angles_in_sweep_frame
-    of_sample = model.likelihood.segment_of_sample
+    segments = model.likelihood.segments
+    angle, of_sample = segments.angles_in_sweep_frame, segments.of_sample
     rows = []
     for onset, snap_off in zip(model.found["onset"].values, model.found["snap_off"].values, strict=True):
         for ends, (before, after) in enumerate((onset, snap_off)):
@@ -122,7 +122,7 @@ def event_brackets(model: ContourModel) -> Brackets:
             width = _EVENT_TOLERANCE * (angle[after] - angle[before])
             rows.append((of_sample[before], ends, angle[before], angle[after], width))
     found = {row[0] for row in rows}
-    for segment, (before, first, last, after) in enumerate(model.likelihood.event_samples(certainly_loaded(model))):
+    for segment, (before, first, last, after) in enumerate(segments.event_samples(certainly_loaded(model))):
         if segment not in found and before >= 0 and after >= 0:  # contact is too brief for its loads to show events
             width = _EVENT_TOLERANCE * (angle[after] - angle[before]) / 2.0
             rows += [(segment, 0, -np.inf, angle[first], width), (segment, 1, angle[last], angle[after], width)]
@@ -336,7 +336,7 @@ def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, d
     if not model.noise.of_discrepancy:
         return np.empty(0)
     loads, _ = model.likelihood.predict(model.contours(point[None]), model.rig(point[None]))
-    largest = load_in_contact(loads[0], model.likelihood.course)[:, model.present]
+    largest = load_in_contact(loads[0], model.likelihood.segments.course)[:, model.present]
     squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviation[model.present])
     least, most = np.quantile(drawn[:, 0], [0.05, 1.0])
     share = np.sqrt(squares[largest > 0.0].sum() / max(np.square(largest).sum(), np.finfo(float).tiny))

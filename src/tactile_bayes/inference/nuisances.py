@@ -15,8 +15,8 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_names, check_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.discrepancy import DISCREPANCY, is_discrepancy
-from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.rig import Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.curve import curved
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
@@ -27,16 +27,13 @@ from tactile_bayes.record import LOAD_CELL_UNITS, bases_of, carried_sweeps, pres
 if TYPE_CHECKING:
     from tactile_bayes.inference.rig_prior import RigPrior
 
-__all__ = ["BIAS", "BIASES", "CURVE", "MAY_VANISH", "STANDARD", "Nuisances", "belongs", "nuisances_of"]
+__all__ = ["BIAS", "BIASES", "CURVE", "STANDARD", "Nuisances", "belongs", "nuisances_of"]
 
 STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
 """Default nuisance parameters, of which those that a record cannot identify are left out."""
 
 _STANDARD = "standard"
 """Name that stands for the default nuisance parameters."""
-
-MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem")
-"""Parameters that are zero or positive, and may be zero."""
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "drift", "gain")}

@@ -234,10 +234,10 @@ def _is_continued(before: ContourModel | None, model: ContourModel) -> bool:
 
     They have others if new samples changed the side of a contact, or, where the base is carried, the line of the drive.
     """
-    if before is None or model.likelihood.is_carried:
+    if before is None or model.likelihood.segments.is_carried:
         return False
-    sides = before.likelihood.signs_of_samples
-    return np.array_equal(sides, model.likelihood.signs_of_samples[: len(sides)])
+    sides = before.likelihood.segments.signs_of_samples
+    return np.array_equal(sides, model.likelihood.segments.signs_of_samples[: len(sides)])
 
 
 def _between(new: Floats, old: Floats, power: float) -> Floats:

@@ -1,4 +1,4 @@
-"""Priors of the parameters of families."""
+"""Priors of parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,18 @@ from tactile_bayes.checks import check_kind, check_mapping, shown
 from tactile_bayes.contours.family import Family, FamilyParameter
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["Prior", "check_priors", "default_priors", "own_priors", "refuse_unknown_priors", "support_of"]
+__all__ = [
+    "MAY_VANISH",
+    "Prior",
+    "check_priors",
+    "default_priors",
+    "own_priors",
+    "refuse_unknown_priors",
+    "support_of",
+]
+
+MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem")
+"""Nuisance parameters that are zero or positive, and may be zero."""
 
 
 @runtime_checkable

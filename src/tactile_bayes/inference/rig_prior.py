@@ -13,8 +13,7 @@ from scipy import optimize, stats
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.nuisances import MAY_VANISH
-from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.priors import MAY_VANISH, Prior
 from tactile_bayes.inference.result import posterior_draws
 
 __all__ = ["RigPrior", "refuse_other_rig", "rig_prior"]

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Draws, Floats
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 
-__all__ = ["Draws", "corrupted_angles", "corrupted_loads"]
-
-
-class Draws(Protocol):
-    """Source of random numbers: a `Generator`, or many side by side."""
-
-    def standard_normal(self, size: tuple[int, ...], /) -> Any: ...
-    def chisquare(self, df: float, size: tuple[int, ...], /) -> Any: ...
+__all__ = ["corrupted_angles", "corrupted_loads"]
 
 
 def corrupted_loads(

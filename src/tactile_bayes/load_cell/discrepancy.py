@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from tactile_bayes.arrays import Floats, Index
-
-if TYPE_CHECKING:
-    from tactile_bayes.load_cell.corruption import Draws
+from tactile_bayes.arrays import Draws, Floats, Index
 
 __all__ = ["Course", "Discrepancy", "joined"]
 

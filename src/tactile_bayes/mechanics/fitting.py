@@ -8,18 +8,17 @@ does not count; where neither sheet has one before it, the most likely contact l
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, contact_workspace
 from tactile_bayes.mechanics.elastica import forward_contacts
+from tactile_bayes.mechanics.fits import ContactFit, RawFit, Reading, SheetFit
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.profile import Rods, rods_of
 
-__all__ = ["ContactFit", "RawFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet", "plain", "raw_contacts"]
+__all__ = ["fit_contacts", "fit_sheet", "plain", "raw_contacts"]
 
 _FREE = {TIP: (FORCE, PSI1), TANGENTIAL: (FORCE, ARCLENGTH), None: (FORCE,)}
 """Free coordinates on a sheet; None stands for the edge."""
@@ -38,63 +37,6 @@ _STARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 _LEAST_MOMENT = 0.1
 """Least moment of a start, in its standard deviations."""
-
-
-class Reading(NamedTuple):
-    """Samples of forward contacts and their uncertainty, dimensionless."""
-
-    drive_angle: Floats
-    """Shape (n,)."""
-    loads: Floats
-    """Holding moment and support reaction, shape (n, 3)."""
-    angle_deviation: Floats
-    """Standard deviation of the drive angle, shape (n,)."""
-    leaning: Floats
-    """Derivative of the errors of the loads by the error of the drive angle, shape (n, 3)."""
-    covariance: Floats
-    """Covariance of the other errors of the loads, shape (n, 3, 3)."""
-
-    def take(self, where: Index | slice) -> Reading:
-        return Reading(*(column[where] for column in self))
-
-
-class SheetFit(NamedTuple):
-    """Best contact of one phase, regardless of its bounds."""
-
-    coordinates: Floats
-    """Force, ψ1, arc length and drive angle, shape (n, 4); NaN where there is none."""
-    covariance: Floats
-    """Covariance of the coordinates, shape (n, 4, 4); zero for those that are not free."""
-    misfit: Floats
-    """Sum of squared deviations, shape (n,)."""
-
-
-class ContactFit(NamedTuple):
-    """Most likely contacts."""
-
-    coordinates: Floats
-    covariance: Floats
-    misfit: Floats
-    phase: NDArray[np.int8]
-    at_edge: Flags
-    """True if the contact lies on the edge, since the best contacts of both phases lie beyond it."""
-    clearance: Floats
-    """Distance from the edge, in standard deviations of the coordinate that leads to it."""
-    rival: Floats
-    """Excess of the sum of squares of the other phase's best contact; infinite where it has none."""
-
-
-class RawFit(NamedTuple):
-    """Contacts of Step 2."""
-
-    place: Floats
-    """Contact point, slope angle and arc length, shape (n, 4)."""
-    tip_angle: Floats
-    covariance: Floats
-    """Covariance of the place to first order, shape (n, 4, 4)."""
-    bend: Floats
-    """Nonlinearity: squared distance, in the metric of the covariance, from the contact to the mean of two contacts one
-    standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,)."""
 
 
 def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike = 0.0) -> RawFit:

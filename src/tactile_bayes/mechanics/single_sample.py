@@ -9,7 +9,7 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.beam import Beam, Varied, mirrored_by
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.contact_map import contact_state, moved
-from tactile_bayes.mechanics.fitting import RawFit, Reading
+from tactile_bayes.mechanics.fits import RawFit, Reading
 from tactile_bayes.mechanics.states import contact_of
 
 __all__ = ["Workspace", "descents", "raw_fits"]

@@ -11,7 +11,7 @@ from scipy.special import chdtri
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.errors import RecordError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.fitting import Reading
+from tactile_bayes.mechanics.fits import Reading
 from tactile_bayes.mechanics.profile import Rods
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction.sides import contact_sides

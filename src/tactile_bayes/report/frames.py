@@ -129,7 +129,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rod.mirrored(sign))
     loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
     base_x, base_y = (record[name].values[samples] for name in ("base_x", "base_y"))
-    of_sample = likelihood.segment_of_sample
+    of_sample = likelihood.segments.of_sample
     first = np.array([segment.base for segment in likelihood.segments])[of_sample[samples]]
     base_x = paths.sweep_frame.base_x[batch_index] + base_x - first[:, 0]
     base_y = paths.sweep_frame.base_y[batch_index] + base_y - first[:, 1]

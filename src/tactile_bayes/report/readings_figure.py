@@ -11,7 +11,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_segments import RecordSegments
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
 from tactile_bayes.plotting.maps import outline
@@ -270,7 +270,7 @@ def _places(findings: Findings, along: DriveAxis, events: xr.Dataset, event: str
     travels = [float(at) for at in events[f"{event}_travel"].values]
     if along.kind == "travel":
         return travels
-    segments = RecordLikelihood(findings.record, LoadCell.from_record(findings.record) or LoadCell()).segments
+    segments = RecordSegments(findings.record, LoadCell.from_record(findings.record) or LoadCell())
     places = []
     for segment, travel in zip(segments, travels, strict=True):
         order = segment.samples[np.argsort(along.travels[segment.samples], kind="stable")]

@@ -15,9 +15,10 @@ from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import Nuisances
 from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
+from tactile_bayes.inference.rig import Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL

@@ -16,7 +16,7 @@ from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import certainly_loaded
 from tactile_bayes.inference.discrepancy import load_in_contact
-from tactile_bayes.inference.nuisances import MAY_VANISH
+from tactile_bayes.inference.priors import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.reconstruction import loaded_samples
@@ -105,7 +105,7 @@ class _SmoothNoise(NamedTuple):
         if not model.noise.of_discrepancy:
             return nothing
         loads, _ = model.likelihood.predict(model.contours(point), model.rig(point))
-        course = model.likelihood.course
+        course = model.likelihood.segments.course
         largest = load_in_contact(loads[0], course) / observer.noise
         in_contact = largest.any(axis=1)
         if not in_contact.any():
@@ -140,7 +140,7 @@ class Observer:
             self.loaded = loaded_samples(model.measured, model.noise.stated_cell)
         stated = np.asarray(model.likelihood.load_cell.noise)
         self.noise = np.where(stated > 0.0, stated, model.deviation)
-        between = model.likelihood.event_angles(self.loaded)[:, 2:]
+        between = model.likelihood.segments.event_angles(self.loaded)[:, 2:]
         self.ends = np.isfinite(between).all(axis=1)
         self._end, self._within = between.mean(axis=1), 0.5 * np.diff(between, axis=1)[:, 0]
         self._width = self._within / np.sqrt(3.0)

@@ -1,0 +1,69 @@
+"""Samples that contacts are fitted to, and what is found."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Flags, Floats, Index
+
+__all__ = ["ContactFit", "RawFit", "Reading", "SheetFit"]
+
+
+class Reading(NamedTuple):
+    """Samples of forward contacts and their uncertainty, dimensionless."""
+
+    drive_angle: Floats
+    """Shape (n,)."""
+    loads: Floats
+    """Holding moment and support reaction, shape (n, 3)."""
+    angle_deviation: Floats
+    """Standard deviation of the drive angle, shape (n,)."""
+    leaning: Floats
+    """Derivative of the errors of the loads by the error of the drive angle, shape (n, 3)."""
+    covariance: Floats
+    """Covariance of the other errors of the loads, shape (n, 3, 3)."""
+
+    def take(self, where: Index | slice) -> Reading:
+        return Reading(*(column[where] for column in self))
+
+
+class SheetFit(NamedTuple):
+    """Best contact of one phase, regardless of its bounds."""
+
+    coordinates: Floats
+    """Force, ψ1, arc length and drive angle, shape (n, 4); NaN where there is none."""
+    covariance: Floats
+    """Covariance of the coordinates, shape (n, 4, 4); zero for those that are not free."""
+    misfit: Floats
+    """Sum of squared deviations, shape (n,)."""
+
+
+class ContactFit(NamedTuple):
+    """Most likely contacts."""
+
+    coordinates: Floats
+    covariance: Floats
+    misfit: Floats
+    phase: NDArray[np.int8]
+    at_edge: Flags
+    """True if the contact lies on the edge, since the best contacts of both phases lie beyond it."""
+    clearance: Floats
+    """Distance from the edge, in standard deviations of the coordinate that leads to it."""
+    rival: Floats
+    """Excess of the sum of squares of the other phase's best contact; infinite where it has none."""
+
+
+class RawFit(NamedTuple):
+    """Contacts of Step 2."""
+
+    place: Floats
+    """Contact point, slope angle and arc length, shape (n, 4)."""
+    tip_angle: Floats
+    covariance: Floats
+    """Covariance of the place to first order, shape (n, 4, 4)."""
+    bend: Floats
+    """Nonlinearity: squared distance, in the metric of the covariance, from the contact to the mean of two contacts one
+    standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,)."""
