@@ -25,7 +25,7 @@ test: $(READY)
 	$(BIN)/python -m pytest -n auto --dist worksteal --nbmake --doctest-modules src notebooks/7_*.ipynb tests
 
 notebooks: $(READY)
-	$(BIN)/python -m pytest -n auto --nbmake notebooks
+	$(BIN)/python -m pytest -n auto --nbmake --nbmake-timeout=1200 notebooks
 
 # With the lowest versions of the dependencies; their warnings about one another are not errors here.
 test-lowest: $(READY)
