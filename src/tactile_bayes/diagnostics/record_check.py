@@ -15,7 +15,7 @@ from tactile_bayes.inference.record_segments import RecordSegments
 from tactile_bayes.inference.result import record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.scatter import rough_noise
-from tactile_bayes.record import carried_sweeps, travels_of
+from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
 
 __all__ = ["DISCREPANCIES", "Residuals", "check_record", "residuals_of"]
 
@@ -202,8 +202,7 @@ def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
     refuse_no_contour(posterior, "posterior_predictive", "observed_data", "constant_data", "sample_stats")
     predicted, observed = posterior["posterior_predictive"].to_dataset(), posterior["observed_data"].to_dataset()
     sweep = posterior["constant_data"].to_dataset().sweep.values
-    order = np.argsort(sweep, kind="stable")
-    sweeps = tuple(np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1))
+    sweeps = tuple(rows_of_sweeps(sweep))
     loaded = _loaded(posterior)
     log_probability = posterior["sample_stats"].to_dataset().lp
     found = (log_probability.sel(draw=predicted.draw) > float(log_probability.median()) - _LOST).values.ravel()
