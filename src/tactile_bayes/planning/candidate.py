@@ -180,7 +180,7 @@ def _nested(
     steps = _COARSE_STEP * parameter_scales(after, point)
 
     def densities(points: Floats) -> Floats:
-        inside = ((points > after.low) & (points < after.high)).all(axis=1)
+        inside = after.within_bounds(points)
         values = np.full((len(points), measured.sizes["sample"]), -np.inf)
         values[inside] = after.log_likelihood(points[inside], pointwise=True)
         return values
