@@ -17,7 +17,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
 
-__all__ = ["DISCREPANCIES", "Residuals", "check_record", "residuals_of"]
+__all__ = ["DISCREPANCIES", "LOST_BELOW", "Residuals", "check_record", "residuals_of"]
 
 DISCREPANCIES = ("runs", "neighbours", "largest", "loaded", "zero")
 """Ways in which a record can differ from those that the posterior predicts."""
@@ -36,7 +36,7 @@ _WINDOWS = 8
 _EXCESS = 1.2
 """Root mean square of loaded residuals over the noise between neighbours from which they count as larger."""
 
-_LOST = 20.0
+LOST_BELOW = 20.0
 """Log-probability below the median beyond which a draw belongs to a lost walker and is left out."""
 
 _TINY = 1e-300
@@ -205,7 +205,7 @@ def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
     sweeps = tuple(rows_of_sweeps(sweep))
     loaded = _loaded(posterior)
     log_probability = posterior["sample_stats"].to_dataset().lp
-    found = (log_probability.sel(draw=predicted.draw) > float(log_probability.median()) - _LOST).values.ravel()
+    found = (log_probability.sel(draw=predicted.draw) > float(log_probability.median()) - LOST_BELOW).values.ravel()
     residuals = {}
     for name, values in predicted.items():
         of_draws = values.values.reshape(-1, sweep.size)[found]
