@@ -10,6 +10,7 @@ import xarray as xr
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour_groups import FEWEST_PREDICTIONS
 from tactile_bayes.inference.discrepancy import PARAMETERS
 from tactile_bayes.inference.record_segments import RecordSegments
 from tactile_bayes.inference.result import record_of, refuse_no_contour
@@ -21,8 +22,6 @@ __all__ = ["DISCREPANCIES", "LOST_BELOW", "Residuals", "check_record", "residual
 
 DISCREPANCIES = ("runs", "neighbours", "largest", "loaded", "zero")
 """Ways in which a record can differ from those that the posterior predicts."""
-
-_FEWEST_PREDICTIONS = 100
 
 _FEWEST_SAMPLES = 5
 """Number of loaded, or of unloaded, samples in a channel below which they are not judged."""
@@ -140,7 +139,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     residuals = residuals_of(posterior)
     channels = list(residuals)
     predictions = len(residuals[channels[0]].values) - 1
-    if predictions < _FEWEST_PREDICTIONS:
+    if predictions < FEWEST_PREDICTIONS:
         raise InferenceError(
             f"the tree holds {predictions} predictions of the record, too few to compare it with: sample longer"
         )
