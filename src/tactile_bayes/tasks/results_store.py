@@ -95,9 +95,6 @@ def open_results_store(
         yield ResultsStore(identity, None, kind)
         return
     folder = check_path("out", out).resolve()
-    if folder.exists() and not folder.is_dir():
-        raise kind.error(f"{folder} is a file: give a folder")
-    folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder, kind.error):
         store: ResultsStore[Any] = ResultsStore(identity, folder, kind)
         try:
