@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_path
 from tactile_bayes.comparison.families import SHAPES
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import check_record
@@ -123,9 +122,8 @@ def band_by_assumption(
         As in `calibrate`.
     """
     study = _Study(tuple(alternatives_of(experiment)), x, probability, seed)
-    folder = None if out is None else check_path("out", out).resolve()
     count = len(study.alternatives)
-    with open_results_store(study.identity, folder, _ALTERNATIVES) as store:
+    with open_results_store(study.identity, out, _ALTERNATIVES) as store:
         kept = keep_outcomes(store, _inferred, study, count, workers=workers, scheduler=scheduler, progress=progress)
     outcomes = [kept[number] for number in range(count)]
     bands = np.full((count, len(_EDGES), x.size), np.nan)

@@ -21,7 +21,6 @@ from tactile_bayes.calibration.replicate import Outcome, compared, contact_cover
 from tactile_bayes.calibration.simulation import Simulation
 from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.calibration.summary import summary
-from tactile_bayes.checks import check_path
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_events import events_of
@@ -183,8 +182,7 @@ def posterior_calibration(
         As in `calibrate`.
     """
     task = _task(posterior, experiment, replicates, probability, seed)
-    folder = None if out is None else check_path("out", out).resolve()
-    with open_results_store(task.identity, folder, REPLICATES) as store:
+    with open_results_store(task.identity, out, REPLICATES) as store:
         kept = keep_outcomes(
             store, _replicate, task, replicates, workers=workers, scheduler=scheduler, progress=progress
         )

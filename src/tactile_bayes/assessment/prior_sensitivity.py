@@ -9,6 +9,7 @@ import xarray as xr
 from arviz_stats.base.array import array_stats
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.diagnostics.record_check import LOST_BELOW
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.stored_experiment import points_of
 from tactile_bayes.uncertainty.band import contour_heights
@@ -22,9 +23,6 @@ _SENSITIVE = 0.05
 """Sensitivity from which a component matters (Kallioinen et al. 2024)."""
 
 _POWERS = (0.99, 1.01)
-
-_LOST = 20.0
-"""Log-probability below the median beyond which a draw belongs to a lost walker and is left out."""
 
 
 def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapping[str, Floats]) -> xr.Dataset:
@@ -66,7 +64,7 @@ def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapp
     heights = {name: _heights(posterior, x, every.shape) for name, x in regions.items() if x.size}
     rows = {name: points[..., i][None] for i, name in enumerate(model.names)}
     rows |= {f"band {name}": values for name, values in heights.items()}
-    kept = np.flatnonzero((every > np.median(every) - _LOST).all(axis=0))
+    kept = np.flatnonzero((every > np.median(every) - LOST_BELOW).all(axis=0))
     found = np.zeros((len(rows), len(_COMPONENTS)))
     for k, name in enumerate(_COMPONENTS):
         weights = [_weights(parts[name][:, kept], power) for power in _POWERS]

@@ -190,8 +190,7 @@ def calibrate(
         probability=probability,
         world=world,
     )
-    folder = None if out is None else check_path("out", out).resolve()
-    with open_results_store(experiment.identity, folder, REPLICATES) as store:
+    with open_results_store(experiment.identity, out, REPLICATES) as store:
         kept = keep_outcomes(
             store, replicate, experiment, int(replicates), workers=workers, scheduler=scheduler, progress=progress
         )

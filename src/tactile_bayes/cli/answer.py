@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-__all__ = ["Answer", "columns_of", "print_answer", "print_object", "table_of"]
+__all__ = ["Answer", "columns_of", "print_answer", "print_object", "table_of", "text_of"]
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,11 @@ def table_of(
     for row in rows:
         table.add_row(*row)
     return table
+
+
+def text_of(value: float, form: str = ".1f") -> str:
+    """Return a number as text in a form, or a dash for NaN."""
+    return "–" if value != value else format(value, form)
 
 
 def columns_of(dataset: Any, dim: str) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_bayes.cli.answer import Answer, columns_of, table_of
+from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Out, Output, Seed
 from tactile_bayes.cli.record_options import Record, RecordOptions
 from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
@@ -110,16 +110,12 @@ def _table(found: xr.Dataset) -> Table:
     left_out = "elpd" in found
     rows = []
     for row in columns_of(found, "family"):
-        cells = [chance(row["probability"]), _fixed(row["log_evidence"])]
+        cells = [chance(row["probability"]), text_of(row["log_evidence"])]
         if left_out:
             cells += [_with_error(row["elpd_difference"], row["elpd_difference_error"]), chance(row["weight"])]
         rows.append([row["family"], *cells, chance(row["p_value"]), "yes" if row["fits"] else "no"])
     heads = ["family", "probability", "log evid.", *(["elpd diff.", "weight"] if left_out else []), "check p", "fits"]
     return table_of(heads, rows, left=["family", "fits"])
-
-
-def _fixed(value: float) -> str:
-    return "–" if value != value else f"{value:.1f}"
 
 
 def _with_error(value: float, error: float) -> str:

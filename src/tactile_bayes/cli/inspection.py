@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_bayes.cli.answer import Answer, columns_of, table_of
+from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Output
 from tactile_bayes.cli.record_options import Record, RecordOptions
 from tactile_bayes.cli.rig_options import Friction
@@ -130,7 +130,7 @@ def _sweeps(sweeps: xr.Dataset) -> Table:
     for i, number in enumerate(sweeps.sweep.values):
         row = sweeps.isel(sweep=i)
         start, end, step = (np.degrees(float(row[f"drive_{name}"])) for name in ("angle_from", "angle_to", "step"))
-        ends = [_place(np.degrees(row[f"{name}_drive_angle"].values)) for name in ("onset", "snap_off")]
+        ends = [text_of(np.degrees(row[f"{name}_drive_angle"].values).mean()) for name in ("onset", "snap_off")]
         moves = [f"{start:.1f} to {end:.1f}", f"{step:.3g}"]
         if "carried" in row and bool(row.carried):
             along = (_travel(float(row[name]), unit) for name in ("travel", "travel_step"))
@@ -158,12 +158,6 @@ def _travel(value: float, unit: str) -> str:
     return f"{value:.4g} L" if unit == "1" else f"{1e3 * value:.4g} mm"
 
 
-def _place(beside: Any) -> str:
-    """Return the middle between the samples beside an event."""
-    middle = float(beside.mean())
-    return "–" if middle != middle else f"{middle:.1f}"
-
-
 def _channels(channels: xr.Dataset) -> Table:
     """Return the table of channels, each in one unit; the last column is the correlation of unloaded neighbours."""
     from tactile_bayes.diagnostics.inspection.messages import prefix_of
@@ -178,7 +172,7 @@ def _channels(channels: xr.Dataset) -> Table:
             none = value != value or (column == "resolution" and value == 0.0)
             cells.append("–" if none else f"{value:.2g}" if column == "bias_uncertainty" else f"{value:.3g}")
         label = name if unit == "1" else f"{name} [{prefix}{unit}]"
-        rows.append([label, *cells, "–" if like != like else f"{like:+.2f}"])
+        rows.append([label, *cells, text_of(like, "+.2f")])
     heads = ["channel", "from", "to", "zero", "± s.e.", "noise", "stated", "step", "corr."]
     return table_of(heads, rows, left=["channel"])
 

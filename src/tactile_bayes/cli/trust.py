@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_bayes.cli.answer import Answer, columns_of, table_of
+from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Output, Seed
 from tactile_bayes.cli.interrupts import resumable
 from tactile_bayes.cli.task_bar import step_bar
@@ -109,15 +109,11 @@ def _assumptions(found: xr.Dataset) -> list[Table | str]:
     if "assumption" not in found.dims:
         return []
     rows = [
-        (row["assumption"], *(_moved(row[f"moved_{region}"]) for region in ("in_gap", "beside")), _yes(row["fits"]))
+        (row["assumption"], text_of(row["moved_in_gap"], ".2f"), text_of(row["moved_beside"], ".2f"), _yes(row["fits"]))
         for row in columns_of(found, "assumption")
     ]
     heads = ["assumption instead", "moves in the gap", "beside it [band widths]", "fits"]
     return [table_of(heads, rows, left=["assumption instead", "fits"]), ""]
-
-
-def _moved(value: float) -> str:
-    return "–" if value != value else f"{value:.2f}"
 
 
 def _yes(value: int) -> str:

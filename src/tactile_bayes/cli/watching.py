@@ -30,9 +30,6 @@ _STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl
 
 _PAGE = "watch.html"
 
-_SURPRISING = 1000
-"""Least e-value of a model that is wrong; of a right one a stream reaches it with a probability of at most 0.001."""
-
 _RARE = 0.001
 """Smallest probability of a shape that is written out."""
 

@@ -103,9 +103,6 @@ def generate(
     """
     spec = spec if isinstance(spec, Specification) else read_specification(spec)
     folder = Path(out).resolve()
-    if folder.exists() and not folder.is_dir():
-        raise SpecificationError(f"{folder} is a file: give a folder")
-    folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder, SpecificationError):
         manifest = _begun(spec, folder)
         done = {shard.file for shard in manifest.shards}

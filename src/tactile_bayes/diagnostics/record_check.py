@@ -10,19 +10,18 @@ import xarray as xr
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour_groups import FEWEST_PREDICTIONS
 from tactile_bayes.inference.discrepancy import PARAMETERS
 from tactile_bayes.inference.record_segments import RecordSegments
 from tactile_bayes.inference.result import record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.scatter import rough_noise
-from tactile_bayes.record import carried_sweeps, travels_of
+from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
 
-__all__ = ["DISCREPANCIES", "Residuals", "check_record", "residuals_of"]
+__all__ = ["DISCREPANCIES", "LOST_BELOW", "Residuals", "check_record", "residuals_of"]
 
 DISCREPANCIES = ("runs", "neighbours", "largest", "loaded", "zero")
 """Ways in which a record can differ from those that the posterior predicts."""
-
-_FEWEST_PREDICTIONS = 100
 
 _FEWEST_SAMPLES = 5
 """Number of loaded, or of unloaded, samples in a channel below which they are not judged."""
@@ -36,7 +35,7 @@ _WINDOWS = 8
 _EXCESS = 1.2
 """Root mean square of loaded residuals over the noise between neighbours from which they count as larger."""
 
-_LOST = 20.0
+LOST_BELOW = 20.0
 """Log-probability below the median beyond which a draw belongs to a lost walker and is left out."""
 
 _TINY = 1e-300
@@ -140,7 +139,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     residuals = residuals_of(posterior)
     channels = list(residuals)
     predictions = len(residuals[channels[0]].values) - 1
-    if predictions < _FEWEST_PREDICTIONS:
+    if predictions < FEWEST_PREDICTIONS:
         raise InferenceError(
             f"the tree holds {predictions} predictions of the record, too few to compare it with: sample longer"
         )
@@ -202,11 +201,10 @@ def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
     refuse_no_contour(posterior, "posterior_predictive", "observed_data", "constant_data", "sample_stats")
     predicted, observed = posterior["posterior_predictive"].to_dataset(), posterior["observed_data"].to_dataset()
     sweep = posterior["constant_data"].to_dataset().sweep.values
-    order = np.argsort(sweep, kind="stable")
-    sweeps = tuple(np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1))
+    sweeps = tuple(rows_of_sweeps(sweep))
     loaded = _loaded(posterior)
     log_probability = posterior["sample_stats"].to_dataset().lp
-    found = (log_probability.sel(draw=predicted.draw) > float(log_probability.median()) - _LOST).values.ravel()
+    found = (log_probability.sel(draw=predicted.draw) > float(log_probability.median()) - LOST_BELOW).values.ravel()
     residuals = {}
     for name, values in predicted.items():
         of_draws = values.values.reshape(-1, sweep.size)[found]

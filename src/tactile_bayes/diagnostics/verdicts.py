@@ -23,20 +23,20 @@ from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps
 
-__all__ = ["doubtful_sides", "verdicts"]
+__all__ = ["CONTRADICTION", "NOISE_FACTOR", "OFF_ZERO", "doubtful_sides", "verdicts"]
 
 _HOLDS, _NOT = "holds", "do not rely on it"
 """Conclusions of `trust`; another one is a reservation."""
 
 _NOISES = ("noise_scale", "moment_noise", "force_noise", *PARAMETERS)
 
-_FACTOR = 2.0
-"""Ratio of inferred to stated noise beyond which it is reported: data sheets are no more accurate."""
+NOISE_FACTOR = 2.0
+"""Ratio of found to stated noise beyond which it is reported: data sheets are no more accurate."""
 
-_OFF_ZERO = 5.0
-"""Standard errors by which a zero must be off to be reported."""
+OFF_ZERO = 5.0
+"""Standard errors by which a zero must differ from the stated one to be reported."""
 
-_CONTRADICTION = 1e-4
+CONTRADICTION = 1e-4
 """Probability of the misfit of single samples below which it is reported."""
 
 _FEWEST_PRIOR_DRAWS = 500
@@ -163,7 +163,7 @@ def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residu
             continue
         means = (of_channel.values * of_channel.scale)[:, unloaded].mean(axis=1)
         error = math.hypot(uncertainty, float(np.std(means[1:])))
-        if abs(means[0]) > _OFF_ZERO * error > 0.0:
+        if abs(means[0]) > OFF_ZERO * error > 0.0:
             unit = _unit(record, name)
             off.append(f"{name} is off by {means[0]:.3g}{unit} ({abs(means[0]) / error:.0f} standard errors)")
     if not off:
@@ -241,10 +241,10 @@ def _noise(posterior: xr.DataTree, noisier: float) -> list[str]:
     if "noise_scale" not in draws:
         return []
     factor = float(draws["noise_scale"].median())
-    if 1.0 / _FACTOR <= factor <= _FACTOR:
+    if 1.0 / NOISE_FACTOR <= factor <= NOISE_FACTOR:
         return []
     said = f"The noise is {factor:.3g} times what the load cell states"
-    if noisier < 0.5 * factor and factor > _FACTOR:
+    if noisier < 0.5 * factor and factor > NOISE_FACTOR:
         alike = f"{noisier:.2g} times as much as stated" if abs(math.log(noisier)) > 0.2 else "as stated"
         return [f"{said}, but neighbouring samples scatter {alike}: the rest is misfit, not noise."]
     return [f"{said}, and neighbouring samples scatter alike: state the noise that it has, or are the units right?"]
@@ -258,7 +258,7 @@ def _contradictions(
     if contacts is None or math.isfinite(cell.degrees_of_freedom):
         return []
     chance = float(contacts.attrs.get("misfit_probability", math.nan))
-    if not chance < _CONTRADICTION or noisier > 0.75 * _FACTOR:  # more noise than stated explains it
+    if not chance < CONTRADICTION or noisier > 0.75 * NOISE_FACTOR:  # more noise than stated explains it
         return []
     words = f"{chance:.1g}" if chance > 1e-99 else "below 1e-99"
     return [

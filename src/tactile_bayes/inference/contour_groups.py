@@ -18,7 +18,7 @@ from tactile_bayes.load_cell.discrepancy import Discrepancy, joined
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels
 
-__all__ = ["drawn_groups", "predicted_groups", "prior_draws", "unit_of"]
+__all__ = ["FEWEST_PREDICTIONS", "drawn_groups", "predicted_groups", "prior_draws", "unit_of"]
 
 _KEPT_DRAWS = 250
 """Largest number of draws of each chain for which predictions and events are stored."""
@@ -27,7 +27,7 @@ _STORED_NUMBERS = 16_000_000
 """Largest number of values in predictions and log-likelihoods, 128 MB; with four chains, fewer draws are stored from
 4,000 samples on."""
 
-_FEWEST_PREDICTIONS = 100
+FEWEST_PREDICTIONS = 100
 """Least number of predictions that the check of the record requires."""
 
 _PATHS = 200
@@ -57,7 +57,7 @@ def predicted_groups(model: ContourModel, draws: Draws, rng: np.random.Generator
     kept = draws.evenly(_KEPT_DRAWS)
     chains, samples = len(draws.samples), len(model.likelihood.measured)
     affordable = _STORED_NUMBERS // (chains * samples * (len(CHANNELS) + 1))
-    fewer = draws.evenly(max(affordable, -(-_FEWEST_PREDICTIONS // chains))) if affordable < kept.size else kept
+    fewer = draws.evenly(max(affordable, -(-FEWEST_PREDICTIONS // chains))) if affordable < kept.size else kept
     groups = _predictions(model, draws, fewer, rng)
     if fewer.size < kept.size:
         stored = f"of {fewer.size} draws of each chain, not {kept.size}, since the record has {samples} samples"

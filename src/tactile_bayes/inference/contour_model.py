@@ -248,11 +248,12 @@ class ContourModel:
             values += log_density(points[:, columns]).sum(axis=1)
         if self.nuisances.joint is not None:
             values += self.nuisances.joint.log_dependence(points[:, self._jointly])
-        values[~self._between_bounds(points)] = -np.inf
+        values[~self.within_bounds(points)] = -np.inf
         return values
 
-    def _between_bounds(self, points: Floats) -> Flags:
-        return np.asarray(((points > self.low) & (points < self.high)).all(axis=1))
+    def within_bounds(self, points: Floats) -> Flags:
+        """Return True for points, shape (n, d), between the bounds of every parameter, shape (n,)."""
+        return Ends(self.low, self.high).hold(points)
 
     def log_probability(self, points: Floats) -> Floats:
         """Return the logarithm of prior times likelihood, shape (n,); −inf outside support or reach.
@@ -325,7 +326,7 @@ class ContourModel:
 
     def _within_reach(self, points: Floats) -> Floats:
         """Return those of the points, (n, d), of which the rod reaches the contour in every sweep."""
-        points = points[self._between_bounds(points)]
+        points = points[self.within_bounds(points)]
         return points[self.likelihood.usable(self.contours(points), self.rig(points))] if len(points) else points
 
     def _zero_load(self) -> xr.Dataset:

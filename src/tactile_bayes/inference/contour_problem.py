@@ -14,6 +14,7 @@ from tactile_bayes.arrays import Flags
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_segments import without_errors
 from tactile_bayes.reconstruction import OTHER_SIDE, doubtful_sweeps, loaded_samples, side_of, with_sides
 
@@ -98,10 +99,7 @@ def _of_sides(experiment: Experiment) -> ContourProblem:
     """
     loaded = loaded_samples(experiment.record, experiment.noise.stated_cell)
     if not loaded.any():
-        raise InferenceError(
-            "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "
-            "in the record's units?"
-        )
+        raise InferenceError(NO_LOAD)
     problem = ContourProblem(experiment.model, experiment.about, loaded)
     if experiment.events:
         return problem

@@ -6,13 +6,19 @@ from collections.abc import Collection
 
 from tactile_bayes.inference.nuisances import belongs
 
-__all__ = ["CHECK_RIG", "GAUGE", "is_inferred", "what_to_try"]
+__all__ = ["CHECK_RIG", "GAUGE", "NO_LOAD", "is_inferred", "what_to_try"]
 
 CHECK_RIG = (
     "check the rod (length, flexural rigidity, rest curvature, taper, stem), unit, sign and axes of each load, the "
     "zero of the drive angle and its backlash, the point where the load cell takes its moment, and the friction"
 )
 """Advice if loads contradict one another for any contour: the cause is the rig."""
+
+NO_LOAD = (
+    "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise in the "
+    "record's units?"
+)
+"""What an error says of a record without a loaded sample."""
 
 GAUGE = "gauge"
 """Name of the family of a gauge, whose contour is known."""

@@ -20,6 +20,7 @@ from tactile_bayes.record import (
     carried_sweeps,
     frame_of,
     present_channels,
+    rows_of_sweeps,
     travels_of,
     validate,
 )
@@ -138,8 +139,7 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     rounding = 4.0 * np.finfo(float).eps * np.abs(readings).max(axis=0)
     floor = np.maximum(steps**2 / 12.0, rounding**2)
     sweep = record["sweep"].values
-    order = np.argsort(sweep, kind="stable")
-    sweeps = np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
+    sweeps = rows_of_sweeps(sweep)
     bounds = [_if_long_enough(contact_bounds(readings[rows], false_alarm, floor), len(rows)) for rows in sweeps]
     stretches = []
     for rows, of_sweep in zip(sweeps, bounds, strict=True):

@@ -126,7 +126,7 @@ def tangential_arclength(
     >>> tangential_arclength(0.2, 0.6, [0.1, 0.2]).round(6)
     array([1.053211, 0.976104])
     """
-    return _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, None, 1.0, NONE)[1][8]
+    return _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, NONE)[1][8]
 
 
 def wrench_from_contact(
@@ -187,15 +187,13 @@ def wrench_from_contact(
     >>> w.phase, w.drive_angle.round(6)
     (array([1, 2], dtype=int8), array([2.901776, 2.923367]))
     """
-    known = NONE if phase is None else phase
-    of_rod: tuple[Any, ...] = friction_angle, rest_curvature, profile, side, known
-    if stem == 0.0:
-        found, columns = _states(contact_x, contact_y, slope_angle, *of_rod)
-    else:
-        found, columns = _states_on_stem(stem, contact_x, contact_y, slope_angle, *of_rod)
-    drive_angle, moment, force_x, force_y, arclength, tip_angle, by_slope, by_distance, tangential = columns
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
+    bent = sign * (rest_curvature if profile is None else profile.sign)
+    known = NONE if phase is None else phase
+    contacts: tuple[Any, ...] = sign * contact_x, contact_y, sign * slope_angle, friction_angle, bent, known, profile
+    found, columns = _states(*contacts) if stem == 0.0 else _states_on_stem(stem, *contacts)
+    drive_angle, moment, force_x, force_y, arclength, tip_angle, by_slope, by_distance, tangential = columns
     return Wrench(
         drive_angle=np.where(mirrored, np.pi - drive_angle, drive_angle),
         holding_moment=sign * moment,
@@ -221,25 +219,23 @@ def _states_on_stem(
     y: ArrayLike,
     alpha: ArrayLike,
     delta: ArrayLike,
-    curvature: ArrayLike,
-    profile: Profile | None,
-    side: ArrayLike,
+    bent: ArrayLike,
     phase: ArrayLike,
+    profile: Profile | None,
 ) -> tuple[NDArray[np.int8], Floats]:
     """`_states` of rods that begin at the end of a stem.
 
     A drive angle a puts the beginning of the rod somewhere, from where the contact takes the drive angle φ0(a). Sought
     is the a with φ0(a) = a: the farther the stem is turned, the less the rod.
     """
-    sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
-    given = np.broadcast_arrays(sign * x, y, sign * alpha, delta, sign * curvature, phase, sign)
+    given = np.broadcast_arrays(x, y, alpha, delta, bent, phase)
     shape = given[0].shape
-    x, y, alpha, delta, bent, phase, sign = (np.asarray(column.ravel()) for column in given)
+    x, y, alpha, delta, bent, phase = (np.asarray(column.ravel()) for column in given)
     bearing = np.arctan2(y, x)
     low, high, angle = bearing - _FARTHEST, bearing + _FARTHEST, bearing
     for _ in range(_MOST_HALVINGS):
         from_x, from_y = x - stem * np.cos(angle), y - stem * np.sin(angle)
-        found, columns = _states(sign * from_x, from_y, sign * alpha, delta, sign * bent, profile, sign, phase)
+        found, columns = _states(from_x, from_y, alpha, delta, bent, phase, profile)
         # Out of reach the stem is turned too far, to either side.
         off = np.where(np.isfinite(columns[0]), columns[0] - angle, np.where(angle < bearing, 1.0, -1.0))
         if not np.any((np.abs(off) > _SETTLED) & (high - low > _SETTLED)):
@@ -272,20 +268,20 @@ def _states(
     y: ArrayLike,
     alpha: ArrayLike,
     delta: ArrayLike,
-    curvature: ArrayLike,
-    profile: Profile | None,
-    side: ArrayLike,
+    bent: ArrayLike,
     phase: ArrayLike,
+    profile: Profile | None = None,
 ) -> tuple[NDArray[np.int8], Floats]:
-    """Phases, and columns of states, of contacts mirrored to forward ones."""
+    """Phases, and columns of states, shape (9, ...), of contacts mirrored to forward ones.
+
+    `bent` is the rest curvature [1/L] of arcs, mirrored with them; of rods with a profile, the sign that mirrors it.
+    """
     from tactile_bayes.mechanics.beam import varied_of  # numba takes a second to load
     from tactile_bayes.mechanics.states import continued_wrenches, wrenches
     from tactile_bayes.mechanics.tables import tables, workspace
 
     _refuse_friction(np.asarray(delta, dtype=float), 0.0 if profile is None else -MAX_FRICTION_ANGLE)
-    sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
-    of_rods = sign * (curvature if profile is None else profile.sign)
-    given = np.broadcast_arrays(sign * x, y, sign * alpha, delta, of_rods, phase)
+    given = np.broadcast_arrays(x, y, alpha, delta, bent, phase)
     shape = given[0].shape
     columns = np.stack([column.ravel() for column in given[:5]], axis=-1).astype(float)
     found, out = given[5].astype(np.int8).ravel(), np.empty((columns.shape[0], 9))

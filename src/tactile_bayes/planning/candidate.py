@@ -17,15 +17,12 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge
-from tactile_bayes.planning.record_information import parameter_scales, reading_slopes, record_information
+from tactile_bayes.planning.record_information import COARSE_STEP, parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Carried, Drive, Rotation
 from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
-
-_COARSE_STEP = 1e-3
-"""Step of finite differences of interpolated loads, over the scale of each parameter."""
 
 _DEGREES_OF_FREEDOM = 8
 _WIDENING = 1.2
@@ -137,7 +134,7 @@ def expected_of(task: tuple[Question, int]) -> Expected:
         gained = np.zeros_like(known.precision)
         if usable[k]:
             try:
-                gained = record_information(model, point, slopes=reading_slopes(model, point, _COARSE_STEP)).matrix
+                gained = record_information(model, point, slopes=reading_slopes(model, point, COARSE_STEP)).matrix
             except ReachError:
                 gained = np.zeros_like(known.precision)
         precision = known.precision + gained
@@ -177,10 +174,10 @@ def _nested(
     known = question.known
     measured = measured_of(model, point, rng)
     after = known.model(measured)
-    steps = _COARSE_STEP * parameter_scales(after, point)
+    steps = COARSE_STEP * parameter_scales(after, point)
 
     def densities(points: Floats) -> Floats:
-        inside = ((points > after.low) & (points < after.high)).all(axis=1)
+        inside = after.within_bounds(points)
         values = np.full((len(points), measured.sizes["sample"]), -np.inf)
         values[inside] = after.log_likelihood(points[inside], pointwise=True)
         return values

@@ -19,7 +19,6 @@ from tactile_bayes.checks import (
     TINY,
     check_choice,
     check_numbers,
-    check_path,
     check_probability,
     check_seed,
     check_whole_number,
@@ -203,8 +202,7 @@ def design(
     candidates = tuple(Candidate(choice, float(step)) for choice, step in product(choices, steps))
     x = np.linspace(*_span(span, knowledge), _GRID_POINTS)
     question = Question(knowledge, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
-    folder = None if out is None else check_path("out", out).resolve()
-    with open_results_store(_identity(question), folder, CANDIDATES) as store:
+    with open_results_store(_identity(question), out, CANDIDATES) as store:
         found = keep_outcomes(
             store, expected_of, question, len(candidates), workers=workers, scheduler=scheduler, progress=progress
         )

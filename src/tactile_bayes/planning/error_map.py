@@ -21,7 +21,6 @@ from tactile_bayes.checks import (
     check_number,
     check_numbers,
     check_optional,
-    check_path,
     check_probability,
     check_seed,
     check_whole_number,
@@ -191,8 +190,7 @@ def error_map(
         float(probability),
         int(seed),
     )
-    folder = None if out is None else check_path("out", out).resolve()
-    with open_results_store(_identity(task), folder, CELLS) as store:
+    with open_results_store(_identity(task), out, CELLS) as store:
         kept = keep_outcomes(
             store, error_cell, task, len(cells), workers=workers, scheduler=scheduler, progress=progress
         )

@@ -11,12 +11,10 @@ from scipy.linalg import solve_triangular
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.numerics.differences import central_slopes
+from tactile_bayes.planning.record_information import STEP
 from tactile_bayes.sweep import Scan
 
 __all__ = ["Stretch", "band_factor", "deviation_of_heights", "height_slopes", "stretches"]
-
-_STEP = 1e-5
-"""Step of finite differences, over the scale of each parameter."""
 
 _GRID_POINTS = 25
 """Number of grid points in every stretch."""
@@ -69,7 +67,7 @@ def height_slopes(model: ContourModel, point: Floats, x: Floats) -> Floats:
 
     slopes = np.zeros((x.size, point.size))
     scale = np.maximum(np.abs(point[:own]), 1e-3 * model.likelihood.rod.length)
-    slopes[:, :own] = central_slopes(heights, point[:own], _STEP * scale)
+    slopes[:, :own] = central_slopes(heights, point[:own], STEP * scale)
     return slopes
 
 

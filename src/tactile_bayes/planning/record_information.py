@@ -17,6 +17,8 @@ from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.record import CHANNELS
 
 __all__ = [
+    "COARSE_STEP",
+    "STEP",
     "ReadingSlopes",
     "RecordInformation",
     "prior_precision",
@@ -25,8 +27,8 @@ __all__ = [
     "scaled_cell",
 ]
 
-_STEP = 1e-5
-"""Step of finite differences, over the scale of each parameter."""
+STEP, COARSE_STEP = 1e-5, 1e-3
+"""Steps of finite differences, over the scale of each parameter: of exact loads, and of interpolated ones."""
 
 
 class ReadingSlopes(NamedTuple):
@@ -55,7 +57,7 @@ class RecordInformation(NamedTuple):
         return np.asarray(flat.T @ flat + np.diag(self.of_noise))
 
 
-def reading_slopes(model: ContourModel, point: Floats, step: float = _STEP) -> ReadingSlopes:
+def reading_slopes(model: ContourModel, point: Floats, step: float = STEP) -> ReadingSlopes:
     """Return loads and derivatives of a record's readings at a point of the model's parameters.
 
     Parameters
@@ -188,5 +190,5 @@ def _by_angle(model: ContourModel, point: Floats) -> Floats:
         loads, _ = model.likelihood.predict(many, every)
         return np.asarray((model.likelihood.load_cell.expected(loads) / scale).reshape(len(angles), -1))
 
-    slopes = central_slopes(readings, np.zeros(1), _STEP)
+    slopes = central_slopes(readings, np.zeros(1), STEP)
     return np.asarray(slopes.reshape(-1, len(CHANNELS)) * scale)

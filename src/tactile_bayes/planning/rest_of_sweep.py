@@ -11,14 +11,11 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.result import record_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import known_from_posterior
-from tactile_bayes.planning.record_information import reading_slopes, record_information
+from tactile_bayes.planning.record_information import COARSE_STEP, reading_slopes, record_information
 from tactile_bayes.record import carried_sweeps
 from tactile_bayes.sweep import Rotation, record_template
 
 __all__ = ["rest_of_sweep"]
-
-_STEP = 1e-3
-"""Step of finite differences of interpolated loads, over the scale of each parameter."""
 
 
 def rest_of_sweep(
@@ -103,7 +100,7 @@ def rest_of_sweep(
     now, then = np.empty((count, at.size)), np.empty((count, at.size))
     for k, point in enumerate(own.points):
         slopes = height_slopes(model, point, at)
-        gained = record_information(model, point, slopes=reading_slopes(model, point, _STEP)).matrix
+        gained = record_information(model, point, slopes=reading_slopes(model, point, COARSE_STEP)).matrix
         now[k] = factor * deviation_of_heights(slopes, own.precision)
         then[k] = factor * deviation_of_heights(slopes, own.precision + gained)
     unit = {"units": "1" if known.rod.is_dimensionless else "m"}

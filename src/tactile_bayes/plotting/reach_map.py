@@ -208,10 +208,8 @@ def _draw(
 def _median(posterior: xr.DataTree) -> tuple[Floats, Floats]:
     """Return points of the posterior's median along the touched stretch."""
     from tactile_bayes.uncertainty.band import contour_heights
+    from tactile_bayes.uncertainty.summary import reach
 
-    events = posterior["events"].to_dataset()
-    ends = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
-    left, right = np.quantile(ends, [0.05, 0.95])
-    x = np.linspace(left, right, 201)
+    x = reach(posterior)
     heights = contour_heights(posterior, x, _DRAWS)
     return x, np.median(np.where(np.isnan(heights), np.inf, heights), axis=0)  # beyond its ends a contour is upright

@@ -14,7 +14,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.contact_bounds import FEWEST, contact_bounds
 from tactile_bayes.numerics.scatter import rough_noise
-from tactile_bayes.record import CHANNELS, present_channels, rod_of
+from tactile_bayes.record import CHANNELS, present_channels, rod_of, rows_of_sweeps
 
 __all__ = [
     "CONTACT_SIDES",
@@ -167,8 +167,7 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
     unknown = float(np.hypot(_ZERO * unit, cell.bias_uncertainty[0]))
     present = present_channels(record)
     sweep, moment = record.sweep.values, record.holding_moment.values
-    order = np.argsort(sweep, kind="stable")
-    parts = np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
+    parts = rows_of_sweeps(sweep)
     if CHANNELS[0] not in present:
         return [_Judged(int(sweep[rows[0]]), rows, np.inf, np.inf) for rows in parts]
     readings = np.stack([record[name].values for name in present], axis=-1)

@@ -17,7 +17,7 @@ from tactile_bayes.record.schema import (
     column_of,
     present_channels,
 )
-from tactile_bayes.record.sweep import base_of_sample, bases_of, carried_sweeps, travels_of
+from tactile_bayes.record.sweep import base_of_sample, bases_of, carried_sweeps, rows_of_sweeps, travels_of
 from tactile_bayes.record.units import rod_of, to_dimensionless, to_si, with_rod
 from tactile_bayes.record.validation import validate
 
@@ -43,6 +43,7 @@ __all__ = [
     "read_record",
     "record_hash",
     "rod_of",
+    "rows_of_sweeps",
     "to_dimensionless",
     "to_si",
     "travels_of",

@@ -16,7 +16,7 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.record.schema import DIRECTIONS, LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source
 
-__all__ = ["base_of_sample", "bases_of", "carried_sweeps", "refuse_impossible_sweeps", "travels_of"]
+__all__ = ["base_of_sample", "bases_of", "carried_sweeps", "refuse_impossible_sweeps", "rows_of_sweeps", "travels_of"]
 
 
 def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
@@ -127,6 +127,12 @@ def bases_of(record: xr.Dataset) -> list[tuple[float, float]]:
     return base_of_sample(record)[0]
 
 
+def rows_of_sweeps(sweep: NDArray[np.integer]) -> list[Index]:
+    """Return the rows of each sweep, from sweep numbers of shape (samples,), in the order of these numbers."""
+    order = np.argsort(sweep, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
+
+
 def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | Index]:
     """Yield the rows of each sweep in the order of measurement, as slices if sweeps are contiguous."""
     steps = np.flatnonzero(sweep[1:] != sweep[:-1]) + 1
@@ -135,8 +141,7 @@ def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | Index]:
         ends = [0, *steps.tolist(), sweep.size]
         yield from (slice(begin, end) for begin, end in pairwise(ends))
     else:
-        order = np.argsort(sweep, kind="stable")
-        yield from np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
+        yield from rows_of_sweeps(sweep)
 
 
 def _ends(rows: slice | Index) -> tuple[int, int]:

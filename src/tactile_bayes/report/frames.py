@@ -20,7 +20,7 @@ from tactile_bayes.inference.stored_experiment import joint_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
-from tactile_bayes.record import rod_of
+from tactile_bayes.record import rod_of, rows_of_sweeps
 from tactile_bayes.sweep import ManyUnits, to_lab_frame
 
 __all__ = ["Motion", "motion_of"]
@@ -106,9 +106,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
 
     numbers = record.sweep.values
     every = max(1, -(-numbers.size // most))
-    order = np.argsort(numbers, kind="stable")
-    by_sweep = np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
-    samples = np.concatenate([rows[::every] for rows in by_sweep])
+    samples = np.concatenate([rows[::every] for rows in rows_of_sweeps(numbers)])
     batch_indices = np.empty(numbers.size, dtype=np.intp)
     for index, segment in enumerate(likelihood.segments):
         batch_indices[segment.samples] = index

@@ -14,7 +14,7 @@ import xarray as xr
 from tactile_bayes import plotting
 from tactile_bayes.arrays import Floats
 from tactile_bayes.diagnostics.inspection import CellSource, known_cell
-from tactile_bayes.diagnostics.verdicts import doubtful_sides
+from tactile_bayes.diagnostics.verdicts import CONTRADICTION, doubtful_sides
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_messages"]
-
-_CONTRADICTION = 1e-4
-"""Probability of the misfit below which it is reported first."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +137,7 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
         words = f"Misfit {total:.0f} in {samples} samples"
         if math.isnan(chance):
             sentences.append(f"{words}; they share an unknown bias, so that no probability can be stated.")
-        elif chance < _CONTRADICTION:
+        elif chance < CONTRADICTION:
             against.append(
                 f"The loads of single samples contradict one another, {words[0].lower()}{words[1:]} (noise explains it "
                 f"with probability {chance:.1g}): {CHECK_RIG}."

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.paths import Paths
 from tactile_bayes.mechanics.phases import NONE
+from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 
 __all__ = ["EVENT_COLUMNS", "SAMPLE_COLUMNS", "ManyUnits", "phases_of", "sweep_events", "sweep_samples"]
 
-LOADS = ("holding_moment", "force_x", "force_y")
-
-SAMPLE_COLUMNS = (*LOADS, "contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
+SAMPLE_COLUMNS = (*CHANNELS, "contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
 """Columns of samples; loads are 0 out of contact, the others NaN."""
 
 EVENT_COLUMNS = ("drive_angle", "slope_angle", "contact_x", "contact_y")
@@ -53,7 +52,7 @@ def sweep_samples(paths: Paths, units: ManyUnits, index: Index) -> dict[str, NDA
     """
     states, each = paths.sampled_states(index), index[..., None]
     found = to_lab_frame(paths.sweep_frame, each, states, units.of(each))
-    for name in LOADS:
+    for name in CHANNELS:
         np.copyto(found[name], 0.0, where=states.wrench.phase == NONE)
     return {name: found[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
 

@@ -139,13 +139,18 @@ def _lock(folder: Path) -> int | None:
 
 @contextmanager
 def alone_in(folder: Path, refusal: type[Exception]) -> Iterator[None]:
-    """Keep other runs out of a folder, where the system has locks; the lock ends with the process.
+    """Create a folder if it is missing, and keep other runs out of it where the system has locks.
+
+    The lock ends with the process.
 
     Raises
     ------
     Exception
-        Of the type `refusal`, if another run is at work there.
+        Of the type `refusal`, if there is a file in its place, or another run is at work there.
     """
+    if folder.exists() and not folder.is_dir():
+        raise refusal(f"{folder} is a file: give a folder")
+    folder.mkdir(parents=True, exist_ok=True)
     try:
         handle = _lock(folder)
     except BlockingIOError:

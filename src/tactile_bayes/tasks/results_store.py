@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from tactile_bayes.checks import check_path
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.tasks.files import alone_in, write_atomically
 from tactile_bayes.tasks.workers import run_tasks
@@ -74,25 +76,25 @@ class ResultsStore(Generic[Outcome]):
 
 
 @contextmanager
-def open_results_store(identity: Mapping[str, str], folder: Path | None, kind: Kind) -> Iterator[ResultsStore[Any]]:
+def open_results_store(
+    identity: Mapping[str, str], out: str | os.PathLike[str] | None, kind: Kind
+) -> Iterator[ResultsStore[Any]]:
     """Open the results store in a folder, which is created if it does not exist; write it at the end of the block.
 
     Parameters
     ----------
     identity : mapping of str to str
         Description of all that the outcomes depend on.
-    folder : Path, optional
-        By default outcomes stay in memory.
+    out : str or path, optional
+        The folder; by default outcomes stay in memory.
     kind : Kind
         Its error is raised if the folder holds results of another experiment, or a file that cannot be read, or if
         another run uses it.
     """
-    if folder is None:
+    if out is None:
         yield ResultsStore(identity, None, kind)
         return
-    if folder.exists() and not folder.is_dir():
-        raise kind.error(f"{folder} is a file: give a folder")
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = check_path("out", out).resolve()
     with alone_in(folder, kind.error):
         store: ResultsStore[Any] = ResultsStore(identity, folder, kind)
         try:

@@ -7,9 +7,10 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.diagnostics.inspection import known_cell
 from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, stuck, uneven_steps
-from tactile_bayes.diagnostics.inspection.stretches import autocorrelation, rows_of_sweeps, unloaded_stretches
+from tactile_bayes.diagnostics.inspection.stretches import autocorrelation, unloaded_stretches
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import CHECK_RIG
+from tactile_bayes.record import rows_of_sweeps
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 
 COARSE = np.radians(12.0)

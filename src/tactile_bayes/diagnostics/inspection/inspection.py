@@ -15,13 +15,13 @@ from tactile_bayes.checks import check_optional, check_probability
 from tactile_bayes.diagnostics.inspection.fit import Fit, fit_of
 from tactile_bayes.diagnostics.inspection.known_cell import known_cell
 from tactile_bayes.diagnostics.inspection.messages import UNFIT, inspection_messages
-from tactile_bayes.diagnostics.inspection.stretches import rows_of_sweeps, unloaded_stretches
+from tactile_bayes.diagnostics.inspection.stretches import unloaded_stretches
 from tactile_bayes.diagnostics.inspection.tables import channel_table, sample_table, sweep_table
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, present_channels, validate
+from tactile_bayes.record import CHANNELS, present_channels, rows_of_sweeps, validate
 
 __all__ = ["Inspection", "inspect_record"]
 

@@ -12,6 +12,7 @@ from tactile_bayes.arrays import Flags
 from tactile_bayes.diagnostics.inspection.corrections import OTHER_ANGLE
 from tactile_bayes.diagnostics.inspection.fit import Fit
 from tactile_bayes.diagnostics.units_and_signs import CHECK_UNITS
+from tactile_bayes.diagnostics.verdicts import NOISE_FACTOR, OFF_ZERO
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.nuisances import BIAS
 from tactile_bayes.load_cell import LoadCell
@@ -22,12 +23,6 @@ __all__ = ["UNFIT", "inspection_messages", "prefix_of", "quantity"]
 UNFIT = 0.25
 """Share of loaded samples without a fitting contact above which it is reported: a rod 10 % stiffer than stated stays
 below it at the usual noise."""
-
-_FACTOR = 2.0
-"""Ratio of estimated to stated noise beyond which it is reported, as for verdicts."""
-
-_OFF_ZERO = 5.0
-"""Standard errors by which a zero must differ from the stated one."""
 
 _FAR = 3.0
 """Standard deviations of a bias's prior beyond which `verdicts` would report the bias."""
@@ -70,8 +65,8 @@ def inspection_messages(
     )
 
 
-def quantity(value: float, unit: str, digits: int = 3) -> str:
-    """Return a value with its unit as text, in SI with a prefix.
+def quantity(value: float, unit: str) -> str:
+    """Return a value with its unit as text, to three digits, in SI with a prefix.
 
     Examples
     --------
@@ -79,9 +74,9 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     ('12.5 mN', '0.0125', '0 N m')
     """
     if unit == "1":
-        return f"{value:.{digits}g}"
+        return f"{value:.3g}"
     size, prefix = prefix_of(value)
-    return f"{value / size:.{digits}g} {prefix}{unit}"
+    return f"{value / size:.3g} {prefix}{unit}"
 
 
 def prefix_of(value: float) -> tuple[float, str]:
@@ -223,7 +218,7 @@ def _zeros(
         away, error = float(row.bias - row.stated_bias), float(row.bias_uncertainty)
         stated = 0.0 if cell is None else cell.bias_uncertainty[CHANNELS.index(str(row.channel.values))]
         error = float(np.hypot(error, stated))
-        if abs(away) > _OFF_ZERO * error > 0.0:
+        if abs(away) > OFF_ZERO * error > 0.0:
             off.append(
                 f"{row.channel.values} is off by {quantity(away, str(row.unit.values))} "
                 f"({abs(away) / error:.0f} standard errors)"
@@ -266,7 +261,7 @@ def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm
         for row in _rows(channels):
             stated, found, error = (float(row[name]) for name in ("stated_noise", "noise", "noise_uncertainty"))
             ratio = found / stated if stated else np.nan
-            if not 1.0 / _FACTOR <= ratio <= _FACTOR and abs(found - stated) > _OFF_ZERO * error:
+            if not 1.0 / NOISE_FACTOR <= ratio <= NOISE_FACTOR and abs(found - stated) > OFF_ZERO * error:
                 unit = str(row.unit.values)
                 messages.append(
                     f"The noise of {row.channel.values} is {quantity(found, unit)} in unloaded samples, and stated as "

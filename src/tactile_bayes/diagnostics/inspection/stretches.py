@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.numerics.scatter import robust_deviation
 
-__all__ = ["Autocorrelation", "autocorrelation", "centred", "rows_of_sweeps", "unloaded_stretches"]
+__all__ = ["Autocorrelation", "autocorrelation", "centred", "unloaded_stretches"]
 
 _CUT = 4.0
 """Robust standard deviations at which residuals are clipped, so that no single outlier dominates."""
@@ -23,12 +22,6 @@ class Autocorrelation(NamedTuple):
     """Coefficient, corrected for the bias from subtracting means; NaN if there are too few samples."""
     score: float
     """Coefficient in standard errors, about standard normal for white noise."""
-
-
-def rows_of_sweeps(sweep: NDArray[np.integer]) -> list[Index]:
-    """Return the rows of each sweep, from sweep numbers of shape (samples,), in the order of these numbers."""
-    order = np.argsort(sweep, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
 
 
 def unloaded_stretches(sweeps: list[Index], unloaded: Flags) -> list[Index]:

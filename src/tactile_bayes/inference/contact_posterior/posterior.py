@@ -27,6 +27,7 @@ from tactile_bayes.inference.contact_posterior.draws import (
 )
 from tactile_bayes.inference.contact_posterior.importance import LARGEST_K, LEAST_DRAWS
 from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
+from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.contact_coordinates import PLACE
@@ -163,10 +164,7 @@ def infer_contacts(
         )
     density, loaded = _density(measured, cell, float(np.arctan(friction)), prior)
     if not loaded.size:
-        raise InferenceError(
-            "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "
-            "in the record's units?"
-        )
+        raise InferenceError(NO_LOAD)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         found = draw_contacts(density, draws, method, spawn(seed, 1)[0], settings, progress)
         groups = _groups(measured, density, loaded, found.points)

@@ -189,8 +189,5 @@ def open_checkpoint(
         If the path is a file, or the folder is in use, damaged, of another run, or holds other files.
     """
     folder = Path(path).resolve()
-    if folder.exists() and not folder.is_dir():
-        raise InferenceError(f"{folder} is a file: give a folder as checkpoint")
-    folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder, InferenceError):
         yield Checkpoint(folder, identity, shape)
