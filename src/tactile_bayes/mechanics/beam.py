@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.forward_table import chord_in, pose_in, sheet
+from tactile_bayes.mechanics.forward_table import PARTS, chord_in, has_parts, part_in, pose_in, sheet
 from tactile_bayes.mechanics.pose import Pose, by_arclength, pose, pose_and_slopes
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.profile_pose import at_contact, part_along, pose_along_and_slopes
@@ -406,19 +406,21 @@ def _from_tip(varied: Varied | None, psi1: float) -> March:
 
 
 @compiled
-def loaded_part(beam: Beam, psi1: float, force: float, share: float, before: March) -> March:
-    """Point of a rod in tip contact, at a share of the arc length from the tip, as seen from there as in `pose`.
+def loaded_part(beam: Beam, psi1: float, force: float, part: int, before: March) -> March:
+    """End of a part of a rod in tip contact, counted from the tip, as seen from there as in `pose`.
 
-    The walk goes on from a point nearer the tip.
+    There are `PARTS` of the same length, and the walk goes on from the end of the part before.
     """
-    return _loaded_part(beam.varied, beam.curvature, psi1, force, share, before)
+    return _loaded_part(beam.varied, beam.curvature, psi1, force, part, before)
 
 
 @compiled
-def _loaded_part(
-    varied: Varied | None, curvature: float, psi1: float, force: float, share: float, before: March
-) -> March:
+def _loaded_part(varied: Varied | None, curvature: float, psi1: float, force: float, part: int, before: March) -> March:
+    share = part / PARTS
     if varied is None:
         here = pose(psi1, share, force, curvature)
         return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v), 0)
+    is_known = varied.slenderness > 0.0 and varied.sign == varied.profile.sign
+    if is_known and has_parts(varied.sheet, force):
+        return March(1.0 - share, 0, part_in(varied.sheet, psi1, force, part, before.state), 0)
     return part_along(varied.profile, before, 1.0 - share, force, varied.work)

@@ -8,13 +8,11 @@ from tactile_bayes.mechanics.beam import free_end, from_tip, loaded_part, rest_c
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import REST
 from tactile_bayes.mechanics.equilibrium import Equilibrium, Scene, tangential_psi1
+from tactile_bayes.mechanics.forward_table import PARTS
 from tactile_bayes.mechanics.leg import PLACE, Leg, LegCurves, guess
 from tactile_bayes.mechanics.outline import Outline, Place, ends, is_inside, narrower, place
 
 __all__ = ["second_contact"]
-
-_BODY = 8
-"""Number of parts of the rod between which a second contact is looked for."""
 
 _SHORT_END = 1e-3
 """Length of a free end [L] up to which its curvature at the contact tells whether it is in the object."""
@@ -61,11 +59,11 @@ def _touches_twice(scene: Scene, tip: bool, at: Equilibrium, wholly: bool, low: 
         if 0.5 * beam.most_curvature <= turned <= _ACROSS:  # the rod is bent toward the object no more than at rest
             return False
         part, (cos, sin) = from_tip(beam, q), _along(spot, scene.rig.friction_angle)
-        for j in range(1, _BODY):
-            part = loaded_part(beam, q, at.force, j / _BODY, part)
+        for j in range(1, PARTS):
+            part = loaded_part(beam, q, at.force, j, part)
             u, v = part.state.u, part.state.v
             x, y = -u * cos + v * sin, -u * sin - v * cos
-            if y * spot.cos > x * spot.sin and is_inside(outline, 1.0 - j / _BODY, spot.x + x, spot.y + y, low, high):
+            if y * spot.cos > x * spot.sin and is_inside(outline, 1.0 - j / PARTS, spot.x + x, spot.y + y, low, high):
                 return True
     elif q < 1.0 - _SHORT_END:
         along, across = free_end(beam, q)

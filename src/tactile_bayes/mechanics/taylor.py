@@ -42,6 +42,7 @@ __all__ = [
     "most_rest_curvature",
     "moved",
     "rest_curvature_at",
+    "rigidity_at",
     "series",
     "slope_series",
     "slopes_moved",
@@ -137,6 +138,16 @@ def rest_curvature_at(profile: Profile, cell: int, arclength: float) -> float:
     for k in range(profile.curvature.shape[1] - 1, -1, -1):
         value = value * offset + profile.curvature[cell, k]
     return profile.sign * (value + profile.bend)
+
+
+@compiled
+def rigidity_at(profile: Profile, cell: int, arclength: float) -> float:
+    """EI(s)/EI(0) at a point of a cell."""
+    value, offset = 0.0, arclength - profile.edges[cell]
+    for k in range(profile.rigidity.shape[1] - 1, -1, -1):
+        value = value * offset + profile.rigidity[cell, k]
+    width = 1.0 - profile.taper * min(arclength, 1.0)
+    return value * (width * width) * (width * width)
 
 
 @compiled
