@@ -1,4 +1,4 @@
-"""The state of a stream, and the file from which a stream goes on after it was killed at any moment."""
+"""The state of a stream, and the file from which a stream resumes after it was killed at any moment."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class StreamState:
     share: float
     """Share of the prior within reach."""
     correlation: float
-    """Of the last steps of any update; NaN if there were none."""
+    """Correlation of the last steps of any update; NaN if there were none."""
     shift: float
     """Largest one of all updates, as of `Particles`."""
     surprise: float

@@ -24,8 +24,8 @@ Direction = Literal["forward", "backward"]
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
-"""Outcomes on the two sides of a carried rod, the most telling first; −1 stands for all others. A rod that is clear of
-the object on one side seems to have passed it on the other."""
+"""Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
+of the object on one side seems to have passed it on the other."""
 
 
 def sweep_paths(
@@ -148,7 +148,7 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
 
 
 def _point(paths: Paths) -> str:
-    """Where a path ends, in the unit of the contour."""
+    """Return the end of a path as text, in the unit of the contour."""
     frame, at = paths.sweep_frame, paths.snap_parameter
     locus = frame.contour.locate(np.where(frame.mirrored, -at, at))
     return f"({locus.x[0]:.6g}, {locus.y[0]:.6g})"
