@@ -119,7 +119,7 @@ def state_in(tree: xr.DataTree, path: Path) -> StoredState:
         raise InferenceError(f"{path} holds no state of a stream: give a file that Stream.save has written")
     if tree.attrs["format"] != _FORMAT:
         raise InferenceError(
-            f"{path} has format {tree.attrs['format']}, and this version reads format {_FORMAT}: go on with the "
+            f"{path} has format {tree.attrs['format']}, and this version reads format {_FORMAT}: use the "
             "version that wrote it, or begin a new stream"
         )
     try:
