@@ -85,7 +85,7 @@ def main() -> None:
             ]
         )
         print(f"\n{error_of_one}\n{error_of_two}\n{error_of_likeliest}\n{rate}\n{draws}\n{other_rods()}")
-        print("\nTime a piece, for ever more of them:")
+        print("\nTime per item, for growing numbers of items:")
         print_growth("state, equilibria", (1_000, 10_000, 100_000, 1_000_000), equilibria)
         print_growth("sample, reconstruct", (1_000, 10_000, 100_000, 1_000_000), reconstruct)
         print_growth("contour, trace and 180 drive angles", (10, 100, 1_000, 10_000), loads)

@@ -227,7 +227,7 @@ def test_samples_that_do_not_go_on_in_order_are_taken_anew(path, lines, follow):
     result = follow(json=True, then=[partial(write, path, head, rows[:11], rows[12:13], rows[11:12], rows[13:turn])])
     _, two, _ = objects(result)
     assert (two["samples"], two["new"], two["restarted"]) == (turn, turn, True)
-    assert "do not go on in order" in two["warnings"][0]
+    assert "do not follow in order" in two["warnings"][0]
 
 
 @pytest.mark.slow

@@ -59,5 +59,5 @@ def test_drives_that_carry_the_base_have_words_and_what_they_tell_for_each_readi
     made.is_pivot[0], made.samples[0], made["drive"] = False, 100, ("candidate", [carried, "turned about (0, 0)"])
     words = design_messages(made)
     assert words[0].startswith(f"The best drive: {carried} [m], with 100 readings: the 95% band is then 1 mm wide")
-    assert f"Per reading this tells the most: {carried} [m], 3 nats in 100 readings." in words
+    assert f"The most information per reading: {carried} [m], 3 nats in 100 readings." in words
     assert not any(sentence.startswith("It is the ") for sentence in words)

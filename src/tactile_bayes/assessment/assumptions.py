@@ -1,4 +1,4 @@
-"""Which assumption matters: the band again with each nuisance added or fixed, and with each other family."""
+"""Effect of assumptions: the band again with each nuisance added or fixed, and with each other family."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Alternative(NamedTuple):
     """An experiment that differs from another in one assumption."""
 
     name: str
-    """What is assumed, such as "friction as stated"."""
+    """The assumption, such as "friction as stated"."""
     kind: str
     """"fixed", "added" or "family"."""
     experiment: Experiment

@@ -45,7 +45,7 @@ class Disagreement(NamedTuple):
     """Disagreement of one part of a record with what the other part predicts."""
 
     ratio: float
-    """Mean square of the surprise over that of all residuals: F-distributed if the model holds."""
+    """Mean square of the prediction errors over that of all residuals: F-distributed if the model holds."""
     measured: int
     """Number of directions of parameter space that the part measures, the first degrees of freedom of the ratio."""
     moves: Floats

@@ -1,4 +1,4 @@
-"""What the prior does: sensitivity of parameters and band to power-scaling of prior and likelihood."""
+"""Effect of the prior: sensitivity of parameters and band to power-scaling of prior and likelihood."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one part of a record says of the other: each sweep, pivot or half alone predicts the rest."""
+"""Prediction of one part of a record by another: each sweep, pivot or half alone predicts the rest."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def _of_parts(parts: xr.Dataset) -> str:
     agree = "agree" if parts.attrs["passed"] else "disagree"
     return (
         f"The parts of the record {agree} (p = {_p(float(parts['overall_p_value']))}, of {parts.attrs['records']} "
-        f"predicted records): what each alone says of the rest is off by, in standard deviations, {named}."
+        f"predicted records): each alone predicts the rest with an error, in standard deviations, of {named}."
     )
 
 

@@ -148,7 +148,8 @@ class Misspecification:
     def truth(self, drawn: Mapping[str, float], stated: LoadCell, curvature_unit: float) -> dict[str, float]:
         """Return the true values of inferred parameters from drawn ones, by name, in the record's units.
 
-        What inference can find, like friction that it infers, it ought to find. It knows the stated load cell.
+        The true value of an inferred property, such as friction, is that of the simulated rig, relative to the stated
+        load cell, which inference knows.
         """
         cell = stated if self.load_cell is None else self.load_cell
         more = {

@@ -36,7 +36,7 @@ class Answer:
     numbers: Callable[[], Mapping[str, Any]]
     interrupted: str = ""
     in_a_line: bool = False
-    """Whether the object for programs is one line."""
+    """True if the object for programs is one line."""
 
 
 def print_answer(answer: Answer, as_json: bool) -> None:

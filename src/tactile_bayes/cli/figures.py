@@ -122,7 +122,7 @@ def figures(
         "figure",
         output.is_silent,
         lambda done: f"{done or 0} of {len(numbers)} figures are drawn",
-        then="the same command draws all anew",
+        then="the same command draws all of them again",
     ) as note:
         files = draw_all(out, only=numbers, formats=format or ("pdf", "png"), style=style, progress=note, **options)
     captions = {number: caption(number, **options) for number in files}

@@ -115,7 +115,7 @@ class RodOptions:
 
     @property
     def shape(self) -> dict[str, Any]:
-        """In what the options make the rod another than a straight, uniform one."""
+        """Given properties by which the rod differs from a straight, uniform one."""
         given = {"rest_curvature": self.rest_curvature, "taper": self.taper, "stem": self.stem}
         return {name: value for name, value in given.items() if value}
 

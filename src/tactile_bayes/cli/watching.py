@@ -47,8 +47,8 @@ def watch(
     family: Annotated[
         list[str] | None,
         typer.Option(
-            help="Shape, as in infer, by default parabola; of several, repeated, the probability of each is told, and "
-            "the band is averaged over them."
+            help="Shape, as in infer, by default parabola; may be repeated: the probability of each is then reported, "
+            "and the band is averaged over them."
         ),
     ] = None,
     reading: RecordOptions,
@@ -87,7 +87,7 @@ def watch(
 ) -> Answer:
     """Infer the contour while its record is measured, with every block of new rows, until Ctrl-C.
 
-    The folder has the stream, from which the same command goes on, the posterior, and watch.html, a page that loads
+    The folder has the stream, from which the same command resumes, the posterior, and watch.html, a page that loads
     itself again; at the end, which is no error, all that infer writes. With --json there is one object in each line:
     of each update, and of the end.
     """
@@ -218,7 +218,9 @@ class _Follower:
             of = "all samples are" if update.every == 1 else f"one sample of {update.every} is"
             self.tell(f"{of} taken from now on, also of those before (--most-samples)")
         if update.restarted:
-            self.tell(f"samples before have changed or do not go on in order: all {update.samples:,} taken anew")
+            self.tell(
+                f"earlier samples have changed or new ones do not follow in order: all {update.samples:,} taken again"
+            )
         words = [
             *_families(update),
             f"{sentence(_band(update))}.",

@@ -52,7 +52,7 @@ class StreamComparison:
     x : array_like, optional
         Positions at which every update states quantiles of the contour's height, averaged over families [length].
     stop : callable, optional
-        Rule that tells whether measuring may stop, as in `Stream`.
+        Rule for the end of measuring, as in `Stream`.
     **options
         Other arguments of `Stream`, the same for all families: `seed`, `load_cell`, `rod`, `friction`, `nuisances`,
         `particles`, `rig`.
@@ -166,7 +166,7 @@ class StreamComparison:
         self._streams, self._lost = streams, lost
 
     def latest(self) -> xr.Dataset:
-        """Return what is known so far, as `update` does, without `seconds` and `may_stop`.
+        """Return the result of `update` for the record so far, without `seconds` and `may_stop`.
 
         Raises
         ------
@@ -213,6 +213,11 @@ class StreamComparison:
     def posterior(self, family: str | None = None) -> xr.DataTree:
         """Return the posterior of a family, by default of the most probable one, as `Stream.posterior` does.
 
+        Parameters
+        ----------
+        family : str, optional
+            One of the families that are compared.
+
         Raises
         ------
         InferenceError
@@ -229,7 +234,12 @@ class StreamComparison:
         return self._streams[name].posterior()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write all streams to a file from which `resume` goes on, whole or not at all.
+        """Write all streams to a file from which `resume` continues, whole or not at all.
+
+        Parameters
+        ----------
+        path : path-like
+            File to be written; it replaces one of its name.
 
         Raises
         ------
@@ -248,7 +258,7 @@ class StreamComparison:
 
     @classmethod
     def resume(cls, path: str | os.PathLike[str], record: xr.Dataset | None = None, **arguments: Any) -> Self:
-        """Return the streams that were saved in a file, which go on with the numbers that they would have had.
+        """Return the streams that were saved in a file; they continue with the numbers that they would have had.
 
         Parameters
         ----------

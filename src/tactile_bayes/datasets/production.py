@@ -163,7 +163,7 @@ def _begun(spec: Specification, folder: Path) -> Manifest:
     other = [f"{name} {was} (now {here.get(name)})" for name, was in manifest.versions.items() if here.get(name) != was]
     if other and not manifest.is_complete:
         raise SpecificationError(
-            f"{folder} was made with {', '.join(other)}, and numbers may differ in the last digit: go on with those "
+            f"{folder} was made with {', '.join(other)}, and numbers may differ in the last digit: use those "
             "versions, or start again in another folder"
         )
     return manifest

@@ -18,7 +18,7 @@ NO_LOAD = (
     "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise in the "
     "record's units?"
 )
-"""What an error says of a record without a loaded sample."""
+"""Message of the error for a record without a loaded sample."""
 
 GAUGE = "gauge"
 """Name of the family of a gauge, whose contour is known."""

@@ -34,7 +34,7 @@ _MOST_STEPS, _BRIDGE_STEPS = 40, 10
 """Largest numbers of steps after these stages."""
 
 WIDER = (1.5, 3.0, 6.0)
-"""Factors on the noise of readings that are no surprise to a model that is not this one."""
+"""Factors on the noise of the alternatives with which the e-value compares the model."""
 
 _MOST_STAGES = 200
 """Largest number of stages of an update."""

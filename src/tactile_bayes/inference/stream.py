@@ -59,7 +59,7 @@ class Stream:
     ----------
     family, load_cell, priors, rod, friction, nuisances
         As in `infer_contour`. A standard parameter that the record does not identify at first, like the backlash in a
-        single direction, enters with the first sample that does; asked for by name, it is refused before.
+        single direction, enters with the first sample that does; if `nuisances` names it, it is refused before.
     seed : int or numpy.random.SeedSequence
         Seed of all random numbers: the same seed and blocks give the same results.
     particles : int
@@ -67,7 +67,7 @@ class Stream:
     x : array_like, optional
         Positions at which every update states quantiles of the contour's height [length].
     stop : callable, optional
-        Rule that tells whether measuring may stop. It is called with the result of each update, and what it returns
+        Rule for the end of measuring: a function that is called with the result of each update, and whose value
         becomes the result's `may_stop`.
     rig : xr.DataTree, optional
         Result of `infer_rig` for the same rig, as in `infer_contour`.
@@ -145,7 +145,7 @@ class Stream:
         ----------
         samples : xr.Dataset
             A record of the new samples alone, in the order of measurement, with the columns and attributes of those
-            before. They may go on with the last sweep, or begin new ones.
+            before. They may continue the last sweep, or begin new ones.
 
         Returns
         -------
@@ -202,7 +202,7 @@ class Stream:
         return result
 
     def latest(self) -> xr.Dataset:
-        """Return what is known so far, as `update` does, without what is of an update alone.
+        """Return the result of `update` for the record so far, without the entries on a single update.
 
         These are `stages`, `steps`, `seconds` and `may_stop`; `correlation` is that of the last steps of any update.
 
@@ -263,7 +263,7 @@ class Stream:
         return tree
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the stream to a file from which `resume` goes on, whole or not at all.
+        """Write the stream to a file from which `resume` continues, whole or not at all.
 
         The NetCDF file holds the record so far, the particles, and all that their numbers depend on (model, priors,
         seed, versions). It replaces one of its name.
@@ -299,13 +299,13 @@ class Stream:
         write_netcdf(self.as_tree(), check_path("path", path))
 
     def as_tree(self) -> xr.DataTree:
-        """Return what `save` writes."""
+        """Return the tree that `save` writes."""
         state = self._known_state()
         return tree_of(state, self._identity(state.experiment))
 
     @classmethod
     def resume(cls, path: str | os.PathLike[str], record: xr.Dataset | None = None, **arguments: Any) -> Self:
-        """Return the stream that was saved in a file, which goes on with the numbers that it would have had.
+        """Return the stream that was saved in a file; it continues with the numbers that it would have had.
 
         Parameters
         ----------
@@ -329,7 +329,7 @@ class Stream:
         return stream
 
     def restore(self, tree: xr.DataTree, path: Path, record: xr.Dataset | None = None) -> None:
-        """Go on from what `as_tree` has returned, which is in the file at a path; see `resume`."""
+        """Continue from the tree that `as_tree` has returned, which is in the file at a path; see `resume`."""
         stored = state_in(tree, path)
         own = stored.record
         if record is not None:

@@ -1,4 +1,4 @@
-"""The state of a stream, and the file from which a stream goes on after it was killed at any moment."""
+"""The state of a stream, and the file from which a stream resumes after it was killed at any moment."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class StreamState:
     share: float
     """Share of the prior within reach."""
     correlation: float
-    """Of the last steps of any update; NaN if there were none."""
+    """Correlation of the last steps of any update; NaN if there were none."""
     shift: float
     """Largest one of all updates, as of `Particles`."""
     surprise: float
@@ -119,7 +119,7 @@ def state_in(tree: xr.DataTree, path: Path) -> StoredState:
         raise InferenceError(f"{path} holds no state of a stream: give a file that Stream.save has written")
     if tree.attrs["format"] != _FORMAT:
         raise InferenceError(
-            f"{path} has format {tree.attrs['format']}, and this version reads format {_FORMAT}: go on with the "
+            f"{path} has format {tree.attrs['format']}, and this version reads format {_FORMAT}: use the "
             "version that wrote it, or begin a new stream"
         )
     try:

@@ -74,7 +74,7 @@ class Varied(NamedTuple):
     sheet: Floats
     """Coefficients of its pose, from a table."""
     slenderness: float
-    """That of the table; 0 if there are no coefficients."""
+    """Slenderness of the table; 0 if there are no coefficients."""
     sign: float
     """Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose."""
     other_sheet: Floats
@@ -372,7 +372,7 @@ def _rest_curvature(varied: Varied | None, curvature: float, arclength: float) -
 
 @compiled
 def is_straight(beam: Beam) -> bool:
-    """Whether the rod at rest is known to be straight."""
+    """True if the rod at rest is known to be straight."""
     return beam.varied is None and beam.curvature == 0.0
 
 

@@ -112,11 +112,11 @@ _MOST, _MOST_ON_LINE = 256, 2
 number that are tried."""
 
 _ROOM_IN_TIP, _ROOM_PAST_TIP = 0.3, 0.02
-"""How far a leg of a rod that is not smooth at its tip may go beyond the change of the phase, in ψ1 [rad] and in arc
-length [L]."""
+"""Largest distances by which a leg of a rod that is not smooth at its tip passes the change of the phase, in ψ1 [rad]
+and in arc length [L]."""
 
 _ROOM_PAST_LINE = 1.1
-"""How far a leg may go on a line of the drive, over the travel up to its end."""
+"""Largest travel of a leg on a line of the drive, over the travel up to its end."""
 
 _PAST_TIP = 1e-6
 """Share of a leg by which it passes the tip of a rod that is not smooth there."""
@@ -159,7 +159,7 @@ class Ends(NamedTuple):
     first_parameter: float
     snap_angle: float
     snap_parameter: float
-    """Where the path ends; also that of a second contact, if there is one."""
+    """Parameter at the end of the path, or at a second contact if there is one."""
     snap_off: int
     phases: int
     """Number of phases."""
@@ -265,7 +265,7 @@ def _ending(line: Line | None, found: Balance) -> Balance:
 
 @compiled
 def _goes_on(lines: Floats | None, k: int) -> bool:
-    """Whether the drive goes on after a line."""
+    """True if the drive continues after a line."""
     if lines is None:
         return False
     return k + 1 < lines.shape[0] and not math.isnan(lines[k + 1, 0])

@@ -117,7 +117,7 @@ class _Rest(event.Listener):
 
 
 class _Notice(event.Listener):
-    """Prints once to a terminal that functions are compiled."""
+    """Listener that prints once to a terminal that functions are compiled."""
 
     def __init__(self) -> None:
         self.said = False

@@ -33,7 +33,7 @@ _SETTLED = 1e-8
 """Newton step after which rounding errors are left only."""
 
 _UNIFORM, _STIFFENED, _WHOLE = 0.0, 1.0, 2.0
-"""Where a continuation begins, where the rigidity is that of the rod, and where the rest curvature is so too."""
+"""Positions in a continuation: its beginning, that of the rod's rigidity, and that of its rest curvature as well."""
 
 _NUDGE = 1e-6
 """Change of the share for a derivative by it, which serves for a first guess."""

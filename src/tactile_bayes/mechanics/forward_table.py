@@ -97,7 +97,7 @@ GRADES = 1 + len(_FINE_FORCES)
 """Number of grades of tables."""
 
 _BELOW, _FINE_PSI1 = 0.1, 2.4
-"""How far ψ1 goes below that of tangential contact in a fine table, and its largest value."""
+"""Largest amount of ψ1 below that of tangential contact in a fine table, and its largest value."""
 
 _SCALE = 10.0
 """f Λ² from which on polynomials are in its logarithm."""
@@ -352,7 +352,7 @@ def _contract(terms: Terms, mirrored: int, sheet: Floats, row: int) -> None:
 def pose_in(
     sheet: Floats, slenderness: float, taper: float, psi1: float, arclength: float, force: float, tip: bool
 ) -> tuple[bool, Pose, Pose, Pose]:
-    """Whether there is a pose; the pose, and its derivatives by ψ1 or the arc length, and by the force."""
+    """True if there is a pose; the pose, and its derivatives by ψ1 or the arc length, and by the force."""
     length, rate = _length(slenderness, taper, arclength)
     scaled, span = force * length * length, sheet[_RANGES, 3]
     z, by_scaled = 2.0 / span * math.log1p(scaled / _SCALE) - 1.0, 2.0 / (span * (_SCALE + scaled))

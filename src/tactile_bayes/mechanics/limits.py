@@ -192,7 +192,7 @@ def clear_angle(outline: Outline, beam: Beam, last_step: float) -> float:
 
 
 class _Turned(NamedTuple):
-    """What a rod would touch first if it turned about its base where it is."""
+    """First contact of a rod if it turned about its base where it is."""
 
     reach: int
     """Among `_TOUCHES`, `_TOO_FAR`, `_ENDS` if it is the end of what is known, `_CUTS_PIVOT` and `_TOO_CLOSE`."""
@@ -207,7 +207,7 @@ class _Turned(NamedTuple):
 
 @compiled
 def _turned(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> _Turned:
-    """What a rod would touch first that turns from a pose of its base."""
+    """First contact of a rod if it turned from a pose of its base."""
     seen = from_base(outline, pose.x, pose.y)
     low, high = ends(seen)
     nearest, beyond_high, beyond_low = _nearest(seen, beam, low, high, last_step)
@@ -326,6 +326,6 @@ def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int,
 
 @compiled
 def is_clear(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> bool:
-    """Whether an unloaded rod in a pose has passed the contour."""
+    """True if an unloaded rod in a pose has passed the contour."""
     passed = Offset(-pose.x, pose.y, math.pi - pose.angle)
     return _turned(mirrored(outline), mirrored_beam(beam), passed, last_step).gap > 0.0

@@ -189,7 +189,7 @@ def pose_at(line: Line, travel: float) -> Offset:
 
 @compiled
 def only_turns(line: Line | None) -> bool:
-    """Whether the base rests."""
+    """True if the base rests."""
     if line is None:
         return True
     return line.along.x == 0.0 and line.along.y == 0.0

@@ -222,7 +222,7 @@ def frame(at: Place) -> tuple[float, float]:
 
 @compiled
 def is_inside(outline: Outline, arclength: float, x: float, y: float, low: float, high: float) -> bool:
-    """Whether the rod at an arc length is within the object as far as it is known: between contour and chord of two of
+    """True if the rod at an arc length is within the object as far as it is known: between contour and chord of two of
     its points."""
     left, right = _beside(outline, low, arclength), _beside(outline, high, arclength)
     if not (left.x < x < right.x and (y - left.y) * (right.x - left.x) < (x - left.x) * (right.y - left.y)):

@@ -60,7 +60,7 @@ def _start(psi1: float, arclength: float, force: float, curvature: float) -> _St
 
 
 class _Parts(NamedTuple):
-    """What a pose consists of."""
+    """Parts of a pose."""
 
     u: float
     """u and v over the arc length."""

@@ -236,8 +236,8 @@ class Rod:
         scatter : float, optional
             Standard deviation of each coordinate, in the unit of the points; estimated from them by default.
         length : float, optional
-            Length of the rod from the first point on, in the unit of the points, if it goes on beyond the last one, as
-            a whisker does whose tip is not to be touched. The rest curvature there goes on with its trend. By default
+            Length of the rod from the first point on, in the unit of the points, if it continues beyond the last one,
+            like a whisker whose tip must not be touched. The rest curvature there continues with its trend. By default
             the last point is the tip.
         diameter, stem : float
             As in `Rod`, in the unit of the points.
@@ -308,7 +308,7 @@ class Rod:
         )
 
     def shape_in_words(self, unit: str) -> list[str]:
-        """Return in what the rod differs from a straight, uniform one, given the unit of curvatures, such as 1/m."""
+        """Return the differences from a straight, uniform rod as text, given the unit of curvatures, such as 1/m."""
         words = [f"stem {self.stem:.4g} {unit.removeprefix('1/')}"] if self.stem else []
         if isinstance(self.rest_curvature, Along):
             ends = self.rest_curvature([0.0, self.length])

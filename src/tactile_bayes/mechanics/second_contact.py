@@ -42,9 +42,9 @@ def second_contact(scene: Scene, seen: Outline, leg: Leg, goes_on: bool, stop: f
 
 @compiled
 def _touches_twice(scene: Scene, tip: bool, at: Equilibrium, wholly: bool, low: float, high: float) -> bool:
-    """Whether a rod touches the object at another point too, between the ends of the contour.
+    """True if a rod touches the object at another point too, between the ends of the contour.
 
-    In tangential contact the free end goes on in its rest shape. It is in the object at once where the contour is less
+    In tangential contact the free end has its rest shape. It is in the object at once where the contour is less
     curved than the rod, or further on, at its tip, which is looked for if all is. In tip contact it may be the loaded
     part.
     """

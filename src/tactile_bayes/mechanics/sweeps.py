@@ -298,7 +298,7 @@ def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line |
 
 @compiled
 def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: float) -> float:
-    """Travel beyond which the unloaded rod is clear; on lines this only tells whether it is so where contact ends.
+    """Travel beyond which the unloaded rod is clear; on lines, only whether it is clear where contact ends.
 
     A rod that is released touches there without load, which small errors alone would decide: −∞ if it does so nowhere
     else.
@@ -393,8 +393,8 @@ def solve_sweeps(
     shape : (int, int)
         Number of contours, and of rows for each.
     profile : Profile, optional
-        Rod whose rest curvature or rigidity varies along it, the same in all sweeps but for the taper, and for what is
-        added to its rest curvature; by default rods are uniform and of constant rest curvature.
+        Rod whose rest curvature or rigidity varies along it, the same in all sweeps except for the taper and an
+        addition to its rest curvature; by default rods are uniform and of constant rest curvature.
     known : (ForwardTable, ForwardTable), optional
         Tables of the profile, for loads with errors of some 1e-6 of the largest.
     tolerance : ndarray, shape (3,), optional

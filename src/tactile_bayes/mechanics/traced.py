@@ -109,8 +109,8 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None, leng
     scatter : float, optional
         Standard deviation of each coordinate, in that unit; estimated from the points by default.
     length : float, optional
-        Length of the rod from the first point on, in that unit, if it goes on beyond the last one. The curvature there
-        follows from the prior: it goes on with its trend, and with a deviation that grows.
+        Length of the rod from the first point on, in that unit, if it continues beyond the last one. The curvature
+        there follows from the prior: it continues with its trend, and with a deviation that grows.
 
     Returns
     -------

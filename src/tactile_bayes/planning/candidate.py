@@ -59,7 +59,7 @@ class Candidate:
 
     @property
     def words(self) -> str:
-        """What the drives do, in a few words."""
+        """The drives in a few words."""
         return " and ".join(map(_in_words, self.drives))
 
 
@@ -108,7 +108,7 @@ class Expected(NamedTuple):
 def expected_of(task: tuple[Question, int]) -> Expected:
     """Return the expected results of one candidate, by its index.
 
-    What a draw's record tells is that of the drives that touch it.
+    The information about a draw is that of the drives that touch it.
     """
     question, number = task
     candidate, step = question.candidates[number], question.candidates[number].drive_step

@@ -48,9 +48,9 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
 
         Over "channel": bound_of_channel (channel, parameter), with priors, from that channel alone, and
         bound_without_channel, from the other two. Over "sample", with the record's columns: leverage (sample, channel),
-        the diagonal of the hat matrix, which sums to the number of parameters that the record determines, the attribute
-        told; and leverage_on (sample, parameter), the share of the bound's inverse square that is lost without the
-        sample.
+        the diagonal of the hat matrix, which sums to the number of parameters that the record determines (the
+        attribute `told`); and leverage_on (sample, parameter), the share of the bound's inverse square that is lost
+        without the sample.
 
         Over "x", in the touched stretches and in the gaps between: stretch, height, and height_sd, standard deviation
         of the contour's height with priors [length]. Scalars: touched_width and gap_width, the mean widths of the

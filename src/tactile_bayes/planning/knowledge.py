@@ -68,14 +68,14 @@ class Knowledge:
         return self.model(empty_record(drives, drive_step, self.experiment.rod, cell))
 
     def model(self, record: xr.Dataset) -> ContourModel:
-        """Return the model of a record, empty or measured, without what it does not tell at all."""
+        """Return the model of a record, empty or measured, without a backlash that it cannot determine."""
         nuisances = self.experiment.nuisances
         if nuisances != STANDARD and len(carried_sweeps(record)) == len(np.unique(record.sweep.values)):
             nuisances = tuple(name for name in nuisances if name != "backlash")
         return replace(self.experiment, record=record, nuisances=nuisances).model
 
     def of(self, model: ContourModel) -> Knowledge:
-        """Return what is known of the parameters of a model, some or all of them."""
+        """Return the knowledge of the parameters of a model, some or all of these."""
         names = self.experiment.model.names
         if names == model.names:
             return self

@@ -62,6 +62,7 @@ def required_noise(
     Parameters
     ----------
     plan : Plan
+        The plan whose noise is scaled, and whose contour, drive, rod and unknowns are kept.
     band_width : float or sequence of float
         Mean width of the pointwise band [length].
     where : {"everywhere", "gap", "touched"}

@@ -1,4 +1,4 @@
-"""How far other assumptions move a band."""
+"""The distances by which other assumptions move a band."""
 
 from __future__ import annotations
 

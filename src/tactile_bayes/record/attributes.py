@@ -25,7 +25,7 @@ _QUANTITY = re.compile(
 )
 
 _SHAPE = ("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviation", "stem")
-"""What makes a rod another than a straight, uniform one."""
+"""Properties by which a rod differs from a straight, uniform one."""
 
 _POINTS, _SAME = 101, 1e-9
 """Points at which properties along rods are compared, and the difference over the largest value that counts as zero."""
@@ -52,7 +52,7 @@ def rod_attributes(rod: Rod) -> dict[str, Any]:
 
 
 def rod_shape_attributes(rod: Rod) -> dict[str, Any]:
-    """Return in what a rod differs from a straight, uniform one: numbers, or polynomials as text."""
+    """Return the properties by which a rod differs from a straight, uniform one: numbers, or polynomials as text."""
     values = {f"rod_{name}": getattr(rod, name) for name in _SHAPE}
     return {name: v.text if isinstance(v, Along) else v for name, v in values.items() if v not in (0.0, None)}
 

@@ -41,9 +41,9 @@ class Growth(NamedTuple):
     """The record in a file after it has changed."""
 
     record: xr.Dataset | None
-    """All samples so far; None if there are none, or `error` tells why they cannot be read."""
+    """All samples so far; None if there are none, or `error` states why they cannot be read."""
     messages: tuple[str, ...]
-    """What is new and wrong with rows, which are left out, or with the file."""
+    """Messages on new faults of rows, which are left out, or of the file."""
     is_other: bool
     """True if the file no longer begins as it did."""
     error: RecordError | None

@@ -111,8 +111,8 @@ def base_of_sample(record: xr.Dataset) -> tuple[list[tuple[float, float]], Index
 def travels_of(record: xr.Dataset) -> Floats:
     """Return how far along the drive of its sweep each sample is, shape (samples,).
 
-    That is the drive angle in rotations [rad], and the way of the base since the first sample of the sweep where it is
-    carried [length].
+    That is the drive angle in rotations [rad], and where the base is carried, the distance that it has moved since the
+    first sample of the sweep [length].
     """
     travels, sweep = record.drive_angle.values.astype(float), record.sweep.values
     for number in carried_sweeps(record):

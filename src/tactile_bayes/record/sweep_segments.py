@@ -123,7 +123,7 @@ def _stretches(angle: Floats, moved: Flags) -> list[tuple[slice, bool]]:
     """Return stretches of samples in their order, each with whether the base is carried in it.
 
     A base that rests while the drive turns is a pivot. Where there are such stretches and others, of more than a few
-    samples, the record is of both kinds. `moved` tells at which samples the base is not where it was before.
+    samples, the record is of both kinds. `moved` is True for samples at which the base is not where it was before.
     """
     turns = np.zeros(angle.size, dtype=bool)
     for begin, end in pairwise([0, *np.flatnonzero(moved).tolist(), angle.size]):

@@ -47,7 +47,7 @@ def trust_tables(findings: Findings) -> list[Table]:
         by = fixed(float(np.nanmax(np.abs(moves))), ".1f") if most else ""
         parts.append([str(name), chance(float(row["part_p_value"])), fixed(float(row["part_sd"]), ".1f"), by, most])
     heads = ["this part alone", "p", "off by [sd]", "moves by [sd]", "most"]
-    tables = [Table("What each part of the record says of the rest", heads, parts)]
+    tables = [Table("Prediction of the rest of the record by each part", heads, parts)]
     if "claim" in found.dims:
         claims = [
             [CLAIMS[str(name)], f"{percent(round(share, 3))} ± {percent(round(error, 3))}", str(int(count))]

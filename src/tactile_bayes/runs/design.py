@@ -95,7 +95,7 @@ def design_messages(found: xr.Dataset) -> tuple[str, ...]:
     if np.ptp(alike.samples.values) > 0:
         most = alike.isel(candidate=int(np.nanargmax(alike.information / alike.samples)))
         sentences.append(
-            f"Per reading this tells the most: {words(most)}, {float(most.information):.3g} nats in "
+            f"The most information per reading: {words(most)}, {float(most.information):.3g} nats in "
             f"{int(most.samples):,} readings."
         )
     if float(best.reached) < 1.0:

@@ -28,7 +28,7 @@ from tactile_bayes.uncertainty.summary import reach, summary
 __all__ = ["Watch", "WatchUpdate", "open_watch"]
 
 _STATE = "stream.nc"
-"""File of the stream in a folder, from which a watch goes on."""
+"""File of the stream in a folder, from which a watch resumes."""
 
 _POINTS = 201
 """Number of grid points of the band."""
@@ -44,7 +44,7 @@ class WatchUpdate(NamedTuple):
     seconds: float
     """Time that the update took, with its files [s]."""
     restarted: bool
-    """True if all samples were taken anew since they do not go on from those before, and not since others of them are
+    """True if all samples were taken again since they do not continue those before, and not since others of them are
     left out."""
     every: int
     """Stride of the samples that are taken into account; 1 if all are."""
@@ -52,7 +52,7 @@ class WatchUpdate(NamedTuple):
     summary: xr.Dataset
     """Parameters with intervals."""
     band: xr.Dataset | None
-    """Band between the ends that were given, or of what the sweeps touch if they go on; None if they touch nothing."""
+    """Band between the given ends, or over the arcs that sweeps touch if they continue; None if they touch nothing."""
     width: float
     """Largest width of the band [length]; NaN without one."""
     probabilities: Mapping[str, float]
@@ -90,15 +90,15 @@ class Watch:
     probability : float
         Probability of the band and of intervals, in (0, 1).
     between : pair of float, optional
-        Ends of the band in x, in the record's unit of length; by default those of what its
-        sweeps touch if they go on.
+        Ends of the band in x, in the record's unit of length; by default those of the arcs that
+        its sweeps touch if they continue.
     until_width : float, optional
         Width below which the band has to be everywhere between these ends for measuring to stop [length].
     until_probability : float, optional
         Probability of a family above which measuring may stop.
     most_samples : int
         Largest number of samples that are taken into account, at least 100. Of a longer record every second sample is,
-        every fourth, and so on; when this begins, all that are left are taken anew. Records of a load cell that drifts
+        every fourth, and so on; when this begins, all that are left are taken again. Records of a load cell that drifts
         from sample to sample are taken whole.
     families : sequence of str
         Families of contours; of several, the posterior is that of the most probable one, and the band is averaged.
@@ -170,7 +170,7 @@ class Watch:
         return 0 if record is None else record.sizes["sample"]
 
     def resume(self, record: xr.Dataset, load_cell: LoadCell | None, sha256: str) -> WatchUpdate | None:
-        """Go on from the stream in the folder; arguments are those of `take`. Return its answer, None if there is none.
+        """Resume the stream in the folder; arguments are those of `take`. Return its answer, None if there is none.
 
         Raises
         ------
@@ -199,8 +199,8 @@ class Watch:
         Parameters
         ----------
         record : xr.Dataset
-            All samples so far. If they do not begin with those before, or not go on from them in order, all are taken
-            anew.
+            All samples so far. If they do not begin with those before, or do not continue them in order, all are
+            taken again.
         load_cell : LoadCell or None
             As in `infer_contour`.
         sha256 : str

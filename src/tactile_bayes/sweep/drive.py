@@ -60,7 +60,7 @@ class Carried(ABC):
 
     @cached_property
     def travels(self) -> Floats:
-        """Travel at each pose: the way of the base [length], or, if it does not move at all, of the angle [rad]."""
+        """Travel at each pose: distance moved by the base [length], or turn if the base does not move at all [rad]."""
         steps = np.diff(self.poses, axis=0)
         ways = np.hypot(steps[:, 0], steps[:, 1])
         return np.append(0.0, np.cumsum(ways if ways.any() else np.abs(steps[:, 2])))
@@ -87,13 +87,13 @@ class Translation(Carried):
     Parameters
     ----------
     base : (float, float)
-        Where it begins, in the contour's unit of length.
+        Position of the base at the beginning, in the contour's unit of length.
     heading : float
         Direction of the motion, counter-clockwise from the x axis [rad].
     drive_angle : float
         Slope of the unloaded rod at its base [rad].
     travel : float
-        How far the base moves [length].
+        Distance by which the base moves [length].
 
     Raises
     ------

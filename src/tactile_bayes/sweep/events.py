@@ -31,7 +31,7 @@ class Event:
         may also leave the contour without a jump ("release"), and one that is carried still touch it at the end of the
         drive ("never").
     travel : float
-        How far along the drive it lies: the drive angle of a rotation [rad], or the way of the base [length].
+        Position along the drive: the drive angle of a rotation [rad], or the distance moved by the base [length].
     drive_angle, slope_angle : float
         Drive angle, and slope angle of the contour at the contact [rad].
     base_x, base_y : float

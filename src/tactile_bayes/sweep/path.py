@@ -24,8 +24,8 @@ Direction = Literal["forward", "backward"]
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
-"""Outcomes on the two sides of a carried rod, the most telling first; −1 stands for all others. A rod that is clear of
-the object on one side seems to have passed it on the other."""
+"""Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
+of the object on one side seems to have passed it on the other."""
 
 
 def sweep_paths(
@@ -105,14 +105,14 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 + (f", on a stem of {rod.stem:g}" if rod.stem else "")
             )
         case Reachability.CUTS_PIVOT if paths.lines is not None:
-            raise ContourError(f"{sweep} the contour cuts the way of the base: raise the contour or lower the drive")
+            raise ContourError(f"{sweep} the contour cuts the path of the base: raise the contour or lower the drive")
         case Reachability.CUTS_PIVOT:
             raise ContourError(
                 f"the contour cuts the base: the pivot at ({base[0]:g}, {base[1]:g}) is not below it; raise the "
                 "contour or lower the pivot"
             )
         case Reachability.TOO_CLOSE:
-            of_drive = "way of the base" if paths.lines is not None else f"pivot at ({base[0]:g}, {base[1]:g})"
+            of_drive = "path of the base" if paths.lines is not None else f"pivot at ({base[0]:g}, {base[1]:g})"
             raise ContourError(
                 f"the contour comes within {paths.distance[0] * rod.length:.6g} of the {of_drive}; a path can be "
                 f"followed from {CLEARANCE * rod.length + rod.stem:g} on ({CLEARANCE:.0%} of the rod's length"
@@ -148,7 +148,7 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
 
 
 def _point(paths: Paths) -> str:
-    """Where a path ends, in the unit of the contour."""
+    """Return the end of a path as text, in the unit of the contour."""
     frame, at = paths.sweep_frame, paths.snap_parameter
     locus = frame.contour.locate(np.where(frame.mirrored, -at, at))
     return f"({locus.x[0]:.6g}, {locus.y[0]:.6g})"

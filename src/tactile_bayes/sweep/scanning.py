@@ -104,9 +104,10 @@ def equilibria(
     They solve equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, in closed form, or by continuation
     if the rod is not straight and uniform. Beyond snap-off they are equilibria too, but unstable.
 
-    A rod that is curved toward the object, as a load does not bend it, may touch with its tip in two equilibria at one
-    slope angle. Early in a sweep the load only straightens it, and the contact moves outward, toward larger |α|; later
-    the load bends it as it bends a straight rod, and the contact comes back. The second equilibrium is returned.
+    A rod that is curved toward the object, against the sense in which a load bends it, may touch with its tip in two
+    equilibria at one slope angle. Early in a sweep the load only straightens it, and the contact moves outward,
+    toward larger |α|; later the load bends it as it bends a straight rod, and the contact comes back. The second
+    equilibrium is returned.
 
     Parameters
     ----------

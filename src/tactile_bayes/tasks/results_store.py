@@ -144,7 +144,7 @@ def keep_outcomes(
 
 
 def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]:
-    correction = f"give another folder, or remove {file.name} from it to begin anew"
+    correction = f"give another folder, or remove {file.name} from it to start again"
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
         if table["format"] != _FORMAT:

@@ -131,7 +131,7 @@ class Checkpoint:
             number = int(table["format"])
             if number != _FORMAT:
                 raise InferenceError(
-                    f"{path} has format {number}, and this version reads format {_FORMAT}: go on with the version that "
+                    f"{path} has format {number}, and this version reads format {_FORMAT}: use the version that "
                     "began it, or give another folder"
                 )
             identity = {name: str(value) for name, value in table["identity"].items()}

@@ -53,9 +53,9 @@ def identity_of_run(
     }
     for name, value in entries.items():
         if not (isinstance(name, str) and isinstance(value, str)):
-            raise ParameterError(f"the identity says {name!r}: {value!r}: give strings, they are compared as they are")
+            raise ParameterError(f"the identity has {name!r}: {value!r}: give strings, they are compared as they are")
         if name in rest:
-            raise ParameterError(f"the identity says {name!r}, which the sampler says itself: leave it out")
+            raise ParameterError(f"the identity has {name!r}, which the sampler adds itself: leave it out")
     return {**entries, **rest}
 
 

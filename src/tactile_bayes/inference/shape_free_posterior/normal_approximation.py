@@ -436,7 +436,7 @@ class _Lines(NamedTuple):
     """Linearised residuals with unit noise, whose signs are those of measured less expected values."""
 
     slopes: Floats
-    """Of the expected values, over changes of the parameters in prior scales, shape (n, k)."""
+    """Slopes of the expected values, over changes of the parameters in prior scales, shape (n, k)."""
     values: Floats
     """At the centre, shape (n,)."""
 
