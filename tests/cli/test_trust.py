@@ -49,7 +49,7 @@ def test_the_report_states_it(folder):
     page = Page((folder / "report.html").read_text(encoding="utf-8"))
     assert "Does the band hold for this record?" in page.texts["h3"]
     assert "The band of probability 0.95 holds, as far as this record shows." in page.texts["p"]
-    assert any(caption.startswith("What each part") for caption in page.texts["caption"])
+    assert any(caption.startswith("Prediction of the rest") for caption in page.texts["caption"])
 
 
 @pytest.mark.usefixtures("written")
