@@ -219,6 +219,12 @@ def lever_of_stem(stem: float, drive_angle: float, force_x: float, force_y: floa
 
 
 @compiled
+def _is_tabulated(varied: Varied) -> bool:
+    """True if there are coefficients of a pose, of the rod itself and not of its mirror image."""
+    return varied.slenderness > 0.0 and varied.sign == varied.profile.sign
+
+
+@compiled
 def _pose(
     varied: Varied | None,
     curvature: float,
@@ -229,7 +235,7 @@ def _pose(
 ) -> tuple[Pose, Pose, Pose]:
     if varied is None:
         return pose_and_slopes(psi1, arclength, force, curvature, tip)
-    if varied.slenderness > 0.0 and varied.sign == varied.profile.sign:
+    if _is_tabulated(varied):
         inside, here, by_q, by_force = pose_in(
             varied.sheet, varied.slenderness, varied.profile.taper, psi1, arclength, force, tip
         )
@@ -420,7 +426,6 @@ def _loaded_part(varied: Varied | None, curvature: float, psi1: float, force: fl
     if varied is None:
         here = pose(psi1, share, force, curvature)
         return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v), 0)
-    is_known = varied.slenderness > 0.0 and varied.sign == varied.profile.sign
-    if is_known and has_parts(varied.sheet, force):
+    if _is_tabulated(varied) and has_parts(varied.sheet, force):
         return March(1.0 - share, 0, part_in(varied.sheet, psi1, force, part, before.state), 0)
     return part_along(varied.profile, before, 1.0 - share, force, varied.work)

@@ -413,7 +413,7 @@ def _sums(sheet: Floats, row: int, x: float, z: float) -> tuple[Pose, Pose, Pose
 
 @compiled
 def has_parts(sheet: Floats, force: float) -> bool:
-    """Whether `part_in` holds under a force."""
+    """True if `part_in` holds under a force."""
     return force * sheet[_PLIANCE, 2 * PARTS + 1] <= _MOST_BENT * PARTS * PARTS
 
 
