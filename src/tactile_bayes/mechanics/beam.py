@@ -17,8 +17,8 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.forward_table import PARTS, chord_in, has_parts, part_in, pose_in, sheet
+from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.forward_table import PARTS, chord_in, has_parts, is_far, part_in, pose_in, sheet
 from tactile_bayes.mechanics.pose import Pose, by_arclength, pose, pose_and_slopes
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.profile_pose import at_contact, part_along, pose_along_and_slopes
@@ -225,6 +225,19 @@ def _is_tabulated(varied: Varied) -> bool:
 
 
 @compiled
+def is_far_from_table(beam: Beam, arclength: float, force: float) -> bool:
+    """True if a force is far beyond those of a table: the search for an equilibrium has gone astray."""
+    return _is_far_from_table(beam.varied, arclength, force)
+
+
+@inlined
+def _is_far_from_table(varied: Varied | None, arclength: float, force: float) -> bool:
+    if varied is None:
+        return False
+    return varied.slenderness > 0.0 and is_far(varied.slenderness, varied.profile.taper, arclength, force)
+
+
+@inlined
 def _pose(
     varied: Varied | None,
     curvature: float,

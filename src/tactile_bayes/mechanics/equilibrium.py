@@ -21,7 +21,7 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.beam import Beam, beam_pose, rubbed_otherwise
+from tactile_bayes.mechanics.beam import Beam, beam_pose, is_far_from_table, rubbed_otherwise
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.line import Line, components, line_of, off_line
 from tactile_bayes.mechanics.outline import Outline, Place, narrower, place
@@ -53,7 +53,7 @@ _MOST_TURN, _MOST_LOADING = 0.4, 1.0
 """Largest changes of q, and of f over 1 + f, in a step."""
 
 _ASTRAY, _LEAST_PSI1, _MOST_PSI1 = 1.5, -0.5 * math.pi, 1.5 * math.pi
-"""Arc length [L] beyond which no tangential contact is sought, and the ψ1 between which tip contact is."""
+"""Largest arc length [L] at which tangential contact is sought, and the ψ1 between which tip contact is."""
 
 SETTLED = 1e-8
 """Step, over the largest, after which a first-order correction leaves rounding errors only."""
@@ -317,7 +317,9 @@ def _is_astray(loaded: Loaded, at: Equilibrium) -> bool:
     """Return whether a rod without a closed form is sought too far away: it takes long and leads nowhere."""
     if loaded.beam.varied is None:
         return False
-    return not _LEAST_PSI1 <= at.q <= _MOST_PSI1 if loaded.tip else at.q > _ASTRAY
+    if not (_LEAST_PSI1 <= at.q <= _MOST_PSI1 if loaded.tip else 0.0 <= at.q <= _ASTRAY):
+        return True
+    return is_far_from_table(loaded.beam, 1.0 if loaded.tip else at.q, at.force)
 
 
 @compiled

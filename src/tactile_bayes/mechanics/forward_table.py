@@ -41,36 +41,43 @@ __all__ = [
     "chord_in",
     "forward_table",
     "has_parts",
+    "is_far",
     "part_in",
     "pose_in",
     "prepare",
     "sheet",
 ]
 
-_ROWS, _MOST_ROWS, _TERMS = 16, 26, 24
-"""Even numbers of terms in ψ1 or s1, also of a fine table, and in the force and the distance of the rod at rest."""
+_ROWS, _MOST_ROWS, _TERMS = 16, 28, 24
+"""Most terms in ψ1 or s1, also of a fine table, and terms in the force and in the distance of the rod at rest."""
 
 _COLUMNS = 3 * _TERMS
+
+_GROUP = 4
+"""Terms in ψ1 or s1 that are summed at a time."""
 
 _CACHE_LINE = 64
 """Bytes of a line of the processor's cache: numbers that lie in two of them take longer to load."""
 
-PARTS = 8
-"""Number of parts of a rod between which it is sought in `part_in`."""
+PARTS, _STEPS = 8, 4
+"""Number of parts of a rod between which it is sought in `part_in`, and largest number of steps in each."""
 
-_TANGENTIAL, _BEYOND_TIP, _AT_REST, _POSE = _MOST_ROWS, 2 * _MOST_ROWS, 3 * _MOST_ROWS, 3 * _MOST_ROWS + 2
-"""First rows of a rod's coefficients; those in tip contact come first, and the mirror image has its own at rest."""
+_HALVES = 2 * PARTS * _STEPS
+
+_AT_REST, _POSE = 3 * _MOST_ROWS, 3 * _MOST_ROWS + 2
+"""First rows of a rod's coefficients at rest, of which the mirror image has its own, after those of three phases: tip
+contact, tangential contact up to the tip and beyond it; and of workspace."""
 
 _TURN, _PLIANCE = _POSE + 3, _POSE + 4
-"""Rows with the turn of the rod at rest between its tip and halves of its parts [rad], and EI(0)/EI there, and then its
-largest value."""
+"""Rows with the turn of the rod at rest between its tip and halves of the shortest steps [rad], and EI(0)/EI there, and
+then its largest value."""
 
-_RANGES = _POSE + 5
-"""Row with the number of terms in ψ1 or s1 and the ranges of a table, and with sign, taper, bend and friction angle of
-the rod."""
+_RANGES, _DEPTH = _POSE + 5, 7
+"""Row with the ranges of a table, with sign, taper, bend and friction angle of the rod, and from this column on the
+numbers of terms in ψ1 or s1 of the three phases."""
 
 _MOST_BENT = 0.1
-"""Largest f/EI(s), over the square of the number of parts, in `part_in`."""
+"""Largest f/EI(s), times the square of a step, in `part_in`."""
 
 _WORST = 1e-5
 """Largest error of the pose with which a table is of use."""
@@ -81,11 +88,10 @@ _OUTER, _OUTER_OF_BOTH, _BOTH = (5, 5, 7), (5, 5, 12), 0.7
 _MOST = max(_OUTER_OF_BOTH)
 
 _NEGLIGIBLE, _AT_ONSET = 2e-7, 100.0
-"""Size of terms in these that are left out, and how much smaller it is without a force."""
+"""Size of terms that are left out, and how much smaller it is without a force."""
 
-_PSI1, _FORCE, _BEYOND = (-1.0, 1.4), 36.0, 0.6
-"""Range of ψ1, largest f Λ², and largest Λ beyond the tip, over Λ(1)."""
-
+_PSI1, _FORCE, _BEYOND = 1.4, 36.0, 0.6
+"""Largest ψ1 and f Λ², and largest Λ beyond the tip, over Λ(1)."""
 
 _THRUST = 20.0
 """f Λ² before which sweeps end with a thrust through the pivot; their last series may go on."""
@@ -96,8 +102,8 @@ _FINE_FORCES = (_THRUST, 7.0)
 GRADES = 1 + len(_FINE_FORCES)
 """Number of grades of tables."""
 
-_BELOW, _FINE_PSI1 = 0.1, 2.4
-"""Largest amount of ψ1 below that of tangential contact in a fine table, and its largest value."""
+_BELOW, _FINE_BELOW, _FINE_PSI1 = 0.4, 0.1, 2.4
+"""Largest amount of ψ1 below that of tangential contact, also in a fine table, and its largest value there."""
 
 _SCALE = 10.0
 """f Λ² from which on polynomials are in its logarithm."""
@@ -161,7 +167,7 @@ class RestChord(NamedTuple):
 
 _NONE = Terms(np.zeros((0, 3), dtype=np.intp), np.zeros((2, 0, 0, 0)))
 
-NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 1.0, _PSI1, 1.0)
+NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 1.0, (0.0, _PSI1), 1.0)
 """Table without any rod."""
 
 Tables = tuple[ForwardTable, ForwardTable]
@@ -191,9 +197,9 @@ def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:
 
 def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
     work = workspace()
-    rows, (low, high), most = _ROWS, _PSI1, _FORCE
+    rows, low, high, most = _ROWS, -box.friction_angle[1] - _BELOW, _PSI1, _FORCE
     if grade:
-        rows, (low, high) = _MOST_ROWS, (-box.friction_angle[1] - _BELOW, _FINE_PSI1)
+        rows, low, high = _MOST_ROWS, -box.friction_angle[1] - _FINE_BELOW, _FINE_PSI1
         most = _FINE_FORCES[grade - 1]
     span = math.log1p(most / _SCALE)
     wide = box.friction_angle[1] - box.friction_angle[0] > _BOTH
@@ -216,11 +222,11 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
                 _write_poses(rod, -delta * at_tip, lengths, forces, slenderness, work, out)
                 out[..., :2] /= lengths[:, None, None]
         _write_chords(profile._replace(bend=bend, sign=sign), distances, work, chord[i, b])
-    inner, felt = ((-3, ways), (-2, loading)), np.where(forces > 0.0, forces < _THRUST, _AT_ONSET)[:, None]
+    felt = np.where(forces > 0.0, forces < _THRUST, _AT_ONSET)[:, None]
     return ForwardTable(
-        _terms(tip[:, :, :, None], felt, *inner),
-        _terms(tangential[..., 0, :, :, :], felt, *inner),
-        _terms(tangential[..., 1, :, :, :], felt, *inner),
+        _phase(tip[:, :, :, None], felt, loading),
+        _phase(tangential[..., 0, :, :, :], felt, loading),
+        _phase(tangential[..., 1, :, :, :], felt, loading),
         _terms(chord[:, None, :, None, None], _AT_ONSET, (-1, distances)),
         np.array(box, dtype=float),
         slenderness,
@@ -240,6 +246,16 @@ def _terms(values: Floats, relevance: Floats | float, *inner: tuple[int, Floats]
         values = np.moveaxis(np.tensordot(fit, values, (1, axis)), 0, axis)
     coefficients = values.reshape(*values.shape[:4], -1, _COLUMNS)
     return Terms(orders, np.ascontiguousarray(coefficients[:, *orders.T]))
+
+
+def _phase(values: Floats, relevance: Floats, loading: Floats) -> Terms:
+    """Terms of a phase, from as few nodes in ψ1 or s1, along the axis −3, as leave out negligible terms only."""
+    coefficients = chebyshev.coefficients(np.moveaxis(values, -3, -1))
+    needed = (np.maximum(relevance, 1.0) * np.abs(coefficients)).max(axis=(1, 2, 3, 4, 5, 6)) > _NEGLIGIBLE
+    count = min(-(-(1 + np.flatnonzero(needed)[-1]) // _GROUP) * _GROUP, needed.size)
+    nodes = chebyshev.nodes(count)
+    few = np.moveaxis(np.tensordot(chebyshev.polynomials(count, nodes), coefficients[:count], 1), 0, -3)
+    return _terms(few, relevance, (-3, nodes), (-2, loading))
 
 
 def _slenderness(profile: Profile) -> float:
@@ -290,10 +306,10 @@ def _write_chords(profile: Profile, distances: Floats, work: Floats, out: Floats
 @compiled
 def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet: Floats) -> bool:
     """Write the coefficients of one rod, unless they are there, and return False if the table does not hold it."""
-    box, values = table.box, (profile.taper, profile.bend, friction_angle)
-    rows, own = table.tip.coefficients.shape[2], sheet[_RANGES]
-    is_there = own[0] == rows and own[3] == table.span and own[4] == profile.sign
-    if is_there and own[5] == values[0] and own[6] == values[1] and own[7] == values[2]:
+    box, (low, high), own = table.box, table.psi1, sheet[_RANGES]
+    values = profile.taper, profile.bend, friction_angle
+    is_there = own[0] == low and own[1] == high and own[2] == table.span and own[3] == profile.sign
+    if is_there and own[4] == values[0] and own[5] == values[1] and own[6] == values[2]:
         return True
     for c in range(3):
         if not box[c, 0] - _ROUNDING <= values[c] <= box[c, 1] + _ROUNDING:
@@ -303,13 +319,12 @@ def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet:
         sheet[_POSE + c, 0], sheet[_POSE + c, 1] = 1.0, x
         for k in range(2, _MOST):
             sheet[_POSE + c, k] = 2.0 * x * sheet[_POSE + c, k - 1] - sheet[_POSE + c, k - 2]
-    own[0], own[3], own[4] = rows, table.span, profile.sign
-    own[1], own[2] = table.psi1
-    own[5], own[6], own[7] = values
+    own[0], own[1], own[2], own[3] = low, high, table.span, profile.sign
+    own[4], own[5], own[6] = values
     mirrored = 0 if profile.sign > 0.0 else 1
-    _contract(table.tip, mirrored, sheet, 0)
-    _contract(table.tangential, mirrored, sheet, _TANGENTIAL)
-    _contract(table.beyond, mirrored, sheet, _BEYOND_TIP)
+    for k, phase in enumerate((table.tip, table.tangential, table.beyond)):
+        own[_DEPTH + k] = phase.coefficients.shape[2]
+        _contract(phase, mirrored, sheet, k * _MOST_ROWS)
     _contract(table.chord, mirrored, sheet, _AT_REST)
     _contract(table.chord, 1 - mirrored, sheet, _AT_REST + 1)
     _write_parts(profile, sheet)
@@ -320,9 +335,9 @@ def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet:
 def _write_parts(profile: Profile, sheet: Floats) -> None:
     """Write the turn of the rod at rest, by Simpson's rule, and its pliance."""
     turn, pliance = sheet[_TURN], sheet[_PLIANCE]
-    width, before = 0.5 / PARTS, rest_curvature_at(profile, cell_at(profile, 1.0, BACKWARD), 1.0)
+    width, before = 1.0 / _HALVES, rest_curvature_at(profile, cell_at(profile, 1.0, BACKWARD), 1.0)
     turn[0], most = 0.0, 0.0
-    for k in range(2 * PARTS + 1):
+    for k in range(_HALVES + 1):
         s = 1.0 - k * width
         cell = cell_at(profile, s, BACKWARD)
         pliance[k] = 1.0 / rigidity_at(profile, cell, s)
@@ -332,7 +347,7 @@ def _write_parts(profile: Profile, sheet: Floats) -> None:
             between = rest_curvature_at(profile, cell_at(profile, middle, BACKWARD), middle)
             turn[k] = turn[k - 1] + (before + 4.0 * between + here) * width / 6.0
             before = here
-    pliance[2 * PARTS + 1] = most
+    pliance[_HALVES + 1] = most
 
 
 @compiled
@@ -354,17 +369,17 @@ def pose_in(
 ) -> tuple[bool, Pose, Pose, Pose]:
     """True if there is a pose; the pose, and its derivatives by ψ1 or the arc length, and by the force."""
     length, rate = _length(slenderness, taper, arclength)
-    scaled, span = force * length * length, sheet[_RANGES, 3]
+    scaled, span = force * length * length, sheet[_RANGES, 2]
     z, by_scaled = 2.0 / span * math.log1p(scaled / _SCALE) - 1.0, 2.0 / (span * (_SCALE + scaled))
-    row, begin, by_x, at = _TANGENTIAL, 0.0, 2.0, arclength
+    phase, begin, by_x, at = 1, 0.0, 2.0, arclength
     if tip:
-        row, begin, at = 0, sheet[_RANGES, 1], psi1
-        by_x = 2.0 / (sheet[_RANGES, 2] - begin)
+        phase, begin, at = 0, sheet[_RANGES, 0], psi1
+        by_x = 2.0 / (sheet[_RANGES, 1] - begin)
     elif arclength > 1.0:
-        row, begin, by_x = _BEYOND_TIP, 1.0, 2.0 / (_BEYOND * (1.0 - taper))
+        phase, begin, by_x = 2, 1.0, 2.0 / (_BEYOND * (1.0 - taper))
     x, by_force = (at - begin) * by_x - 1.0, by_scaled * length * length
     inside = -1.0 <= x <= 1.0 and z <= 1.0
-    here, in_x, in_z = _sums(sheet, row, x, z)
+    here, in_x, in_z = _sums(sheet, phase, x, z)
     if tip:
         return inside, here, _times(by_x, in_x), _times(by_force, in_z)
     by_s = 2.0 * by_scaled * force * length * rate
@@ -378,6 +393,13 @@ def pose_in(
 
 
 @compiled
+def is_far(slenderness: float, taper: float, arclength: float, force: float) -> bool:
+    """True if f Λ² is more than twice the largest one of any table."""
+    length, _ = _length(slenderness, taper, arclength)
+    return force * length * length > 2.0 * _FORCE
+
+
+@compiled
 def _times(factor: float, pose: Pose) -> Pose:
     return Pose(factor * pose.u, factor * pose.v, factor * pose.turn)
 
@@ -388,20 +410,21 @@ def _stretched(factor: float, pose: Pose) -> Pose:
 
 
 @compiled
-def _sums(sheet: Floats, row: int, x: float, z: float) -> tuple[Pose, Pose, Pose]:
+def _sums(sheet: Floats, phase: int, x: float, z: float) -> tuple[Pose, Pose, Pose]:
     """Three polynomials in two variables, and their derivatives."""
-    rows, at, by = int(sheet[_RANGES, 0]), sheet[_POSE], sheet[_POSE + 1]
+    at, by, square, power, before = sheet[_POSE], sheet[_POSE + 1], x * x, 1.0, 0.0
     for j in range(_COLUMNS):
-        at[j], by[j] = sheet[row + rows - 1, j], 0.0
-    for i in range(rows - 2, 0, -2):  # rows by twos, and several columns at a time
-        here, next_one = sheet[row + i], sheet[row + i - 1]
-        for j in range(_COLUMNS):
-            mid = at[j] * x + here[j]
-            by[j] = (by[j] * x + at[j]) * x + mid
-            at[j] = mid * x + next_one[j]
-    for j in range(_COLUMNS):  # the last, of an even number
-        by[j] = by[j] * x + at[j]
-        at[j] = at[j] * x + sheet[row, j]
+        at[j], by[j] = 0.0, 0.0
+    for i in range(0, int(sheet[_RANGES, _DEPTH + phase]), _GROUP):
+        row, power_1, power_2, power_3 = phase * _MOST_ROWS + i, power * x, power * square, power * square * x
+        by_0, by_1, by_2, by_3 = i * before, (i + 1) * power, (i + 2) * power_1, (i + 3) * power_2
+        row_0, row_1, row_2, row_3 = sheet[row], sheet[row + 1], sheet[row + 2], sheet[row + 3]
+        for j in range(_COLUMNS):  # several at a time, and nothing stored before all is loaded
+            c_0, c_1, c_2, c_3 = row_0[j], row_1[j], row_2[j], row_3[j]
+            value = at[j] + (power * c_0 + power_1 * c_1 + power_2 * c_2 + power_3 * c_3)
+            slope = by[j] + (by_0 * c_0 + by_1 * c_1 + by_2 * c_2 + by_3 * c_3)
+            at[j], by[j] = value, slope
+        power, before = power_2 * square, power_3
     u, v, turn, u_x, v_x, turn_x, u_z, v_z, turn_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(_COLUMNS - 3, -1, -3):
         u_z, v_z, turn_z = u_z * z + u, v_z * z + v, turn_z * z + turn
@@ -414,29 +437,42 @@ def _sums(sheet: Floats, row: int, x: float, z: float) -> tuple[Pose, Pose, Pose
 @compiled
 def has_parts(sheet: Floats, force: float) -> bool:
     """True if `part_in` holds under a force."""
-    return force * sheet[_PLIANCE, 2 * PARTS + 1] <= _MOST_BENT * PARTS * PARTS
+    return _is_fine(sheet, force, _STEPS)
+
+
+@compiled
+def _is_fine(sheet: Floats, force: float, steps: int) -> bool:
+    """True if steps of this number in a part are short enough."""
+    return force * sheet[_PLIANCE, _HALVES + 1] <= _MOST_BENT * (PARTS * steps) ** 2
 
 
 @compiled
 def part_in(sheet: Floats, psi1: float, force: float, part: int, before: State) -> State:
     """State of a rod in tip contact at the end of a part, as seen from the tip, from that at its beginning.
 
-    Parts are counted from the tip. In place of P stands the turn by which the force has bent the rod. A step of the
-    classical Runge–Kutta method leads over a part, with errors of 4e-4 [L] at most.
+    Parts are counted from the tip. In place of P stands the turn by which the force has bent the rod. Steps of the
+    classical Runge–Kutta method lead over a part, with errors of 4e-4 [L] at most.
     """
-    turn, pliance, h = sheet[_TURN], sheet[_PLIANCE], 1.0 / PARTS
-    k, bent, u, v = 2 * part, before.load, before.u, before.v
-    cos_1, sin_1, rate_1 = math.cos(before.psi), math.sin(before.psi), force * u * pliance[k - 2]
-    psi_2 = psi1 - turn[k - 1] + bent + 0.5 * h * rate_1
-    cos_2, sin_2, rate_2 = math.cos(psi_2), math.sin(psi_2), force * (u + 0.5 * h * cos_1) * pliance[k - 1]
-    psi_3 = psi1 - turn[k - 1] + bent + 0.5 * h * rate_2
-    cos_3, sin_3, rate_3 = math.cos(psi_3), math.sin(psi_3), force * (u + 0.5 * h * cos_2) * pliance[k - 1]
-    psi_4 = psi1 - turn[k] + bent + h * rate_3
-    cos_4, sin_4, rate_4 = math.cos(psi_4), math.sin(psi_4), force * (u + h * cos_3) * pliance[k]
-    bent += h / 6.0 * (rate_1 + 2.0 * (rate_2 + rate_3) + rate_4)
-    u += h / 6.0 * (cos_1 + 2.0 * (cos_2 + cos_3) + cos_4)
-    v += h / 6.0 * (sin_1 + 2.0 * (sin_2 + sin_3) + sin_4)
-    return State(psi1 - turn[k] + bent, bent, u, v)
+    turn, pliance, steps = sheet[_TURN], sheet[_PLIANCE], 1
+    while steps < _STEPS and not _is_fine(sheet, force, steps):
+        steps *= 2
+    h, half, k = 1.0 / (PARTS * steps), _STEPS // steps, 2 * _STEPS * (part - 1)
+    psi, bent, u, v = before
+    for _ in range(steps):
+        cos_1, sin_1, rate_1 = math.cos(psi), math.sin(psi), force * u * pliance[k]
+        k += half
+        psi_2 = psi1 - turn[k] + bent + 0.5 * h * rate_1
+        cos_2, sin_2, rate_2 = math.cos(psi_2), math.sin(psi_2), force * (u + 0.5 * h * cos_1) * pliance[k]
+        psi_3 = psi1 - turn[k] + bent + 0.5 * h * rate_2
+        cos_3, sin_3, rate_3 = math.cos(psi_3), math.sin(psi_3), force * (u + 0.5 * h * cos_2) * pliance[k]
+        k += half
+        psi_4 = psi1 - turn[k] + bent + h * rate_3
+        cos_4, sin_4, rate_4 = math.cos(psi_4), math.sin(psi_4), force * (u + h * cos_3) * pliance[k]
+        bent += h / 6.0 * (rate_1 + 2.0 * (rate_2 + rate_3) + rate_4)
+        u += h / 6.0 * (cos_1 + 2.0 * (cos_2 + cos_3) + cos_4)
+        v += h / 6.0 * (sin_1 + 2.0 * (sin_2 + sin_3) + sin_4)
+        psi = psi1 - turn[k] + bent
+    return State(psi, bent, u, v)
 
 
 @compiled

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from tactile_bayes.mechanics.beam import free_end, from_tip, loaded_part, rest_curvature
-from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.curves import REST
 from tactile_bayes.mechanics.equilibrium import Equilibrium, Scene, tangential_psi1
 from tactile_bayes.mechanics.forward_table import PARTS
@@ -40,7 +40,7 @@ def second_contact(scene: Scene, seen: Outline, leg: Leg, goes_on: bool, stop: f
     return at.p if _touches_twice(scene, leg.tip, at, True, low, high) else math.nan
 
 
-@compiled
+@inlined
 def _touches_twice(scene: Scene, tip: bool, at: Equilibrium, wholly: bool, low: float, high: float) -> bool:
     """True if a rod touches the object at another point too, between the ends of the contour.
 
