@@ -328,7 +328,7 @@ def _to_chord(arclength: float, bearing: float, slope: float, curvature: float, 
     return Chord(arclength, bearing, at_point, rate)
 
 
-@compiled
+@inlined
 def _chord(varied: Varied | None, curvature: float, reach: float, distance: float) -> Chord:
     if varied is None:
         sine = min(max(0.5 * curvature * distance, -1.0), 1.0)

@@ -16,6 +16,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.newton import newton_step
 
 __all__ = [
     "Half",
@@ -35,8 +36,9 @@ _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3
 """Rod lengths beyond which an end of a contour does not matter."""
 
-_HALVINGS = 30
-"""Halvings of the range in which the parameter at an x is sought."""
+_MOST_STEPS, _SETTLED = 60, 1e-5
+"""Largest number of steps in which the parameter at an x is sought, and the last one over the range: beside it the
+contour is straight."""
 
 
 class Half(NamedTuple):
@@ -227,13 +229,16 @@ def is_inside(outline: Outline, arclength: float, x: float, y: float, low: float
     left, right = _beside(outline, low, arclength), _beside(outline, high, arclength)
     if not (left.x < x < right.x and (y - left.y) * (right.x - left.x) < (x - left.x) * (right.y - left.y)):
         return False
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if _beside(outline, middle, arclength).x < x:
-            low = middle
-        else:
-            high = middle
-    return y > _beside(outline, high, arclength).y
+    p, before = 0.5 * (low + high), high - low
+    settled = _SETTLED * before
+    for _ in range(_MOST_STEPS):
+        at = _beside(outline, p, arclength)
+        new, low, high, before = newton_step(p, x - at.x, -at.speed * at.cos, low, high, before)
+        step, p = abs(new - p), new
+        if not step > settled:
+            break
+    at = _beside(outline, p, arclength)
+    return (y - at.y) * at.cos > (x - at.x) * at.sin
 
 
 @compiled

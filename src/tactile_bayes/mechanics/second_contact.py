@@ -20,7 +20,7 @@ _SHORT_END = 1e-3
 _ACROSS = 0.5 * math.pi
 
 
-@compiled
+@inlined
 def second_contact(scene: Scene, seen: Outline, leg: Leg, goes_on: bool, stop: float, work: LegCurves) -> float:
     """Contact up to a position on a leg at which a rod curved toward the object would touch it twice; NaN without one.
 
