@@ -34,6 +34,7 @@ from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.record import make_record
 from tactile_bayes.runs.demonstration import CONTOUR as DEMONSTRATED
 from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
+from tactile_bayes.tasks import one_thread
 
 CONTOUR = tb.contours.paper_profile("II", q=0.6)
 """Its forward sweep is in tip, then tangential, then tip contact again."""
@@ -66,7 +67,7 @@ TIGHT = 1e-12
 
 
 def main() -> None:
-    with threadpool_limits(1):
+    with threadpool_limits(1), one_thread():
         one, error_of_one = step_one()
         two, error_of_two = step_two()
         likeliest, error_of_likeliest = constrained()

@@ -17,6 +17,7 @@ import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw
 from tactile_bayes.record import make_record
+from tactile_bayes.tasks import one_thread
 
 REFERENCE = Path(__file__).parents[1] / "data" / "synthetic" / "reference"
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -33,7 +34,7 @@ SAMPLES = {"first 5 % of the sweep": 4, "in between": 12, "last 5 % before snap-
 
 
 def main(sweeps: int = 1000) -> None:
-    with threadpool_limits(1):
+    with threadpool_limits(1), one_thread():
         print("Root-mean-square error of contact points, in rod lengths, on the reference data set:\n")
         print_errors()
         print(f"\nHow many regions hold the true contact, of {sweeps:,} sweeps:\n")

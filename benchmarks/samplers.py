@@ -35,6 +35,7 @@ from tactile_bayes.inference.experiment import default_priors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
+from tactile_bayes.tasks import one_thread
 
 Sampler = Callable[["Counted", Floats, int], Floats]
 
@@ -57,7 +58,7 @@ class Counted:
 def main(evaluations: int = 40_000) -> None:
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    with threadpool_limits(1):
+    with threadpool_limits(1), one_thread():
         model = demonstration()
         walk = walk_of(model, spawn(1, 1)[0], tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS))
         start = started(walk)

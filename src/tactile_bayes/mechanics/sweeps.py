@@ -28,6 +28,7 @@ from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples, write_state
+from tactile_bayes.tasks import in_parts
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
 
@@ -49,6 +50,9 @@ _EXACT_ORDER, _FAST_ORDER = 32, 12
 """Numbers of nodes on a stretch."""
 
 _NEVER_MISSED = np.full(3, np.inf)
+
+_FEWEST = 16
+"""Fewest sweeps that another thread shares."""
 
 
 class Shapes(NamedTuple):
@@ -419,22 +423,26 @@ def solve_sweeps(
     events = np.empty(sweep.size, dtype=_EVENTS)
     longest = int(np.diff(segments.first).max(initial=0))
     lines = 0 if segments.lines is None else segments.lines.shape[1]
-    _solve(
-        shapes,
-        varied_of(profile),
-        known,
-        sweep,
-        segments,
-        *_carried(segments.lines),
-        tolerance is None,
-        accuracy,
-        _NEVER_MISSED if tolerance is None else tolerance,
-        asks_clearance,
-        branch_workspace(longest, order, shapes.knots.shape[1], lines),
-        np.empty(shapes.tables.shape[1:]),
-        loads,
-        all_states,
-        changes,
-        events,
-    )
+
+    def solve(part: slice) -> None:
+        _solve(
+            shapes,
+            varied_of(profile),
+            known,
+            sweep[part],
+            segments,
+            *_carried(segments.lines),
+            tolerance is None,
+            accuracy,
+            _NEVER_MISSED if tolerance is None else tolerance,
+            asks_clearance,
+            branch_workspace(longest, order, shapes.knots.shape[1], lines),
+            np.empty(shapes.tables.shape[1:]),
+            loads,
+            all_states,
+            changes[part],
+            events[part],
+        )
+
+    in_parts(solve, sweep.size, _FEWEST)
     return Solutions(loads, all_states, changes, *(np.ascontiguousarray(events[name]) for name in _EVENTS.names or ()))

@@ -2,6 +2,7 @@
 
 from tactile_bayes.tasks.files import alone_in, is_temporary, write_atomically
 from tactile_bayes.tasks.results_store import Kind, ResultsStore, TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.tasks.threads import in_parts, one_thread
 from tactile_bayes.tasks.workers import run_tasks
 
 __all__ = [
@@ -9,8 +10,10 @@ __all__ = [
     "ResultsStore",
     "TaskProgress",
     "alone_in",
+    "in_parts",
     "is_temporary",
     "keep_outcomes",
+    "one_thread",
     "open_results_store",
     "run_tasks",
     "write_atomically",

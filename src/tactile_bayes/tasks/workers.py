@@ -19,6 +19,7 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError, TaskError
+from tactile_bayes.tasks.threads import cores, one_thread
 
 __all__ = ["run_tasks"]
 
@@ -42,7 +43,7 @@ def run_tasks(
     """Call a function on every task, and yield results in the order in which they are ready.
 
     A process that dies (killed, out of memory) is replaced, and its task is repeated. The result of a task must not
-    depend on where or when it is computed. Each task runs with one thread of linear algebra. Processes end with the
+    depend on where or when it is computed. Each task runs on one thread. Processes end with the
     iterator, and with this process, however it ends; only this process receives Ctrl-C.
 
     Parameters
@@ -82,7 +83,7 @@ def run_tasks(
     if scheduler is not None:
         yield from _on_cluster(function, tasks, scheduler)
         return
-    count = min(workers or _cores(), len(tasks))
+    count = min(workers or cores(), len(tasks))
     if count <= 1:
         for task in tasks:
             yield task, _alone(function, task)
@@ -91,12 +92,8 @@ def run_tasks(
 
 
 def _alone(function: Callable[[Task], Result], task: Task) -> Result:
-    with threadpool_limits(1):
+    with threadpool_limits(1), one_thread():
         return function(task)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 # ---- processes on this machine
