@@ -26,10 +26,10 @@ from benchmarks.starting import starting
 from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.sweep_frame import SweepFrame
-from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import spawn
-from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.rig import Rig
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.record import make_record
 from tactile_bayes.runs.demonstration import CONTOUR as DEMONSTRATED

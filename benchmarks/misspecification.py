@@ -25,7 +25,7 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
-from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.parameters.nuisances import STANDARD
 
 OUT = Path("results/misspecification")
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import tactile_bayes as tb
-from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 

@@ -28,12 +28,12 @@ import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.ensembles import sample, spawn
 from tactile_bayes.inference.ensembles.diagnosis import walker_major
 from tactile_bayes.inference.experiment import default_priors
-from tactile_bayes.inference.noise import noise_of
-from tactile_bayes.inference.nuisances import nuisances_of
+from tactile_bayes.inference.parameters.noise import noise_of
+from tactile_bayes.inference.parameters.nuisances import nuisances_of
+from tactile_bayes.inference.starts.contour_start import Walk, walk_of
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.tasks import one_thread
 

@@ -22,7 +22,7 @@ import tactile_bayes as tb
 from tactile_bayes.calibration.calibrate import calibration_replicate
 from tactile_bayes.calibration.ranks import uniformity_p_value
 from tactile_bayes.errors import StudyError, TactileBayesError
-from tactile_bayes.inference.particles import SETTLED
+from tactile_bayes.inference.streams.particles import SETTLED
 from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
 
 OUT = Path("results/stream")

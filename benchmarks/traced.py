@@ -16,7 +16,7 @@ from scipy.integrate import cumulative_simpson
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.traced import traced_rod
+from tactile_bayes.mechanics.rods.traced import traced_rod
 
 PLACES, FINE = np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 2001)
 POINTS, SCATTERS = (8, 12, 30, 80), (1e-4, 1e-3, 5e-3)

@@ -34,8 +34,8 @@ import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.contour_events import events_of
-from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.nuisances import Nuisances
+from tactile_bayes.inference.parameters.nuisances import Nuisances
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 
 ROOT = Path(__file__).resolve().parents[1]
 MEASURED = Path(os.environ.get("TACTILE_BAYES_MEASURED", ROOT.parent / "shared" / "data")) / "whisker-sweeps"

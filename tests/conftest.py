@@ -13,7 +13,7 @@ from hypothesis import settings
 
 from helpers.contour_posteriors import QUICK
 from tactile_bayes.contours import Circle
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import Translation, scan
 

@@ -26,10 +26,10 @@ _HOMES = {
     "OrnsteinUhlenbeck": "load_cell",
     "Plan": "planning.plan",
     "RandomWalk": "load_cell",
-    "Rod": "mechanics.rod",
+    "Rod": "mechanics.rods.rod",
     "Rotation": "sweep",
     "SamplerSettings": "inference.ensembles",
-    "Stream": "inference.stream",
+    "Stream": "inference.streams.stream",
     "StreamComparison": "comparison.streams",
     "Translation": "sweep",
     "calibrate": "calibration.calibrate",
@@ -99,13 +99,13 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.result import read_result as read_result
     from tactile_bayes.inference.result import to_arviz as to_arviz
     from tactile_bayes.inference.result import write_result as write_result
-    from tactile_bayes.inference.stream import Stream as Stream
+    from tactile_bayes.inference.streams.stream import Stream as Stream
     from tactile_bayes.load_cell import LoadCell as LoadCell
     from tactile_bayes.load_cell import OrnsteinUhlenbeck as OrnsteinUhlenbeck
     from tactile_bayes.load_cell import RandomWalk as RandomWalk
     from tactile_bayes.load_cell import zero_load as zero_load
     from tactile_bayes.mechanics import elastica as elastica
-    from tactile_bayes.mechanics.rod import Rod as Rod
+    from tactile_bayes.mechanics.rods.rod import Rod as Rod
     from tactile_bayes.planning.design import design as design
     from tactile_bayes.planning.error_map import error_map as error_map
     from tactile_bayes.planning.plan import Plan as Plan

@@ -33,7 +33,7 @@ def test_gains_take_the_place_of_the_rigidity_which_has_the_same_effect():
 def test_a_calibrated_rig_does_not_add_what_is_fixed():
     from scipy import stats
 
-    from tactile_bayes.inference.rig_prior import RigPrior
+    from tactile_bayes.inference.parameters.rig_prior import RigPrior
 
     priors = {"rigidity_scale": stats.lognorm(s=0.01), "lever_x": stats.norm(0.0, 0.01)}
     joint = RigPrior(priors, np.array([[1.0, 0.8], [0.8, 1.0]]), 0.1, "0")

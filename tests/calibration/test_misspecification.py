@@ -11,7 +11,7 @@ from helpers.refusals import refused
 from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.rig import Rig
+from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.load_cell import LoadCell
 
 DRAWN = family_named("parabola").build(np.array([0.6]), np.array([0.4]), np.array([0.1]))

@@ -16,7 +16,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
 
 QUIET = LoadCell(force_noise=1e-12, moment_noise=1e-12)

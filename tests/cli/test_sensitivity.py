@@ -11,7 +11,7 @@ import tactile_bayes as tb
 import tactile_bayes.planning.error_map as error_map_module
 from helpers import commands
 from tactile_bayes.contours import Joined, Parabola
-from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.error_cell import CellOutcome
 from tactile_bayes.runs import sensitivity as sensitivity_run

@@ -15,7 +15,7 @@ from helpers import commands
 from helpers.report_pages import Page
 from tactile_bayes.cli import watching
 from tactile_bayes.inference.result import read_result
-from tactile_bayes.inference.stream import Stream
+from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import read_record
 from tactile_bayes.runs import contour as contour_run

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from helpers.refusals import refused
 from tactile_bayes.contours.families import FAMILIES, FLANKS, family_named
 from tactile_bayes.errors import ContourError, ParameterError
-from tactile_bayes.inference.priors import default_priors
+from tactile_bayes.inference.parameters.priors import default_priors
 
 OWN = {"parabola": (0.8,), "circle": (0.7,), "ellipse": (0.9, 0.6), "power-law": (1.2, 2.5)}
 CASES = {

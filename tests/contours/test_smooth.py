@@ -7,9 +7,9 @@ from scipy.integrate import quad
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, Smooth, check
 from tactile_bayes.errors import ContourError
-from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep import scan
 
 NODES = 40

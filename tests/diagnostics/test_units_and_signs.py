@@ -6,7 +6,7 @@ import pytest
 from tactile_bayes.contours import Circle, paper_profile
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import in_frame
 from tactile_bayes.runs.demonstration import LOAD_CELL
 from tactile_bayes.sweep import scan

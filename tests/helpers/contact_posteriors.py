@@ -19,7 +19,7 @@ from tactile_bayes.inference.contact_posterior.importance import weigh_contacts
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import samples_of
 from tactile_bayes.record import CHANNELS, frame_of, in_frame, rod_of
 from tactile_bayes.sweep import scan

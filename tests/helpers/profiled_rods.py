@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
-from tactile_bayes.mechanics.profile import Profile, profile_of
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.profile import Profile, profile_of
+from tactile_bayes.mechanics.rods.rod import Rod
 
 Function = Callable[[float], float]
 

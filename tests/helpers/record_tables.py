@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 
 WIRE = Rod(length=0.2, flexural_rigidity=2.4e-3, diameter=0.7e-3)
 

@@ -28,9 +28,9 @@ from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment, default_priors
-from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics import blocks
 from tactile_bayes.record import CHANNELS, in_frame, record_hash, to_si
 from tactile_bayes.sweep import scan

@@ -7,8 +7,8 @@ from helpers.contour_posteriors import assert_near, infer_as_stated
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.priors import default_priors
+from tactile_bayes.inference.parameters.priors import default_priors
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.sweep import scan, scan_many
 

@@ -11,7 +11,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)

@@ -10,7 +10,7 @@ from tactile_bayes import scan
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, frame_of, in_frame, present_channels, to_dimensionless, to_si
 

@@ -9,7 +9,7 @@ from helpers.load_cells import cell, ideal, load_cells
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, LOAD_CELL_UNITS, frame_of, read_record, to_dimensionless, write_record
 
 SIZES = ("force_noise", "moment_noise", "relative_noise", "force_resolution", "moment_resolution")

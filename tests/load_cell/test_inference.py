@@ -12,7 +12,7 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS
 

@@ -10,7 +10,7 @@ from tactile_bayes.contours import Circle, Ellipse, paper_profile
 from tactile_bayes.errors import DriftWarning, RecordError
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.load_cell.contact_bounds import contact_bounds
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, in_frame, make_record, to_si
 from tactile_bayes.sweep import scan
 

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.special import ellipkinc
 
-from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, FORCE, PSI1, contact_states
+from tactile_bayes.mechanics.contacts.contact_coordinates import ARCLENGTH, FORCE, PSI1, contact_states
+from tactile_bayes.mechanics.contacts.fits import ContactFit, Reading
 from tactile_bayes.mechanics.elastica import tangential_arclength, wrench_from_contact
-from tactile_bayes.mechanics.fits import ContactFit, Reading
 from tactile_bayes.mechanics.fitting import fit_contacts, fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 

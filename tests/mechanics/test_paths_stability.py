@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from helpers.integration import shoot
 from helpers.second_variation import Held, eigenvalues, held
 from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep import equilibria, scan
 
 EIGENVALUE = 1e-7

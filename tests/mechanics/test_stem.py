@@ -9,14 +9,18 @@ from helpers.integration import ATOL, RTOL
 from helpers.refusals import refused
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
-from tactile_bayes.mechanics.along import Along
+from tactile_bayes.mechanics.branches.line import lines_through
 from tactile_bayes.mechanics.centreline import rod_shape
-from tactile_bayes.mechanics.contact_coordinates import contact_states, contact_states_and_slopes, place_by_wrench
+from tactile_bayes.mechanics.contacts.contact_coordinates import (
+    contact_states,
+    contact_states_and_slopes,
+    place_by_wrench,
+)
 from tactile_bayes.mechanics.elastica import contact_from_wrench, wrench_from_contact
-from tactile_bayes.mechanics.line import lines_through
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.along import Along
+from tactile_bayes.mechanics.rods.rod import Rod
 
 STEM = 0.15
 CIRCLE = tb.contours.Circle(0.3, 0.6)

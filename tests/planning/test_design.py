@@ -14,7 +14,7 @@ from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.candidate import Candidate, Question, _band_widths, expected_of
 from tactile_bayes.planning.design import design
 from tactile_bayes.planning.information import information

@@ -11,7 +11,7 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ReachError
-from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan

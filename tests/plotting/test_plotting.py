@@ -17,7 +17,7 @@ from tactile_bayes import plotting
 from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.plotting import posteriors, touch_map
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.plotting.tightening import _fit_map, _panels

@@ -11,7 +11,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contact_posterior import infer_contacts
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.phases import PHASE_NAMES
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct, samples, samples_of
 from tactile_bayes.record import make_record
 

@@ -5,7 +5,7 @@ import pytest
 
 from tactile_bayes.contours import Parabola
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.sweep import scan
 

@@ -10,7 +10,7 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples, reconstruct
 from tactile_bayes.record import in_frame, make_record
 from tactile_bayes.sweep import scan

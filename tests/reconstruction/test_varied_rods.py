@@ -7,7 +7,11 @@ from scipy.integrate import solve_ivp
 import tactile_bayes as tb
 from helpers.integration import ATOL, RTOL
 from tactile_bayes.mechanics.centreline import rod_shape
-from tactile_bayes.mechanics.contact_coordinates import contact_states, contact_states_and_slopes, place_by_wrench
+from tactile_bayes.mechanics.contacts.contact_coordinates import (
+    contact_states,
+    contact_states_and_slopes,
+    place_by_wrench,
+)
 from tactile_bayes.mechanics.elastica import contact_from_wrench
 from tactile_bayes.record import CHANNELS
 

@@ -7,7 +7,7 @@ import xarray as xr
 from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError, RecordError
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import MEASURED, make_record, present_channels, rod_of, validate
 
 

@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import (
     CHANNELS,
     FRAMES,

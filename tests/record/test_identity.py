@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from helpers.record_tables import WIRE, columns, edited
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record, record_hash
 
 

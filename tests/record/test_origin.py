@@ -9,7 +9,7 @@ import xarray as xr
 from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError, RecordError
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import make_record, read_record, rod_of, write_record
 from tactile_bayes.record.origin import Origin, origins_of
 from tactile_bayes.record.table import Source

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, COLUMNS, column_of
 
 

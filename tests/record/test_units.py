@@ -9,7 +9,7 @@ from hypothesis.extra import numpy as hnp
 from helpers.record_tables import WIRE, columns, edited
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record, rod_of, to_dimensionless, to_si
 
 # Numbers whose quotients are far from underflow, where digits would be lost.

@@ -40,8 +40,8 @@ from helpers.report_pages import (
 )
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.nuisances import nuisances_of
+from tactile_bayes.inference.parameters.nuisances import nuisances_of
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import posterior_draws, read_result, record_of, write_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, record_hash, rod_of

@@ -9,7 +9,7 @@ import pytest
 from helpers.profiled_rods import given_rod, given_rods
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ClearanceWarning, ContourError
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep import equilibria, scan
 
 RODS = given_rods()

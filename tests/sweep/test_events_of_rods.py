@@ -17,7 +17,7 @@ from scipy.optimize import root
 from helpers.profiled_rods import GivenRod, RodAlong, given_rod, integrated_pose
 from tactile_bayes.contours import Circle, Contour, Parabola
 from tactile_bayes.errors import ClearanceWarning, ContourError, ReachError, StrainWarning
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep import scan
 from tactile_bayes.sweep.events import SweepEvents
 

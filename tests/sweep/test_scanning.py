@@ -12,7 +12,7 @@ from helpers.legendre import equilibrium, tangential_arclength
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, from_function, paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import equilibria, scan
 

@@ -17,7 +17,7 @@ from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior import infer_contacts
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import in_frame, record_hash
 from tactile_bayes.sweep import scan

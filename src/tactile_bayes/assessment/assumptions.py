@@ -21,7 +21,7 @@ from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.misfit import is_inferred
-from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 

@@ -26,7 +26,6 @@ from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem
-from tactile_bayes.inference.contour_start import Walk
 from tactile_bayes.inference.ensembles import (
     Mixture,
     Proposal,
@@ -37,6 +36,7 @@ from tactile_bayes.inference.ensembles import (
 )
 from tactile_bayes.inference.ensembles.proposal import flattened
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.starts.contour_start import Walk
 from tactile_bayes.inference.stored_experiment import points_of, predicted_points
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS

@@ -22,7 +22,7 @@ from tactile_bayes.checks import check_function, check_probability, check_seed, 
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.inference.result import contour_draws, read_result
 from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.tasks import TaskProgress

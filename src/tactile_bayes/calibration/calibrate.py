@@ -28,10 +28,10 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
-from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep import Drive, Rotation, drives_of, record_template
 from tactile_bayes.tasks import ResultsStore, TaskProgress, keep_outcomes, open_results_store
 

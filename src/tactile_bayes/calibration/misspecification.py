@@ -12,9 +12,9 @@ from tactile_bayes.checks import check_number, check_numbers, check_optional
 from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.nuisances import BIASES, DRIFTS, GAINS, LEVERS
-from tactile_bayes.inference.priors import Prior, check_priors
-from tactile_bayes.inference.rig import Rig
+from tactile_bayes.inference.parameters.nuisances import BIASES, DRIFTS, GAINS, LEVERS
+from tactile_bayes.inference.parameters.priors import Prior, check_priors
+from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.load_cell import LoadCell
 
 __all__ = ["NUMBERS", "Misspecification"]

@@ -18,7 +18,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment, priors_in_words
-from tactile_bayes.inference.priors import refuse_unknown_priors
+from tactile_bayes.inference.parameters.priors import refuse_unknown_priors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import bases_of
 from tactile_bayes.sweep import Carried, Drive

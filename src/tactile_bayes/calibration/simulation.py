@@ -14,7 +14,7 @@ from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
-from tactile_bayes.inference.rig import Rig
+from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.load_cell.corruption import corrupted_angles
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.record import CHANNELS

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from tactile_bayes.load_cell import LoadCell
-    from tactile_bayes.mechanics.rod import Rod
+    from tactile_bayes.mechanics.rods.rod import Rod
 
 __all__ = ["Friction", "KnownRig", "NoiseOptions", "RigOptions", "RodOptions", "UnknownOptions", "rig_in"]
 
@@ -90,7 +90,7 @@ class RodOptions:
             If options of the rod are missing, or contradict each other.
         """
         from tactile_bayes.errors import ParameterError
-        from tactile_bayes.mechanics.rod import Rod
+        from tactile_bayes.mechanics.rods.rod import Rod
 
         if self.rod_shape is not None:
             if self.rest_curvature:
@@ -196,8 +196,8 @@ class UnknownOptions:
             If the options contradict each other.
         """
         from tactile_bayes.errors import ParameterError
-        from tactile_bayes.inference.discrepancy import DISCREPANCY
-        from tactile_bayes.inference.nuisances import STANDARD
+        from tactile_bayes.inference.parameters.discrepancy import DISCREPANCY
+        from tactile_bayes.inference.parameters.nuisances import STANDARD
 
         if self.as_stated and self.nuisance:
             raise ParameterError("--as-stated and --nuisance contradict each other: leave one of them out")

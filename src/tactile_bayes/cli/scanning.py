@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from tactile_bayes.mechanics.rod import Rod
+    from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.sweep import Event, Scan
 
 __all__ = ["RecordFile", "refuse_other_suffix", "scan"]
@@ -57,7 +57,7 @@ def scan(
     if figure is not None:
         refuse_other_suffix(figure, (".png", ".pdf", ".svg"), "a figure")
     with step_bar(output.is_silent) as show:
-        from tactile_bayes.mechanics.rod import Rod
+        from tactile_bayes.mechanics.rods.rod import Rod
         from tactile_bayes.record import write_record
         from tactile_bayes.sweep import scan as sweep
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from tactile_bayes.load_cell import LoadCell
-    from tactile_bayes.mechanics.rod import Rod
+    from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.runs.sensitivity import Material, SensitivityRun
 
 __all__ = ["sensitivity"]
@@ -98,7 +98,7 @@ def sensitivity(
     The same command resumes a stopped study.
     """
     from tactile_bayes.contours import paper_profile
-    from tactile_bayes.mechanics.rod import Rod
+    from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.planning.family_parameters import enlarged
     from tactile_bayes.runs.sensitivity import sensitivity_into, steps_of
 
@@ -173,7 +173,7 @@ def _material(youngs_modulus: float | None, elastic_strain: float | None) -> Mat
 
 def _load_cell(rod: Rod | None, cell: LoadCell | None, drive_angle_noise: float) -> LoadCell | None:
     from tactile_bayes.inference.experiment import usual_load_cell
-    from tactile_bayes.mechanics.rod import Rod
+    from tactile_bayes.mechanics.rods.rod import Rod
 
     if not drive_angle_noise:
         return cell

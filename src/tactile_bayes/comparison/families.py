@@ -25,15 +25,15 @@ from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, settings_of, spawn
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.matched_priors import matched_priors
-from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.priors import Prior
-from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
+from tactile_bayes.inference.parameters.matched_priors import matched_priors
+from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig, rig_prior
+from tactile_bayes.inference.starts.contour_start import Walk, walk_of
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import record_hash, rod_of
 

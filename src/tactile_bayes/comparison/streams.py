@@ -18,10 +18,10 @@ from tactile_bayes.checks import check_function, check_numbers, check_path
 from tactile_bayes.comparison.families import GIVEN_UP, checked_families
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
-from tactile_bayes.inference.matched_priors import matched_priors
-from tactile_bayes.inference.priors import Prior
-from tactile_bayes.inference.stream import LEVELS, Stream
-from tactile_bayes.inference.stream_state import read_tree
+from tactile_bayes.inference.parameters.matched_priors import matched_priors
+from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.streams.stream import LEVELS, Stream
+from tactile_bayes.inference.streams.stream_state import read_tree
 from tactile_bayes.record import rod_of, validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.uncertainty.averaged_contours import averaged_heights

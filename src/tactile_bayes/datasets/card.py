@@ -6,7 +6,7 @@ from itertools import groupby
 
 from tactile_bayes.datasets.manifest import Manifest
 from tactile_bayes.datasets.specification import Specification
-from tactile_bayes.mechanics.rod import LARGEST_STRAIN
+from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN
 
 __all__ = ["CARD", "card"]
 

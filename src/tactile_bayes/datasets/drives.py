@@ -9,7 +9,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.datasets.specification import Specification
-from tactile_bayes.mechanics.line import lines_through
+from tactile_bayes.mechanics.branches.line import lines_through
 
 __all__ = ["Drives", "drives_of"]
 

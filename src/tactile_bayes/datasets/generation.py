@@ -22,9 +22,9 @@ from tactile_bayes.datasets.specification_reading import rule_of
 from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.paths import Paths, trace
-from tactile_bayes.mechanics.profile import profile_of
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
-from tactile_bayes.mechanics.rod import LARGEST_STRAIN
+from tactile_bayes.mechanics.rods.profile import profile_of
+from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN
 from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
 __all__ = ["Records", "directions_of", "generate_records"]

@@ -20,7 +20,7 @@ from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_specification, read_text
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, COLUMNS, column_of, make_record
 
 __all__ = ["contour_of", "record"]

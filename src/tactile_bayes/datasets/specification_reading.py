@@ -21,8 +21,8 @@ from tactile_bayes.datasets.specification import Drive, Group, Specification
 from tactile_bayes.datasets.specification_text import DEFAULTS, SCAN, left_out, toml_of
 from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
-from tactile_bayes.mechanics.profile import STEEPEST_TAPER
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
 
 __all__ = ["read_specification", "read_text", "rule_of"]

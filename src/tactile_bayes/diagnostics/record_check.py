@@ -11,8 +11,8 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import FEWEST_PREDICTIONS
-from tactile_bayes.inference.discrepancy import PARAMETERS
-from tactile_bayes.inference.record_segments import RecordSegments
+from tactile_bayes.inference.parameters.discrepancy import PARAMETERS
+from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
 from tactile_bayes.inference.result import record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.scatter import rough_noise

@@ -16,8 +16,8 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
-from tactile_bayes.inference.discrepancy import PARAMETERS
 from tactile_bayes.inference.misfit import CHECK_RIG, GAUGE, is_inferred, what_to_try
+from tactile_bayes.inference.parameters.discrepancy import PARAMETERS
 from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM

@@ -17,7 +17,6 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
-from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import (
     Coordinates,
@@ -33,12 +32,13 @@ from tactile_bayes.inference.ensembles import (
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.gauge import Gauge
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig, rig_prior
 from tactile_bayes.inference.result import provenance
-from tactile_bayes.inference.rig_prior import refuse_other_rig, rig_prior
+from tactile_bayes.inference.starts.contour_start import Walk, walk_of
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import CONTACT_SIDES
 
 __all__ = ["Sampled", "contours_of", "infer_contour", "infer_rig", "sampled"]

@@ -6,8 +6,8 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
-from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.rig import Rig
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.rig import Rig
 
 __all__ = ["events_of"]
 

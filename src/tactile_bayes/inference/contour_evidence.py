@@ -12,7 +12,7 @@ from tactile_bayes.inference.contour import Sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import in_coordinates
 from tactile_bayes.inference.evidence import bridge_evidence
-from tactile_bayes.inference.matched_priors import widened
+from tactile_bayes.inference.parameters.matched_priors import widened
 
 __all__ = ["WIDTHS", "ContourEvidence", "contour_evidence"]
 

@@ -14,14 +14,14 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import DriftWarning, ParameterError, ReachError
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.discrepancy import load_in_contact
 from tactile_bayes.inference.ensembles import Ends, Logarithms
-from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.noise import Noise
-from tactile_bayes.inference.nuisances import Nuisances
-from tactile_bayes.inference.prior_density import log_density_of
-from tactile_bayes.inference.priors import MAY_VANISH, Prior, support_of
-from tactile_bayes.inference.rig import Rig
+from tactile_bayes.inference.parameters.discrepancy import load_in_contact
+from tactile_bayes.inference.parameters.noise import Noise
+from tactile_bayes.inference.parameters.nuisances import Nuisances
+from tactile_bayes.inference.parameters.prior_density import log_density_of
+from tactile_bayes.inference.parameters.priors import MAY_VANISH, Prior, support_of
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.numerics.blocks import blocks

@@ -15,7 +15,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.misfit import NO_LOAD
-from tactile_bayes.inference.record_segments import without_errors
+from tactile_bayes.inference.record_likelihood.record_segments import without_errors
 from tactile_bayes.reconstruction import OTHER_SIDE, doubtful_sweeps, loaded_samples, side_of, with_sides
 
 __all__ = ["ContourProblem", "contour_problem", "identity_of"]

@@ -18,15 +18,15 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.discrepancy import discrepancy_priors
 from tactile_bayes.inference.gauge import Gauge
-from tactile_bayes.inference.noise import Noise, noise_of
-from tactile_bayes.inference.nuisances import STANDARD, Nuisances, nuisances_of
-from tactile_bayes.inference.priors import Prior, check_priors, refuse_unknown_priors
-from tactile_bayes.inference.priors import default_priors as contour_priors
-from tactile_bayes.inference.rig_prior import RigPrior
+from tactile_bayes.inference.parameters.discrepancy import discrepancy_priors
+from tactile_bayes.inference.parameters.noise import Noise, noise_of
+from tactile_bayes.inference.parameters.nuisances import STANDARD, Nuisances, nuisances_of
+from tactile_bayes.inference.parameters.priors import Prior, check_priors, refuse_unknown_priors
+from tactile_bayes.inference.parameters.priors import default_priors as contour_priors
+from tactile_bayes.inference.parameters.rig_prior import RigPrior
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
 from tactile_bayes.record.attributes import rod_attributes

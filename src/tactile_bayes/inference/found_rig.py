@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.inference.nuisances import CURVE
+from tactile_bayes.inference.parameters.nuisances import CURVE
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of, to_si, with_rod
 

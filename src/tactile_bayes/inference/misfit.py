@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from tactile_bayes.inference.nuisances import belongs
+from tactile_bayes.inference.parameters.nuisances import belongs
 
 __all__ = ["CHECK_RIG", "GAUGE", "NO_LOAD", "is_inferred", "what_to_try"]
 

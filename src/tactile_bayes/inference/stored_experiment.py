@@ -14,9 +14,9 @@ from scipy import stats
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.experiment import Experiment, prior_in_words
-from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.parameters.rig_prior import RigPrior
 from tactile_bayes.inference.result import contour_draws, record_of
-from tactile_bayes.inference.rig_prior import RigPrior
 
 __all__ = ["experiment_of", "joint_of", "points_of", "predicted_points"]
 

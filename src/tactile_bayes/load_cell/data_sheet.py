@@ -16,7 +16,7 @@ from tactile_bayes.checks import as_number, check_choice, check_number, check_nu
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.curve import curved, slope_of, straightened
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.attributes import no_entry
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.elastica import contact_from_wrench, lever_of_stem
-from tactile_bayes.mechanics.profile import Profile, Rods
+from tactile_bayes.mechanics.rods.profile import Profile, Rods
 
 __all__ = ["rod_shape"]
 
@@ -67,7 +67,7 @@ def rod_shape(
     >>> x.round(3), y.round(3)
     (array([ 0.   , -0.203, -0.221, -0.042,  0.2  ]), array([0.   , 0.135, 0.375, 0.541, 0.6  ]))
     """
-    from tactile_bayes.mechanics.pose import write_poses  # numba takes a second to load
+    from tactile_bayes.mechanics.poses.pose import write_poses  # numba takes a second to load
 
     if points < 2:
         raise ParameterError(f"points is {points!r}: a rod is drawn with at least 2 points, pivot and tip")
@@ -130,8 +130,8 @@ def _on_stem(
 
 def _along(wrenches: Floats, profile: Profile, s: Floats) -> tuple[Floats, Floats]:
     """Points of a rod that varies along its length, from wrenches mirrored to forward ones and the side."""
-    from tactile_bayes.mechanics.beam import varied  # numba takes a second to load
-    from tactile_bayes.mechanics.states import profile_shapes
+    from tactile_bayes.mechanics.contacts.states import profile_shapes
+    from tactile_bayes.mechanics.poses.beam import varied  # numba takes a second to load
 
     x, y = np.empty((2, len(wrenches), s.size))
     profile_shapes(wrenches, varied(profile), s, x, y)

@@ -148,5 +148,5 @@ event.register("numba:compile", _Rest())
 @functools.cache
 def _version() -> str:
     """Hash of all source files of this package."""
-    sources = sorted(Path(__file__).parent.glob("*.py"))
+    sources = sorted(Path(__file__).parent.rglob("*.py"))
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:12]

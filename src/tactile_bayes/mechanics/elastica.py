@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.phases import NONE
-from tactile_bayes.mechanics.profile import Profile, Rods
+from tactile_bayes.mechanics.rods.profile import Profile, Rods
 
 __all__ = [
     "MAX_FRICTION_ANGLE",
@@ -276,9 +276,9 @@ def _states(
 
     `bent` is the rest curvature [1/L] of arcs, mirrored with them; of rods with a profile, the sign that mirrors it.
     """
-    from tactile_bayes.mechanics.beam import varied_of  # numba takes a second to load
-    from tactile_bayes.mechanics.states import continued_wrenches, wrenches
-    from tactile_bayes.mechanics.tables import tables, workspace
+    from tactile_bayes.mechanics.contacts.states import continued_wrenches, wrenches
+    from tactile_bayes.mechanics.contacts.tables import tables, workspace
+    from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
     _refuse_friction(np.asarray(delta, dtype=float), 0.0 if profile is None else -MAX_FRICTION_ANGLE)
     given = np.broadcast_arrays(x, y, alpha, delta, bent, phase)
@@ -400,8 +400,8 @@ def forward_contacts(wrenches: Floats, rods: Rods) -> Floats:
     ndarray, shape (6, n)
         As `Contact`.
     """
-    from tactile_bayes.mechanics.beam import varied  # numba takes a second to load
-    from tactile_bayes.mechanics.states import arc_contacts, contacts, profile_contacts
+    from tactile_bayes.mechanics.contacts.states import arc_contacts, contacts, profile_contacts
+    from tactile_bayes.mechanics.poses.beam import varied  # numba takes a second to load
 
     columns, out = np.column_stack([wrenches, rods.curvature]), np.empty((len(wrenches), 6))
     if rods.stem:

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, contact_workspace
+from tactile_bayes.mechanics.contacts.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, contact_workspace
+from tactile_bayes.mechanics.contacts.fits import ContactFit, RawFit, Reading, SheetFit
 from tactile_bayes.mechanics.elastica import forward_contacts
-from tactile_bayes.mechanics.fits import ContactFit, RawFit, Reading, SheetFit
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.profile import Rods, rods_of
+from tactile_bayes.mechanics.rods.profile import Rods, rods_of
 
 __all__ = ["fit_contacts", "fit_sheet", "plain", "raw_contacts"]
 
@@ -41,8 +41,8 @@ _LEAST_MOMENT = 0.1
 
 def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike = 0.0) -> RawFit:
     """Contacts of n samples by Step 2, with friction angles and rods, or rest curvatures of arcs, of shape (n,)."""
-    from tactile_bayes.mechanics.beam import varied_of  # numba takes a second to load
-    from tactile_bayes.mechanics.single_sample import raw_fits
+    from tactile_bayes.mechanics.contacts.single_sample import raw_fits
+    from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
     count = delta.size
     fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
@@ -172,8 +172,8 @@ class _Descent:
 
     def go(self, who: Index, gain: float, most_steps: int) -> None:
         """Descend with the samples `who` until the gain that the next step promises is small."""
-        from tactile_bayes.mechanics.beam import varied_of  # numba takes a second to load
-        from tactile_bayes.mechanics.single_sample import Workspace, descents
+        from tactile_bayes.mechanics.contacts.single_sample import Workspace, descents
+        from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
         count, target = len(self._free), self._target
         workspace = Workspace(np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), contact_workspace())

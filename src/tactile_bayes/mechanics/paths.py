@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.sweep_frame import SweepFrame
+from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
+from tactile_bayes.mechanics.branches.shapes import shapes_of
 from tactile_bayes.mechanics.elastica import Wrench
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL
-from tactile_bayes.mechanics.readings import STATE_COLUMNS
-from tactile_bayes.mechanics.shapes import shapes_of
 
 if TYPE_CHECKING:
-    from tactile_bayes.mechanics.profile import Profile
-    from tactile_bayes.mechanics.sweeps import Shapes, Solutions, Sweeps
+    from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps
+    from tactile_bayes.mechanics.rods.profile import Profile
 
 __all__ = ["Paths", "States", "trace"]
 
@@ -164,7 +164,7 @@ class Paths:
         return self._events()[..., STATE_COLUMNS]
 
     def _events(self) -> Floats:
-        from tactile_bayes.mechanics.sweeps import solve_events  # numba takes a second to load
+        from tactile_bayes.mechanics.branches.sweeps import solve_events  # numba takes a second to load
 
         sweeps, lines = _segments_of(self.sweeps, self.lines, 1)
         return solve_events(self.shapes, sweeps, self.changes, self.profile, lines)
@@ -208,7 +208,7 @@ def trace(
         Lines of drives that carry the base, in the sweep frame from the first pose of each, as in `lines_through`; NaN
         after the last. Drive angles are then travels, in rod lengths.
     """
-    from tactile_bayes.mechanics.sweeps import Sweeps  # numba takes a second to load
+    from tactile_bayes.mechanics.branches.sweeps import Sweeps  # numba takes a second to load
 
     count, every = sweep_frame.size, np.arange(sweep_frame.size)
     friction_angle = np.broadcast_to(np.asarray(friction_angle, dtype=float), (count,))
@@ -272,7 +272,7 @@ def _swept(
     **options: Any,
 ) -> Solutions:
     """Solutions at drive angles in the sweep frame, shape (k,) for all or (n, k)."""
-    from tactile_bayes.mechanics.sweeps import Segments, solve_sweeps
+    from tactile_bayes.mechanics.branches.sweeps import Segments, solve_sweeps
 
     angles = np.atleast_2d(np.asarray(drive_angles, dtype=float))
     if lines is not None:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.mechanics.contact_coordinates import (
+from tactile_bayes.mechanics.contacts.contact_coordinates import (
     ARCLENGTH,
     DRIVE_ANGLE,
     FORCE,
@@ -17,8 +17,8 @@ from tactile_bayes.mechanics.contact_coordinates import (
     contact_states_and_slopes,
     place_by_wrench,
 )
-from tactile_bayes.mechanics.profile import Rods
-from tactile_bayes.mechanics.surface import Surface
+from tactile_bayes.mechanics.rods.profile import Rods
+from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS, carried_sweeps, travels_of
 from tactile_bayes.record.frame import to_fixed_axes
@@ -100,8 +100,8 @@ def amplification(plan: Plan) -> xr.Dataset:
     Notes
     -----
     Raw Step 2 is a function of four numbers, whose derivatives follow from the closed form (`place_by_wrench` of
-    `mechanics.contact_coordinates`). The constrained estimate is, to first order, the weighted least-squares solution
-    on the surface of possible contacts.
+    `contact_coordinates`). The constrained estimate is, to first order, the weighted least-squares solution on the
+    surface of possible contacts.
     """
     refined = plan if plan.drive_angles is not None else _refined(plan)
     record, rod = refined.scan.record, plan.taken_rod

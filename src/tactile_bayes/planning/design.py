@@ -27,10 +27,10 @@ from tactile_bayes.checks import (
 from tactile_bayes.errors import ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
-from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import (

@@ -29,10 +29,10 @@ from tactile_bayes.checks import (
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
 from tactile_bayes.inference.experiment import priors_in_words
-from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.amplification import METHODS
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters

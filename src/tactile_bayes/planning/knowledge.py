@@ -16,10 +16,10 @@ from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import carried_sweeps, rod_of
 from tactile_bayes.sweep import Drive, Rotation, record_template, recorded_drives
 

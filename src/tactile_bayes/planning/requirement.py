@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import TINY, check_choice, check_kind, check_numbers, check_positive, check_probability
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, StrainWarning
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, reading_slopes, record_information

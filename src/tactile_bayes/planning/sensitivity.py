@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.checks import check_names, check_optional, refused
 from tactile_bayes.contours import Contour, paper_profile
-from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.priors import Prior
+from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.family_parameters import enlarged
 from tactile_bayes.planning.information import information

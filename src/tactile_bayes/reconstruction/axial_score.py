@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.contact_coordinates import (
+from tactile_bayes.mechanics.contacts.contact_coordinates import (
     DRIVE_ANGLE,
     FORCE,
     PSI1,

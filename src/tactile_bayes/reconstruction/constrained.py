@@ -8,10 +8,10 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.contact_coordinates import contact_states, contact_states_and_slopes
-from tactile_bayes.mechanics.fits import ContactFit
+from tactile_bayes.mechanics.contacts.contact_coordinates import contact_states, contact_states_and_slopes
+from tactile_bayes.mechanics.contacts.fits import ContactFit
 from tactile_bayes.mechanics.fitting import fit_contacts
-from tactile_bayes.mechanics.profile import Rods
+from tactile_bayes.mechanics.rods.profile import Rods
 from tactile_bayes.reconstruction.estimate import (
     AT_EDGE,
     EITHER_PHASE,

@@ -11,9 +11,9 @@ from scipy.special import chdtri
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.errors import RecordError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.fits import Reading
-from tactile_bayes.mechanics.profile import Rods
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.contacts.fits import Reading
+from tactile_bayes.mechanics.rods.profile import Rods
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction.sides import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, turned
 from tactile_bayes.record.frame import to_fixed_axes

@@ -12,11 +12,11 @@ from scipy.special import chdtrc
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_number, check_optional, refused
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.contact_coordinates import PLACE
+from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
-from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.mechanics.surface import Surface
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.reconstruction.axial_score import axial_score
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across

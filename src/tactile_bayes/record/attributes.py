@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.along import Along
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.along import Along
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.quantity import unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, LOAD_CELL_UNITS, UNITS, Frame

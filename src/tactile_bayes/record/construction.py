@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.checks import check_kind, check_mapping, check_names, check_optional, refused
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attributes import completed_attributes
 from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.schema import CHANNELS, Frame

@@ -12,7 +12,7 @@ import xarray as xr
 
 from tactile_bayes.checks import check_choice, check_kind, check_mapping, check_optional, check_path, check_switch
 from tactile_bayes.errors import RecordError
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.bag import is_bag, read_bag_table
 from tactile_bayes.record.construction import completed_record
 from tactile_bayes.record.csv_format import read_csv, write_csv

@@ -15,7 +15,7 @@ import xarray as xr
 
 from tactile_bayes.checks import check_path
 from tactile_bayes.errors import RecordError
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record.csv_format import read_csv_content
 from tactile_bayes.record.files import record_in

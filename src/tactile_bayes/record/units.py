@@ -10,7 +10,7 @@ import xarray as xr
 
 from tactile_bayes.checks import check_optional
 from tactile_bayes.errors import ParameterError, RecordError
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod, without_rod
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of

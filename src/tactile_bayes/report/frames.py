@@ -13,8 +13,8 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.found_rig import rod_with
-from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.nuisances import nuisances_of
+from tactile_bayes.inference.parameters.nuisances import nuisances_of
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.inference.stored_experiment import joint_of
 from tactile_bayes.load_cell import LoadCell

@@ -11,7 +11,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.record_segments import RecordSegments
+from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
 from tactile_bayes.plotting.maps import outline

@@ -26,7 +26,7 @@ from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.found_rig import contact_points, rod_with
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod
 from tactile_bayes.runs.folder import Folder, panels

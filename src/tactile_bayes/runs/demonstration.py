@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tactile_bayes.contours import Parabola
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import write_record
 from tactile_bayes.sweep import scan
 

@@ -14,8 +14,8 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import infer_rig
+from tactile_bayes.inference.parameters.rig_prior import rig_prior
 from tactile_bayes.inference.result import write_result
-from tactile_bayes.inference.rig_prior import rig_prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.uncertainty.summary import summary

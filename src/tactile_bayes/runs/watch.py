@@ -17,7 +17,7 @@ from tactile_bayes.checks import check_numbers, check_positive, check_probabilit
 from tactile_bayes.comparison.streams import StreamComparison
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
-from tactile_bayes.inference.stream import Stream
+from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import record_hash
 from tactile_bayes.runs.contour import ContourRun, RunFolder, complete, file_of, origin_of

@@ -10,11 +10,11 @@ from tactile_bayes.checks import check_choice, check_kind, check_number
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
+from tactile_bayes.mechanics.branches.line import lines_through
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
-from tactile_bayes.mechanics.line import lines_through
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried
 
 __all__ = ["Direction", "carried_paths", "friction_angle_of", "sweep_paths", "to_sweep_frame"]

@@ -16,11 +16,11 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_numbers, check_choice, check_number, check_pivots, refused
 from tactile_bayes.contours.base import Contour, Locus
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
+from tactile_bayes.mechanics.branches.line import lines_through
 from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
-from tactile_bayes.mechanics.line import lines_through
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
-from tactile_bayes.mechanics.rod import LARGEST_STRAIN, Rod
+from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.record import make_record
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation

@@ -14,7 +14,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import Reachability
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.sweep.columns import ManyUnits, phases_of, sweep_events, sweep_samples
 from tactile_bayes.sweep.path import friction_angle_of

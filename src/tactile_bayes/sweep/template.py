@@ -10,7 +10,7 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record
 from tactile_bayes.sweep.drive import Carried, Drive
 

@@ -15,12 +15,12 @@ from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.nuisances import Nuisances
+from tactile_bayes.inference.parameters.nuisances import Nuisances
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
-from tactile_bayes.inference.rig import Rig
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.contact_coordinates import PLACE
+from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS, record_hash, rod_of, validate

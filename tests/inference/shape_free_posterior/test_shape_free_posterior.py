@@ -12,15 +12,15 @@ from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_optimum import contact_fit
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import default_priors
-from tactile_bayes.inference.noise import noise_of
-from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
+from tactile_bayes.inference.parameters.noise import noise_of
+from tactile_bayes.inference.parameters.nuisances import STANDARD, nuisances_of
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
+from tactile_bayes.inference.starts.contour_optimum import contact_fit
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.band import contour_band
 

@@ -14,7 +14,7 @@ from tactile_bayes.diagnostics.inspection.fit import Fit
 from tactile_bayes.diagnostics.units_and_signs import CHECK_UNITS
 from tactile_bayes.diagnostics.verdicts import NOISE_FACTOR, OFF_ZERO
 from tactile_bayes.inference.misfit import CHECK_RIG
-from tactile_bayes.inference.nuisances import BIAS
+from tactile_bayes.inference.parameters.nuisances import BIAS
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
 

@@ -12,7 +12,7 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoneSamples
-from tactile_bayes.mechanics.contact_coordinates import (
+from tactile_bayes.mechanics.contacts.contact_coordinates import (
     ARCLENGTH,
     DRIVE_ANGLE,
     FORCE,
@@ -21,7 +21,7 @@ from tactile_bayes.mechanics.contact_coordinates import (
     contact_states,
 )
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.surface import Surface
+from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.reconstruction import Samples
 from tactile_bayes.record import turned
 

@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.proposal import ContactProposal
-from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
+from tactile_bayes.mechanics.contacts.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
 from tactile_bayes.mechanics.fitting import fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 

@@ -30,9 +30,9 @@ from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
-from tactile_bayes.mechanics.contact_coordinates import PLACE
+from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
-from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct, samples_of
 from tactile_bayes.record import CHANNELS, frame_of, record_hash, validate, with_rod
 from tactile_bayes.record.schema import column_attributes

@@ -14,10 +14,10 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_optimum import certainly_loaded
-from tactile_bayes.inference.discrepancy import load_in_contact
-from tactile_bayes.inference.priors import MAY_VANISH
+from tactile_bayes.inference.parameters.discrepancy import load_in_contact
+from tactile_bayes.inference.parameters.priors import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
+from tactile_bayes.inference.starts.contour_optimum import certainly_loaded
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.reconstruction import loaded_samples
 

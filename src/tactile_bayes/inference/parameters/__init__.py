@@ -1,0 +1,1 @@
+"""Parameters that are inferred, and their priors."""

@@ -1,0 +1,370 @@
+"""Likelihood of a whole record, loaded and unloaded samples, for many contours at once."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from scipy.special import logsumexp
+
+from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.contours import Contour
+from tactile_bayes.contours.sweep_frame import SweepFrame
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.record_likelihood.encoder import EncoderErrors
+from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
+from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.inference.record_likelihood.rod_tables import RodTables
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.discrepancy import Discrepancy
+from tactile_bayes.mechanics.branches.shapes import shapes_of
+from tactile_bayes.mechanics.paths import Paths, trace
+from tactile_bayes.mechanics.reachability import Reachability
+from tactile_bayes.mechanics.rods.profile import Profile
+from tactile_bayes.record import CHANNELS, frame_of, rod_of, to_dimensionless, turned
+
+if TYPE_CHECKING:
+    from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps
+    from tactile_bayes.mechanics.poses.forward_table import Tables
+
+__all__ = ["RecordLikelihood"]
+
+_UNFELT = 2e-3
+"""Error of loads over their noise that is negligible for 360 samples: it changes their log-likelihood by less than
+0.05 in 999 of 1000 records."""
+
+_LEAST = 1e-10
+"""Least tolerance of loads, over the largest load: tables are no more accurate."""
+
+_TABULATED = 5e-6
+"""Least tolerance of loads for which the pose of a rod with a profile comes from a table."""
+
+_LENGTHS_OF_LINE = [0, 1, 3, 4]
+"""Columns of a line that are lengths, or changes of lengths."""
+
+
+class RecordLikelihood:
+    """Likelihood of a record as a function of contour, rig and noise.
+
+    Contours are in the record's unit of length, loads inside in EI/L and EI/L². Because loads drop to zero at snap-off,
+    the likelihood distinguishes contours that release the rod earlier or later than the record shows. Predicted forces
+    are turned into the record's frame, since measured ones may lack a component.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A valid record.
+    load_cell : LoadCell
+        Load cell in the record's units. Its encoder offset and backlash are subtracted from the drive angles.
+    friction : float
+        Coulomb's coefficient μ, >= 0.
+    exact : bool
+        Whether paths are exact to rounding; otherwise they are as accurate as the noise requires, at a fifth of the
+        cost.
+    is_always_clear : bool
+        Whether the unloaded rod is clear of every contour after snap-off, so that clearance need not be checked.
+        No load is predicted after snap-off, and contours that are not clear are excluded.
+
+    Raises
+    ------
+    ParameterError
+        If the frame of the load cell is another than the record's, or errors of the encoder are combined with drift or
+        an uncertain bias, for which there is no closed form.
+    """
+
+    def __init__(
+        self,
+        measured: xr.Dataset,
+        load_cell: LoadCell,
+        friction: float = 0.0,
+        exact: bool = False,
+        is_always_clear: bool = True,
+    ) -> None:
+        self.exact = exact
+        self.is_always_clear = is_always_clear
+        self.rod = rod_of(measured)
+        self.friction = friction
+        record = to_dimensionless(measured)
+        load_cell.refuse_other_frame(measured)
+        self.load_cell = load_cell.dimensionless(self.rod)
+        self.encoder = EncoderErrors(self.load_cell)
+        if self.encoder.count > 1 and (load_cell.drift or any(load_cell.bias_uncertainty)):
+            raise ParameterError(
+                "drive_angle_noise or drive_angle_resolution together with drift or bias_uncertainty have no closed "
+                "form: leave one of the two out (a bias can be inferred instead, as a nuisance parameter)"
+            )
+        self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
+        self.noise = self.load_cell.noise
+        self.segments = RecordSegments(measured, load_cell)
+        self._turn = self.segments.drive_angles if frame_of(record) == "turning" else None
+        self._tables = RodTables(self.rod, friction, self.segments.is_carried)
+
+    @property
+    def noise(self) -> Floats:
+        """Approximate standard deviation of each channel, to which tolerances are relative, shape (3,)."""
+        return self._noise
+
+    @noise.setter
+    def noise(self, deviation: Floats) -> None:
+        self._noise = np.asarray(deviation, dtype=float)
+        largest = np.nan_to_num(np.abs(self.measured)).max(axis=0)
+        share = _UNFELT * math.sqrt(min(1.0, 360.0 / len(self.measured)))
+        self._tolerance = np.maximum(share * self._noise, _LEAST * np.maximum(largest, 1.0))
+
+    def paths(
+        self, contours: Contour, rig: Rig | None = None, *, exact: bool = True, drive_angles: Floats | None = None
+    ) -> Paths:
+        """Return the paths of every contour in every segment; batch index k·n + i is contour i in segment k.
+
+        Parameters
+        ----------
+        contours : Contour
+            Contours with parameters of shape (n,).
+        rig : Rig, optional
+            Deviations from the stated rig.
+        exact : bool
+            Whether paths are exact to rounding, or as accurate as the noise requires.
+        drive_angles : ndarray, shape (segments · n, k), optional
+            Travels as from `travels`, or others in the sweep frame.
+        """
+        rig = self._rig_of(rig, contours.shape[0])
+        segments, lines = len(self.segments), None
+        if self.segments.lines is not None:
+            lines = np.repeat(self.segments.lines[:, None], contours.shape[0], axis=1)
+            lines[..., 2] -= (self.segments.signs * self._misread(rig)).T[..., None]
+            lines[..., _LENGTHS_OF_LINE] /= rig.length[:, None, None]
+            lines = lines.reshape(-1, *lines.shape[2:])
+        return trace(
+            self._in_sweep_frame(contours, rig),
+            friction_angle=np.tile(np.arctan(rig.friction), segments),
+            suspension_compliance=np.tile(self._compliance(rig), segments),
+            profile=self._profile(rig),
+            tolerance=None if exact else self._tolerance,
+            drive_angles=drive_angles,
+            lines=lines,
+        )
+
+    def _in_sweep_frame(self, contours: Contour, rig: Rig) -> SweepFrame:
+        (count,), segments = contours.shape, len(self.segments)
+        base_x, base_y = self._bases(rig).reshape(-1, 2).T
+        backward = np.repeat(self.segments.signs < 0.0, count)
+        every = contours.take(np.tile(np.arange(count), segments))
+        length = np.tile(self.rod.length * rig.length, segments)
+        of_rod = (np.tile(values, segments) for values in (*self._shape_of_rod(rig), self._stem(rig)))
+        return SweepFrame(every, base_x, base_y, length, 0.5 * self.rod.diameter, backward, *of_rod)
+
+    def _profile(self, rig: Rig) -> Profile | None:
+        """Return the profile of the rod, without what the rig adds to it; None for arcs."""
+        return self._as_profile if self.rod.profile is not None or np.any(rig.taper) else None
+
+    @cached_property
+    def _as_profile(self) -> Profile:
+        return self.rod.as_profile()
+
+    def _shape_of_rod(self, rig: Rig) -> tuple[Floats, Floats]:
+        """Return rest curvature and taper of each contour, as in `Sweeps`."""
+        known = self.rod.rest_curvature / self.rod.curvature_unit if self._profile(rig) is None else 0.0
+        return known + rig.rest_curvature, self.rod.taper + rig.taper
+
+    def _stem(self, rig: Rig) -> Floats:
+        """Return the stem of each contour, in lengths of its rod."""
+        return np.asarray((self.rod.stem / self.rod.length + rig.stem) / rig.length)
+
+    def _compliance(self, rig: Rig) -> Floats:
+        """Return the compliance of the suspension of each contour, in rad per EI/L of its rod."""
+        return np.asarray(rig.suspension_compliance * rig.rigidity_scale / rig.length)
+
+    def _known(self, rig: Rig) -> Tables:
+        """Return tables for the rod, as far as the noise allows their errors."""
+        from tactile_bayes.mechanics.poses.forward_table import NO_TABLES  # numba takes a second to load
+
+        profile = self._profile(rig)
+        if self.exact or profile is None or self._tolerance.min() < _TABULATED:
+            return NO_TABLES
+        return self._tables.known(profile, rig.taper, rig.rest_curvature, rig.friction, rig.length)
+
+    def _bases(self, rig: Rig) -> Floats:
+        """Return the pivots, shape (segments, n, 2)."""
+        stated = np.array([segment.base for segment in self.segments])
+        return np.asarray(stated[:, None] + rig.base_shifts[:, self.segments.pivots].swapaxes(0, 1))
+
+    def snap_offs(self, contours: Contour, rig: Rig | None = None) -> Floats:
+        """Return the readings of the drive angle at snap-off, in the sweep frame [rad], shape (n, segments)."""
+        rig = self._rig_of(rig, contours.shape[0])
+        return self._events(self._solutions(contours, rig), rig)[..., 1]
+
+    def travels(self, drive_angles: Floats, rig: Rig) -> Floats:
+        """Return travels of samples as `paths` takes them, shape (n or 1, samples): drive angles [rad], or ways [L].
+
+        Parameters
+        ----------
+        drive_angles : ndarray, shape (samples,)
+            Readings of drive angles, corrected by the data sheet; NaN for samples without interest.
+        rig : Rig
+            Deviations from the stated rig.
+        """
+        sign = self.segments.signs_of_samples
+        in_sweep_frame = np.where(sign < 0.0, np.pi - drive_angles, drive_angles)[None]
+        if not self.segments.is_carried:
+            return np.asarray(in_sweep_frame - sign * self.misread(rig))
+        carried = self.segments.senses[self.segments.of_sample] == 0.0
+        known = carried & np.isfinite(drive_angles)
+        return np.where(known, self.segments.angles_in_sweep_frame, in_sweep_frame)
+
+    def misread(self, rig: Rig) -> Floats:
+        """Return the errors of the encoder in addition to the data sheet [rad], shape (n or 1, samples)."""
+        return self._misread(rig)[:, self.segments.of_sample]
+
+    def _misread(self, rig: Rig) -> Floats:
+        """Return the errors of the encoder by segment [rad], shape (n or 1, segments)."""
+        offset, backlash = (np.atleast_1d(v)[:, None] for v in (rig.drive_angle_offset, rig.drive_angle_backlash))
+        return np.asarray(offset + 0.5 * backlash * self.segments.senses)
+
+    def usable(self, contours: Contour, rig: Rig | None = None) -> Flags:
+        """Return True for contours that the rod reaches in every segment and is clear of after snap-off, shape (n,)."""
+        return self._usable(self._solutions(contours, self._rig_of(rig, contours.shape[0])))
+
+    def predict(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags]:
+        """Return noise-free loads, shape (n, samples, 3), and which contours are usable, shape (n,).
+
+        Forces are in the record's frame, loads in EI/L and EI/L² of the stated rod, at the drive angles read.
+        """
+        return self.predict_with_events(contours, rig)[:2]
+
+    def predict_with_errors(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags]:
+        """Return loads for every error of the encoder, shape (n, errors, samples, 3), and which contours are usable."""
+        return self._predict(contours, rig, self.encoder.errors)[:2]
+
+    def predict_with_events(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags, Floats]:
+        """Return the results of `predict`, and the drive angles of first contact and snap-off.
+
+        The angles are readings in the sweep frame [rad], shape (n, segments, 2); NaN if there is no such event.
+        """
+        loads, reached, events = self._predict(contours, rig, np.zeros(1))
+        return loads[:, 0], reached, events
+
+    def _predict(self, contours: Contour, rig: Rig | None, errors: Floats) -> tuple[Floats, Flags, Floats]:
+        rig = self._rig_of(rig, contours.shape[0])
+        found = self._solutions(contours, rig, errors)
+        predicted = found.loads.reshape(-1, errors.size, *self.measured.shape)
+        if self._turn is not None:
+            turn = self._turn - self.misread(rig)[:, None] - errors[:, None]
+            predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
+        return predicted, self._usable(found), self._events(found, rig)
+
+    def _solutions(self, contours: Contour, rig: Rig, errors: Floats | None = None) -> Solutions:
+        """Solve the forward model; batch index k·n + i is contour i in segment k; without errors, for no samples."""
+        from tactile_bayes.mechanics.branches.sweeps import solve_sweeps  # numba takes a second to load
+
+        errors = np.empty(0) if errors is None else errors
+        return solve_sweeps(
+            self._shapes(contours, rig),
+            self._sweeps(rig),
+            self.segments.samples_with(errors),
+            (contours.shape[0], errors.size * len(self.measured)),
+            profile=self._profile(rig),
+            known=self._known(rig),
+            tolerance=None if self.exact else self._tolerance,
+            asks_clearance=not self.is_always_clear,
+        )
+
+    def _usable(self, found: Solutions) -> Flags:
+        usable = found.reach == Reachability.TOUCHES
+        if not self.is_always_clear:
+            usable &= found.snap_angle > found.clear_angle
+        return np.asarray(usable.reshape(len(self.segments), -1).all(axis=0))
+
+    def _events(self, found: Solutions, rig: Rig) -> Floats:
+        """Return readings of the drive angle at first contact and snap-off, in the sweep frame, (n, segments, 2)."""
+        events = np.stack([found.first_angle, found.snap_angle], axis=-1).reshape(len(self.segments), -1, 2)
+        misread = 0.0 if self.segments.is_carried else (self.segments.signs * self._misread(rig))[..., None]
+        return np.asarray(events.swapaxes(0, 1) + misread)
+
+    def _shapes(self, contours: Contour, rig: Rig) -> Shapes:
+        if contours.halves is not None:
+            return shapes_of(contours)
+        low, high = (end.reshape(len(self.segments), -1) for end in self._in_sweep_frame(contours, rig).own_domain())
+        return shapes_of(contours, low.min(axis=0), high.max(axis=0))
+
+    def _sweeps(self, rig: Rig) -> Sweeps:
+        from tactile_bayes.mechanics.branches.sweeps import Sweeps
+
+        count, segments = rig.friction.size, len(self.segments)
+        bases, (curvature, taper) = self._bases(rig), self._shape_of_rod(rig)
+        return Sweeps(
+            contour=np.tile(np.arange(count), segments),
+            segment=np.repeat(np.arange(segments), count),
+            base_x=bases[..., 0].ravel(),
+            base_y=bases[..., 1].ravel(),
+            length=np.tile(self.rod.length * rig.length, segments),
+            standoff=np.full(segments * count, 0.5 * self.rod.diameter),
+            backward=np.repeat(self.segments.signs < 0.0, count),
+            friction_angle=np.tile(np.arctan(rig.friction), segments),
+            compliance=np.tile(self._compliance(rig), segments),
+            rest_curvature=np.tile(curvature, segments),
+            taper=np.tile(taper, segments),
+            stem=np.tile(self._stem(rig), segments),
+            offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
+            rigidity=np.tile(rig.rigidity_scale, segments),
+            relative_length=np.tile(rig.length, segments),
+        )
+
+    def _rig_of(self, rig: Rig | None, count: int) -> Rig:
+        """Return the rig of every contour, with the stated values as defaults."""
+        rig = rig or Rig(friction=self.friction)
+        shifts = np.zeros((count, self.segments.pivots.max() + 1, 2))
+        if rig.base_shifts is not None:
+            shifts[:, : rig.base_shifts.shape[1]] = rig.base_shifts
+        return Rig._make((*(np.broadcast_to(value, (count,)) for value in rig[:-1]), shifts))
+
+    def log_likelihood(
+        self, contours: Contour, noise_scale: Any = 1.0, rig: Rig | None = None, *, pointwise: bool = False
+    ) -> Floats:
+        """Return the log-likelihood of each contour, shape (n,), or of each sample, (n, samples); −inf out of reach.
+
+        Parameters
+        ----------
+        contours : Contour
+            Contours with parameters of shape (n,).
+        noise_scale : array_like, broadcastable to shape (n, 3)
+            Factor on the load cell's standard deviations, by channel.
+        rig : Rig, optional
+            Deviations from the stated rig.
+        pointwise : bool
+            Whether the result is by sample.
+        """
+        return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
+
+    def score(
+        self,
+        predicted: Floats,
+        reached: Flags,
+        noise_scale: Any = 1.0,
+        *,
+        pointwise: bool = False,
+        discrepancy: Discrepancy | None = None,
+    ) -> Floats:
+        """Return the `log_likelihood` of contours from the loads of `predict_with_errors`, beside a discrepancy."""
+        is_exact = self.encoder.count == 1
+        scale = np.asarray(noise_scale, dtype=float)
+        if scale.ndim > 1 and not is_exact:
+            scale = scale[:, None]
+        values = self.load_cell.log_likelihood(
+            self.measured,
+            predicted[:, 0] if is_exact else predicted,
+            noise_scale=scale,
+            pointwise=pointwise or not is_exact,
+            discrepancy=discrepancy,
+        )
+        if not is_exact:
+            values = logsumexp(values + self.encoder.log_weights[:, None], axis=1)
+            values = values if pointwise else values.sum(axis=-1)
+        values[~reached] = -np.inf
+        if np.any(np.isnan(values)):
+            raise ParameterError(
+                f"the likelihood of {np.count_nonzero(np.isnan(values))} contours is not a number: please report this"
+            )
+        return values

@@ -1,0 +1,1 @@
+"""Where walkers start, and the coordinates in which they move."""

@@ -1,0 +1,380 @@
+"""Parameters that fit a record best, found from the record and the priors alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import chdtri
+
+from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.errors import InferenceError, ParameterError, RecordError
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.ensembles import Logarithms
+from tactile_bayes.inference.found_rig import rig_with
+from tactile_bayes.inference.parameters.discrepancy import load_in_contact
+from tactile_bayes.inference.parameters.nuisances import BIASES
+from tactile_bayes.inference.starts.axial_rig import axial_rig
+from tactile_bayes.inference.starts.start import Optimum, descend, optima
+from tactile_bayes.numerics.blocks import blocks
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
+from tactile_bayes.record import CHANNELS, present_channels
+
+__all__ = [
+    "ContourOptimum",
+    "certainly_loaded",
+    "contact_fit",
+    "fitted_noise",
+    "optima_of",
+    "optimum_of",
+]
+
+_PRIOR_DRAWS = 1000
+_CANDIDATES = 24
+"""Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
+early, since a sample at an event is loaded or not."""
+
+_EVENT_TOLERANCE = 0.1
+"""Distance of an event outside its bracket that counts as a residual of one, over the width of the bracket."""
+
+_FALSE_ALARM = 1e-7
+"""Probability that noise alone makes an unloaded sample look loaded."""
+
+_MAX_LOG_DISTANCE = 12.0
+"""Largest distance of the logarithm of a positive parameter from its prior median during a search, in prior spreads."""
+
+_MISSING_EVENT_RESIDUAL = 1000.0
+"""Residual of an event that does not occur."""
+
+_MAX_RELATIVE_SD = 2.0
+"""Largest standard deviation of a contact normal to the contour, over the median one, for a fit of the contour."""
+
+_MIN_GAIN, _MAX_COST = 100.0, 5.0
+"""Gain in coarse log-likelihood beyond the end of a prior above which the prior is reported as too narrow, and the cost
+per residual there below which the gain is believed."""
+
+_DISCREPANCY_SPREAD = 0.4
+"""Standard deviation of the logarithms of scale and length of a discrepancy, before they are known."""
+
+_MAX_RESIDUAL = 100.0
+"""Largest residual in standard deviations from which a discrepancy is estimated."""
+
+_MAX_TRIED = 9
+"""Number of searches after which the best optimum is taken though it does not explain the record."""
+
+_MAX_COST_RATIO = 0.9
+"""Largest share of the cost that a search from Step 2's contacts may leave for its result to be taken."""
+
+
+class ContourOptimum(NamedTuple):
+    """Robust least-squares solution for all parameters."""
+
+    point: Floats
+    """Shape (parameters,)."""
+    covariance: Floats
+    """Coarse posterior covariance of the model's coordinates, shape (parameters, parameters)."""
+    cost: float
+    """Robust least-squares cost."""
+    fits: bool
+    """True if the assumed noise explains the residuals."""
+    beyond: str = ""
+    """Parameters that fit the record far better beyond the ends of their priors, as text; else empty."""
+
+
+class Brackets(NamedTuple):
+    """Drive angles as read, in the sweep frame, between which contact begins or ends; one entry per event."""
+
+    segment: Index
+    """Number of the sweep segment."""
+    ends: Index
+    """0 for first contact, 1 for snap-off."""
+    low: Floats
+    high: Floats
+    width: Floats
+    """Distance outside that counts as a residual of one [rad]."""
+
+    def at(self, events: Floats) -> Floats:
+        """Select the bracketed events from all events, (n, segments, 2), as (n, events); NaN if one does not occur."""
+        return np.asarray(events[:, self.segment, self.ends])
+
+    def missed(self, events: Floats) -> Floats:
+        """Return residuals of events, shape (n, segments, 2), relative to their brackets, shape (n, events)."""
+        at = self.at(events)
+        missed = np.maximum(self.low - at, 0.0) - np.maximum(at - self.high, 0.0)
+        return np.nan_to_num(missed / self.width, nan=_MISSING_EVENT_RESIDUAL)
+
+
+def event_brackets(model: ContourModel) -> Brackets:
+    """Return the drive angles between which contact begins and ends, from the loads alone.
+
+    Residuals of loads do not depend on the angle of snap-off until a sample changes sides; residuals of brackets do.
+    """
+    segments = model.likelihood.segments
+    angle, of_sample = segments.angles_in_sweep_frame, segments.of_sample
+    rows = []
+    for onset, snap_off in zip(model.found["onset"].values, model.found["snap_off"].values, strict=True):
+        for ends, (before, after) in enumerate((onset, snap_off)):
+            if before < 0 or after < 0 or of_sample[before] != of_sample[after] or angle[before] >= angle[after]:
+                continue  # there is no event, or the drive turns back
+            width = _EVENT_TOLERANCE * (angle[after] - angle[before])
+            rows.append((of_sample[before], ends, angle[before], angle[after], width))
+    found = {row[0] for row in rows}
+    for segment, (before, first, last, after) in enumerate(segments.event_samples(certainly_loaded(model))):
+        if segment not in found and before >= 0 and after >= 0:  # contact is too brief for its loads to show events
+            width = _EVENT_TOLERANCE * (angle[after] - angle[before]) / 2.0
+            rows += [(segment, 0, -np.inf, angle[first], width), (segment, 1, angle[last], angle[after], width)]
+    columns = np.array(rows, dtype=float).reshape(-1, 5).T
+    return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
+
+
+def certainly_loaded(model: ContourModel) -> Flags:
+    """Return True for samples whose load noise does not explain, each taken by itself, above the zero of the record."""
+    measured, present = model.likelihood.measured[:, model.present], model.present
+    zero = np.where(np.isfinite(model.zero[present]), model.zero[present], np.median(measured, axis=0))
+    squared_distance = np.square((measured - zero) / model.deviation[present]).sum(axis=1)
+    return np.asarray(squared_distance > chdtri(np.count_nonzero(present), _FALSE_ALARM))
+
+
+def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
+    """Return the first optimum of `optima_of` that explains the record, or else the best of the first ones.
+
+    Raises
+    ------
+    InferenceError
+        If there is no optimum.
+    """
+    best: ContourOptimum | None = None
+    for tried, found in enumerate(optima_of(model, rng, deadline), start=1):
+        if best is None or found.cost < best.cost:
+            best = found
+        if best.fits or tried == _MAX_TRIED:
+            break
+    if best is None:
+        raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
+    return best
+
+
+def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Iterator[ContourOptimum]:
+    """Yield optima that start from a contour fitted to Step 2's contacts, and from prior draws, the likeliest first."""
+    search = _Search(model, rng, deadline)
+    for found in optima(search.residuals, search.starts(), *search.limits):
+        yield search.complete(search.refine(found))
+
+
+class _Search:
+    """Least squares over the forward-model parameters, positive ones by their logarithms.
+
+    The noise follows from the residuals.
+    """
+
+    def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
+        self.model = model
+        self.deadline = deadline
+        size = len(model.forward_parameters)
+        self.coordinates = Logarithms(model.coordinates.positive[:size])
+        self.deviation = model.deviation[model.present]
+        self.measured = model.likelihood.measured[:, model.present] / self.deviation
+        self.brackets = event_brackets(model)
+        self.axial_rig_is_due = True
+        self.candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
+        for name, zero in _zeros(model).items():
+            self.candidates[:, model.names.index(name)] = zero
+        self.drawn = self.coordinates.of(self.candidates[:, :size])
+        percentiles = np.quantile(self.drawn, [0.16, 0.84], axis=0)
+        coarse = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
+        stated = np.array([float(model.priors[name].std()) for name in model.forward_parameters])
+        self.middle = percentiles.mean(axis=0)
+        self.spread = np.where(np.isfinite(stated) & ~self.coordinates.positive, stated, coarse)
+        ends = model.walked_ends
+        self.limits = self.middle, self.spread, ends.low[:size], ends.high[:size], deadline
+
+    def points(self, coordinates: Floats) -> Floats:
+        """Return the forward-model parameters at coordinates, both of shape (n, parameters)."""
+        return self.coordinates.parameters(coordinates)[0]
+
+    def residuals(self, coordinates: Floats) -> Floats:
+        """Return residuals of loads and events in standard deviations, shape (n, loads + events).
+
+        They are defined beyond the ends of priors too, since the way to an optimum may lead through there.
+        """
+        model, points, size = self.model, self.points(coordinates), self.middle.size
+        least = np.where(model.may_vanish, -model.high, model.low)[:size]
+        allowed = ((points > least) & (points < model.high[:size])).all(axis=1)
+        far = np.abs(coordinates - self.middle) >= _MAX_LOG_DISTANCE * self.spread
+        allowed &= ~far[:, self.coordinates.positive].any(axis=1)
+        out = np.tile(10.0 * (np.abs(self.measured) + 1.0), (len(points), 1, 1))
+        late = np.full((len(points), self.brackets.low.size), _MISSING_EVENT_RESIDUAL)
+        if allowed.any():
+            loads, events = _continued(model, points[allowed])
+            expected = model.likelihood.load_cell.expected(loads)
+            # Zero loads are often closer to measured ones than wrong loads: without contact, residuals are constant.
+            happens = ~np.isnan(self.brackets.at(events)).any(axis=1)
+            missed = self.measured - expected[happens][..., model.present] / self.deviation
+            out[np.flatnonzero(allowed)[happens]] = missed
+            late[allowed] = self.brackets.missed(events)
+        return np.concatenate([out.reshape(len(points), -1), late], axis=1)
+
+    def events_missed(self, coordinates: Floats) -> Floats:
+        """Return the residuals of events, shape (n, events)."""
+        return self.residuals(coordinates)[:, self.measured.size :]
+
+    def starts(self) -> Iterator[Floats]:
+        """Yield coordinates at which searches begin; prior draws are first moved until events are in their brackets."""
+        fitted = contact_fit(self.model)
+        if fitted is not None:
+            rig = np.median(self.candidates[:, fitted.size : self.middle.size], axis=0)
+            yield self.coordinates.of(np.append(fitted, rig))
+        parts = [self.drawn[block] for block in blocks(len(self.drawn), self.measured.size)]
+        costs = np.concatenate([np.sum(np.minimum(np.abs(self.residuals(part)), 30.0), axis=1) for part in parts])
+        for place in self.drawn[np.argsort(costs)[:_CANDIDATES]]:
+            if self.brackets.low.size and not self.deadline.has_passed:
+                yield descend(self.events_missed, place, self.middle, self.spread, deadline=self.deadline).point
+            else:
+                yield place
+
+    def refine(self, found: Optimum) -> Optimum:
+        """Return an optimum, refined by searches from Step 2's contacts while it does not explain the record.
+
+        The rig often converges long before a distant contour; with that rig, Step 2 locates the contour. Where loads
+        are large, the record shows the rig without a contour.
+        """
+        if self.axial_rig_is_due and not found.fits and not self.deadline.has_passed:
+            self.axial_rig_is_due = False
+            again = self.by_axial_rig()
+            if again is not None and again.cost < _MAX_COST_RATIO * found.cost:
+                found = again
+        while not found.fits and not self.deadline.has_passed:
+            point = self.points(found.point[None])[0]
+            point = np.where(self.model.may_vanish[: point.size], np.maximum(point, 0.0), point)
+            fitted = contact_fit(self.model, dict(zip(self.model.forward_parameters, point.tolist(), strict=True)))
+            if fitted is None:
+                break
+            place = self.coordinates.of(np.append(fitted, point[fitted.size :]))
+            again = next(optima(self.residuals, [place], *self.limits))
+            if again.cost > _MAX_COST_RATIO * found.cost:
+                break
+            found = again
+        return found
+
+    def by_axial_rig(self) -> Optimum | None:
+        """Optimum of the search from Step 2's contacts with the rig that axial forces show; None without."""
+        rig = axial_rig(self.model, certainly_loaded(self.model))
+        fitted = None if rig is None else contact_fit(self.model, rig)
+        if rig is None or fitted is None:
+            return None
+        place = self.coordinates.of(np.append(fitted, list(rig.values())))
+        return next(optima(self.residuals, [place], *self.limits))
+
+    def complete(self, found: Optimum) -> ContourOptimum:
+        """Return the optimum with the noise parameters and the covariance of all parameters."""
+        model, size = self.model, self.middle.size
+        point = self.points(found.point[None])[0]
+        residuals = found.residuals[: self.measured.size].reshape(self.measured.shape)
+        drawn = self.candidates[:, len(model.names) - len(model.noise.of_discrepancy) :]
+        noise = np.append(fitted_noise(model, residuals), _fitted_discrepancy(model, point, residuals, drawn))
+        if not np.isfinite(model.log_prior(np.append(point, noise)[None]))[0]:
+            possible = self.candidates[:, size:]
+            noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
+        narrow = np.minimum(0.5 * self.spread / np.sqrt(np.diag(found.covariance)), 1.0)
+        variances = np.full(len(model.names), 0.5 / self.measured.size)
+        variances[len(model.names) - len(model.noise.of_discrepancy) :] = _DISCREPANCY_SPREAD**2
+        covariance = np.diag(variances)
+        covariance[:size, :size] = found.covariance * np.outer(narrow, narrow)
+        return ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, self._beyond(found))
+
+    def _beyond(self, found: Optimum) -> str:
+        """Return the parameters that fit the record far better beyond the ends of their priors, as text."""
+        explained = found.cost - found.excess < _MAX_COST * found.residuals.size
+        if found.beyond is None or found.excess <= _MIN_GAIN or not explained:
+            return ""
+        favoured, ends, names = self.points(found.beyond[None])[0], self.model.ends, self.model.forward_parameters
+        low, high = ends.low[: favoured.size], ends.high[: favoured.size]
+        off = np.flatnonzero((favoured <= low) | (favoured >= high))
+        return ", ".join(f"{names[i]} = {favoured[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off)
+
+
+def _continued(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
+    """Return loads and events, continued antisymmetrically to negative values of parameters that may vanish.
+
+    A search would otherwise stop at a wall if the record favours negative values.
+    """
+    vanishing = np.flatnonzero(model.may_vanish)
+    below = (points[:, vanishing] < 0.0).any(axis=1)
+    if not below.any():
+        return model.loads_and_events(points)
+    none, mirrored = points.copy(), points[below]
+    none[:, vanishing] = np.maximum(none[:, vanishing], 0.0)
+    mirrored[:, vanishing] = np.abs(mirrored[:, vanishing])
+    found = model.loads_and_events(none)
+    for values, there in zip(found, model.loads_and_events(mirrored), strict=True):
+        values[below] = 2.0 * values[below] - there
+    return found
+
+
+def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
+    """Return parameters of the white noise that fit residuals, shape (samples, present channels), robustly.
+
+    Beside a discrepancy the noise is that of unloaded or neighbouring samples.
+    """
+    known = model.likelihood.load_cell.noise
+    sizes = np.maximum(DEVIATION_OVER_MEDIAN * np.median(np.abs(residuals), axis=0), 1e-3)
+    fitted = model.deviation[model.present] * (1.0 if model.noise.of_discrepancy else sizes)
+    measured = np.flatnonzero(model.present)
+    ratio = {CHANNELS[i]: value / (known[i] or 1.0) for i, value in zip(measured, fitted, strict=True)}
+    return np.array([np.median([ratio[c] for c in channels if c in ratio]) for channels in model.noise.channels])
+
+
+def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, drawn: Floats) -> Floats:
+    """Return parameters of the discrepancy, if it is inferred, that fit residuals as in `fitted_noise`.
+
+    They are the root mean square of the residuals in contact over the largest load, within the range of prior draws,
+    shape (n, 2), and the median of the drawn lengths.
+    """
+    if not model.noise.of_discrepancy:
+        return np.empty(0)
+    loads, _ = model.likelihood.predict(model.contours(point[None]), model.rig(point[None]))
+    largest = load_in_contact(loads[0], model.likelihood.segments.course)[:, model.present]
+    squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviation[model.present])
+    least, most = np.quantile(drawn[:, 0], [0.05, 1.0])
+    share = np.sqrt(squares[largest > 0.0].sum() / max(np.square(largest).sum(), np.finfo(float).tiny))
+    return np.array([np.clip(share, least, most), np.median(drawn[:, 1])])
+
+
+def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:
+    """Return the contour parameters fitted to Step 2's contact points, or None if too few are usable.
+
+    Step 2 takes a given rig, by default one with the zeros of the unloaded samples. None stands also for a rig that
+    is so far from the stated one that a record corrected for it is refused.
+    """
+    if len(present_channels(model.measured)) < len(CHANNELS):
+        return None
+    rod = model.likelihood.rod
+    moment, *forces = model.deviation * rod.load_units
+    cell = replace(model.noise.cell, moment_noise=float(moment), force_noise=float(max(forces)))
+    rig = rig_with(model.measured, cell, _zeros(model) if found is None else found, model.nuisances.friction)
+    try:
+        contacts = rig.contacts()
+    except (ParameterError, RecordError):
+        return None
+    usable = contacts.status.values == "ok"
+    if usable.any():
+        usable &= contacts.normal_sd.values <= _MAX_RELATIVE_SD * np.median(contacts.normal_sd.values[usable])
+    size = len(model.family.parameters) - len(model.family.roughness)
+    if np.count_nonzero(usable) < 2 * size:
+        return None
+    length = rod.length
+    values = model.family.fit(contacts.contact_x.values[usable] / length, contacts.contact_y.values[usable] / length)
+    point = np.array([values[name] * length**power for name, power in model.family.length_powers.items()])
+    inside = [np.isfinite(model.priors[n].logpdf(v)) for n, v in zip(model.family.parameters, point, strict=True)]
+    return point if all(inside) else None
+
+
+def _zeros(model: ContourModel) -> dict[str, float]:
+    """Return inferred biases as estimated from the unloaded samples, by name."""
+    names, stated = model.nuisances.names, model.noise.cell.bias
+    units = [model.nuisances.units.get(name, np.nan) for name in BIASES]
+    shown = zip(BIASES, model.zero * np.array(units) - np.array(stated), strict=True)
+    return {name: float(zero) for name, zero in shown if name in names and np.isfinite(zero)}

@@ -1,0 +1,1 @@
+"""Branches of equilibria along a contour, from first contact to snap-off, compiled."""

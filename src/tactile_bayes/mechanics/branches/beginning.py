@@ -1,0 +1,109 @@
+"""The beginning of a branch: first contact, and the state there."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.branches.equilibrium import (
+    SETTLED,
+    Balance,
+    Equilibrium,
+    Loaded,
+    Scene,
+    balance,
+    in_phase,
+    nowhere,
+    on_line,
+    settle,
+    tangential_psi1,
+    with_friction,
+)
+from tactile_bayes.mechanics.branches.leg import first_equilibrium
+from tactile_bayes.mechanics.branches.limits import Approach, approach, arrival
+from tactile_bayes.mechanics.branches.line import line_of, only_turns, pose_at
+from tactile_bayes.mechanics.branches.outline import Outline, from_base
+from tactile_bayes.mechanics.branches.slip import slip
+from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.reachability import Reachability
+
+__all__ = ["Beginning", "beginning"]
+
+_TOUCHES, _TOUCHES_TWICE = int(Reachability.TOUCHES), int(Reachability.TOUCHES_TWICE)
+_SLIPS_OFF, _STICKS = int(Reachability.SLIPS_OFF), int(Reachability.STICKS)
+
+_BY_FORCE, _NO_FORCE = Equilibrium(0.0, 0.0, 1.0), Equilibrium(0.0, 0.0, 0.0)
+
+_NOT_TURNED = 1e-3
+"""Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried."""
+
+
+class Beginning(NamedTuple):
+    """First contact and the state there."""
+
+    reach: int
+    """A `Reachability`."""
+    near: Approach
+    scene: Scene
+    """With the line of the drive on which first contact lies, and the friction that the rod has there."""
+    line: int
+    seen: Outline
+    """Relative to the base."""
+    loaded: Loaded
+    state: Balance
+
+
+class _Arrived(NamedTuple):
+    """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
+
+    near: Approach
+    scene: Scene
+    line: int
+    seen: Outline
+
+
+@compiled
+def beginning(scene: Scene, lines: Floats | None, first_step: float) -> Beginning:
+    """Beginning of a branch, on the first line that leads to contact if the drive carries the base."""
+    near, scene, line, seen = _arrive(scene, lines, first_step)
+    if near.reach != _TOUCHES:
+        return Beginning(near.reach, near, scene, line, seen, in_phase(scene, near.tip_first), nowhere())
+    reach, scene, loaded, state = _first_state(scene, lines, seen, near)
+    least_psi1 = tangential_psi1(scene) - (0.0 if lines is None else _NOT_TURNED)
+    if reach == _TOUCHES and loaded.tip and state.at.q < least_psi1:
+        reach = _TOUCHES_TWICE
+    return Beginning(reach, near, scene, line, seen, loaded, state)
+
+
+@compiled
+def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> _Arrived:
+    if lines is None:
+        return _Arrived(approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline)
+    near, k, travel = arrival(scene.outline, scene.beam, lines)
+    pose = pose_at(line_of(lines, k), travel)
+    return _Arrived(near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y))
+
+
+@compiled
+def _first_state(
+    scene: Scene, lines: Floats | None, seen: Outline, near: Approach
+) -> tuple[int, Scene, Loaded, Balance]:
+    """State at first contact, with the friction that it has: it opposes the slip of the rod along the contour."""
+    loaded = in_phase(scene, near.tip_first)
+    guessed = first_equilibrium(loaded, seen, near)
+    if lines is None:
+        return _TOUCHES, scene, loaded, balance(loaded, guessed)[0]
+    begin = settle(loaded, guessed, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+    if not loaded.tip and begin.at.q > 1.0:  # the approach is not exact
+        near = Approach(near.reach, near.distance, near.begin, True, near.low)
+        loaded = in_phase(scene, True)
+        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+    delta = scene.rig.friction_angle
+    if delta > 0.0 and not only_turns(scene.line) and slip(loaded, begin) > 0.0:
+        scene = with_friction(scene, -delta)
+        loaded = in_phase(scene, loaded.tip)
+        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+        if not slip(loaded, begin) > 0.0:
+            return _STICKS, scene, loaded, begin
+    pushed = begin.travel_rate * begin.tangent.force > 0.0
+    return _TOUCHES if pushed else _SLIPS_OFF, scene, loaded, begin

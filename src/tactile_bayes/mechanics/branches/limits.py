@@ -1,0 +1,331 @@
+"""Limits of a path: whether a rod reaches the contour, and first contact.
+
+At first contact the rod has its rest shape.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import NamedTuple
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.branches.line import Line, Offset, line_of, pose_at
+from tactile_bayes.mechanics.branches.outline import Outline, Place, ends, frame, from_base, mirrored, narrower, place
+from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.newton import newton_step
+from tactile_bayes.mechanics.poses.beam import Beam, Chord, chord_to, mirrored_beam
+from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
+
+__all__ = ["Approach", "approach", "arrival", "clear_angle", "is_clear", "touch"]
+
+
+class _Sought(IntEnum):
+    """Function whose root is sought; it decreases away from the side of the pivot."""
+
+    LEVER = 0
+    """Lever arm of a force across the contour."""
+    TURNED = 1
+    """Angle of the contour's direction to the unloaded rod."""
+    WITHIN = 2
+    """Margin to the rod's reach."""
+
+
+_TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reachability.TOUCHES), int(Reachability.TOO_FAR), int(Reachability.CUTS_PIVOT)
+_ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reachability.ENDS), int(Reachability.TOO_CLOSE), int(Reachability.RUNS_OUT)
+_BEGINS_INSIDE = int(Reachability.BEGINS_INSIDE)
+_CLEARANCE = CLEARANCE
+
+_MOST_MOVES = 50
+"""Largest number of corrections of a standoff. Each reduces the error to a share of the order of the cone's angle."""
+
+_MOST_HALVINGS, _LAST = 100, 1e-6
+"""Largest number of steps of that search, and its last step where a rod comes within reach and is past the object."""
+
+_UPRIGHT = 0.5 * math.pi
+
+_ROUNDING = 1e-14
+"""Distance from the end of the rod's reach [L] that counts as zero."""
+
+
+_LOOKS, _FEWEST_LOOKS, _COARSE = 8, 2, 1e-3
+"""Parts of a drive, and fewest of a line, between which a carried rod is looked at, and last step of searches there."""
+
+_CLOSE = 1e-3
+"""Angle [rad] to which first contact of a carried rod is found; a search for the equilibrium there follows."""
+
+_DEEPEST = 20
+"""Number of steps of the search for the pose in which a rod reaches farthest into an object that it hardly reaches."""
+
+_JUMP = 0.02
+"""Angle [rad] by which a rod that comes within reach of an object is past it, and has not touched it."""
+
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+class Approach(NamedTuple):
+    """First contact with an outline, as a parameter of the contour."""
+
+    reach: int
+    """A `Reachability`."""
+    distance: float
+    """Least distance of contour and pivot [L]."""
+    begin: float
+    """First contact."""
+    tip_first: bool
+    """True if the tip touches first, and not a point before it."""
+    low: float
+    """Least parameter of the contour."""
+
+
+@compiled
+def touch(outline: Outline, beam: Beam, p: float, tip: bool) -> tuple[Place, Chord]:
+    """Point beside which the unloaded rod lies at a contact, and the chord to it."""
+    at = place(outline, p)
+    narrow = narrower(outline, at, 1.0)
+    chord = chord_to(beam, math.hypot(narrow.x, narrow.y))
+    if tip or outline.narrowing == 0.0:
+        return narrow, chord
+    for _ in range(_MOST_MOVES):
+        before = chord.arclength
+        narrow = narrower(outline, at, before)
+        chord = chord_to(beam, math.hypot(narrow.x, narrow.y))
+        if not abs(chord.arclength - before) > _ROUNDING:
+            break
+    return narrow, chord
+
+
+@compiled
+def _missing(outline: Outline, beam: Beam, what: _Sought, p: float) -> tuple[float, float]:
+    """Function whose root is sought, and its derivative."""
+    at = place(outline, p)
+    if what == _Sought.LEVER:
+        along, facing = frame(at)
+        return along, at.speed + facing * at.bend
+    if what == _Sought.WITHIN:
+        at = narrower(outline, at, 1.0)
+        along = frame(at)[0]
+        return beam.reach * beam.reach - at.x * at.x - at.y * at.y, -2.0 * along * at.speed
+    # The angle between the line from the pivot and the contour's direction grows to the left as long as the contour
+    # faces the pivot. It jumps below the pivot, where no contour is.
+    at, chord = touch(outline, beam, p, False)
+    along, facing = frame(at)
+    bearing, distance = math.atan2(-at.x, at.y) + 0.5 * math.pi, math.hypot(at.x, at.y)
+    angle = bearing - math.atan2(at.sin, at.cos) + chord.at_point - outline.half_angle
+    return -angle, facing * at.speed / (distance * distance) + at.bend - chord.rate * along * at.speed / distance
+
+
+@compiled
+def _root(outline: Outline, beam: Beam, what: _Sought, positive: float, negative: float, last_step: float) -> float:
+    """Root by Newton's method within a bracket, until a step is a given share of it."""
+    p, before = 0.5 * (positive + negative), abs(negative - positive)
+    settled = last_step * before
+    for _ in range(100):
+        value, slope = _missing(outline, beam, what, p)
+        new, positive, negative, before = newton_step(p, value, slope, positive, negative, before)
+        step = abs(new - p)
+        p = new
+        if not step > settled or value == 0.0:
+            break
+    return p
+
+
+@compiled
+def _nearest(outline: Outline, beam: Beam, low: float, high: float, last_step: float) -> tuple[float, bool, bool]:
+    """Parameter of the nearest point, and whether it lies beyond the greatest or the least parameter."""
+    beyond_high = _missing(outline, beam, _Sought.LEVER, high)[0] <= 0.0
+    beyond_low = _missing(outline, beam, _Sought.LEVER, low)[0] >= 0.0
+    if beyond_high:
+        return high, beyond_high, beyond_low
+    if beyond_low:
+        return low, beyond_high, beyond_low
+    return _root(outline, beam, _Sought.LEVER, high, low, last_step), beyond_high, beyond_low
+
+
+@compiled
+def _is_out(outline: Outline, beam: Beam, p: float) -> bool:
+    at = narrower(outline, place(outline, p), 1.0)
+    return math.hypot(at.x, at.y) > beam.reach
+
+
+@compiled
+def _first(outline: Outline, beam: Beam, high: float, nearest: float, last_step: float) -> tuple[float, bool]:
+    """Parameter of first contact, and whether the tip touches first."""
+    tangent = _root(outline, beam, _Sought.TURNED, high, nearest, last_step)
+    if _is_out(outline, beam, tangent):
+        return _root(outline, beam, _Sought.WITHIN, nearest, tangent, last_step), True
+    return tangent, False
+
+
+@compiled
+def approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
+    """First contact of a rod; roots are found to a share of their brackets."""
+    low, high = ends(outline)
+    nearest, beyond_high, beyond_low = _nearest(outline, beam, low, high, last_step)
+    at = place(outline, nearest)
+    distance, below = math.hypot(at.x, at.y), frame(at)[1] > 0.0
+    at_tip = narrower(outline, at, 1.0)
+    begin, tip_first = _first(outline, beam, high, nearest, last_step)
+    at_high = narrower(outline, place(outline, high), 1.0)
+    open_end = frame(at_high)[1] > 0.0 and math.hypot(at_high.x, at_high.y) <= beam.reach
+    reach = _TOUCHES
+    if not below:
+        reach = _RUNS_OUT if beyond_low and not beyond_high else _CUTS_PIVOT
+    elif distance < beam.stem + _CLEARANCE:
+        reach = _TOO_CLOSE
+    elif math.hypot(at_tip.x, at_tip.y) >= beam.reach - _ROUNDING:
+        reach = _TOO_FAR
+    elif beyond_high or open_end:
+        reach = _ENDS
+    return Approach(reach, distance, begin, tip_first, low)
+
+
+@compiled
+def clear_angle(outline: Outline, beam: Beam, last_step: float) -> float:
+    """Drive angle beyond which an unloaded rod has passed the contour: first contact of the opposite sweep [rad]."""
+    opposite, of_opposite = mirrored(outline), mirrored_beam(beam)
+    low, high = ends(opposite)
+    nearest = _nearest(opposite, of_opposite, low, high, last_step)[0]
+    begin, tip_first = _first(opposite, of_opposite, high, nearest, last_step)
+    at, chord = touch(opposite, of_opposite, begin, tip_first)
+    return math.pi - (math.atan2(at.y, at.x) - chord.at_base)
+
+
+class _Turned(NamedTuple):
+    """First contact of a rod if it turned about its base where it is."""
+
+    reach: int
+    """Among `_TOUCHES`, `_TOO_FAR`, `_ENDS` if it is the end of what is known, `_CUTS_PIVOT` and `_TOO_CLOSE`."""
+    gap: float
+    """Angle by which it would turn until it touches [rad]; out of reach, one and the distance that is missing."""
+    begin: float
+    """Parameter of the contour there."""
+    tip_first: bool
+    distance: float
+    """Least distance of contour and base [L]."""
+
+
+@compiled
+def _turned(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> _Turned:
+    """First contact of a rod if it turned from a pose of its base."""
+    seen = from_base(outline, pose.x, pose.y)
+    low, high = ends(seen)
+    nearest, beyond_high, beyond_low = _nearest(seen, beam, low, high, last_step)
+    at = place(seen, nearest)
+    at_tip, distance = narrower(seen, at, 1.0), math.hypot(at.x, at.y)
+    missing = math.hypot(at_tip.x, at_tip.y) - (beam.reach - _ROUNDING)
+    if frame(at)[1] <= 0.0:
+        cuts = not (beyond_high or beyond_low)
+        return _Turned(_CUTS_PIVOT if cuts else _TOO_FAR, 1.0 + max(missing, 0.0), nearest, True, distance)
+    if distance < beam.stem + _CLEARANCE:
+        return _Turned(_TOO_CLOSE, 0.0, nearest, True, distance)
+    if missing >= 0.0:
+        return _Turned(_TOO_FAR, 1.0 + missing, nearest, True, distance)
+    begin, tip_first, reach = high, False, _TOUCHES
+    if not beyond_high and _missing(seen, beam, _Sought.TURNED, high)[0] > 0.0:
+        begin, tip_first = _first(seen, beam, high, nearest, last_step)
+    elif _is_out(seen, beam, high):
+        begin, tip_first = _root(seen, beam, _Sought.WITHIN, nearest, high, last_step), True
+    else:
+        reach = _ENDS
+    there, chord = touch(seen, beam, begin, tip_first)
+    bearing = math.atan2(-there.x, there.y) + _UPRIGHT
+    return _Turned(reach, bearing - chord.at_base - pose.angle, begin, tip_first, distance)
+
+
+@compiled
+def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> _Turned:
+    return _turned(outline, beam, pose_at(line, travel), _COARSE)
+
+
+@compiled
+def _arrival_on(outline: Outline, beam: Beam, line: Line, way: float, is_first: bool) -> tuple[_Turned, float]:
+    """First contact on a line of a drive of some way, and its travel; NaN if there is none.
+
+    The least gap between two looks is looked for where it may be less than none: if the least found is no larger than
+    its changes from look to look.
+    """
+    looks = max(math.ceil(_LOOKS * (line.end - line.travel) / way), _FEWEST_LOOKS)
+    size = (line.end - line.travel) / looks
+    before, looked = line.travel, _look(outline, beam, line, line.travel)
+    nearest, least, gap, change = before, math.inf, looked.gap, 0.0
+    if gap <= 0.0 and (is_first or looked.reach == _CUTS_PIVOT or looked.reach == _TOO_CLOSE):
+        return looked, before
+    for k in range(1, looks + 1):
+        travel = line.travel + k * size
+        looked = _look(outline, beam, line, travel)
+        if gap > 0.0 and looked.gap <= 0.0:
+            found, at = _between(outline, beam, line, before, gap, travel, looked)
+            if found.gap > -_JUMP or found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+                return found, at
+        elif gap > 0.0 and looked.gap < least:
+            nearest, least = travel, looked.gap
+        change = max(change, abs(looked.gap - gap))
+        before, gap = travel, looked.gap
+    if least > change:
+        return looked, math.nan
+    low, high = max(nearest - size, line.travel), min(nearest + size, line.end)
+    for _ in range(_DEEPEST):
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        at_left, at_right = _look(outline, beam, line, left), _look(outline, beam, line, right)
+        if min(at_left.gap, at_right.gap) <= 0.0:
+            inside, looked = (left, at_left) if at_left.gap <= 0.0 else (right, at_right)
+            found, at = _between(outline, beam, line, low, _look(outline, beam, line, low).gap, inside, looked)
+            return found, at if found.gap > -_JUMP else math.nan
+        if at_left.gap < at_right.gap:
+            high = right
+        else:
+            low = left
+    return looked, math.nan
+
+
+@compiled
+def _between(
+    outline: Outline, beam: Beam, line: Line, clear: float, gap: float, inside: float, found: _Turned
+) -> tuple[_Turned, float]:
+    """First contact between two travels, at the second of which the unloaded rod would cut the object."""
+    settled, at_inside = _LAST * (inside - clear), found.gap
+    if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+        return found, inside
+    for k in range(_MOST_HALVINGS):
+        share = gap / (gap - at_inside)
+        travel = clear + (inside - clear) * (share if k % 3 < 2 else 0.5)
+        looked = _look(outline, beam, line, travel)
+        if looked.gap <= 0.0:
+            inside, at_inside, found = travel, looked.gap, looked
+            gap *= 0.5 if k % 3 == 1 else 1.0
+        else:
+            clear, gap = travel, looked.gap
+        if not inside - clear > settled or found.gap > -_CLOSE:
+            break
+    return found, inside
+
+
+@compiled
+def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int, float]:
+    """First contact of a rod that is carried along lines, the number of the line, and the travel."""
+    reach, distance, way = _TOO_FAR, math.inf, 0.0
+    for k in range(lines.shape[0]):
+        if not math.isnan(lines[k, 7]):
+            way = lines[k, 7]
+    for k in range(lines.shape[0]):
+        if math.isnan(lines[k, 0]):
+            break
+        line = line_of(lines, k)
+        found, travel = _arrival_on(outline, beam, line, way, k == 0)
+        distance = min(distance, found.distance)
+        if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+            return Approach(found.reach, found.distance, math.nan, True, math.nan), k, travel
+        if math.isfinite(travel):
+            reach = _BEGINS_INSIDE if k == 0 and travel == line.travel else found.reach
+            pose = pose_at(line, travel)
+            low = ends(from_base(outline, pose.x, pose.y))[0]
+            return Approach(reach, found.distance, found.begin, found.tip_first, low), k, travel
+    return Approach(reach, distance, math.nan, True, math.nan), 0, math.nan
+
+
+@compiled
+def is_clear(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> bool:
+    """True if an unloaded rod in a pose has passed the contour."""
+    passed = Offset(-pose.x, pose.y, math.pi - pose.angle)
+    return _turned(mirrored(outline), mirrored_beam(beam), passed, last_step).gap > 0.0

@@ -1,0 +1,456 @@
+"""Many sweeps, each of one rod along one contour, about one pivot and in one direction."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
+from tactile_bayes.mechanics.branches.branch import (
+    MOST_CHANGES,
+    BranchWorkspace,
+    Ends,
+    branch_workspace,
+    follow_branch,
+)
+from tactile_bayes.mechanics.branches.curves import Accuracy
+from tactile_bayes.mechanics.branches.equilibrium import (
+    Equilibrium,
+    Rig,
+    Scene,
+    balance,
+    in_phase,
+    on_line,
+    with_friction,
+)
+from tactile_bayes.mechanics.branches.limits import clear_angle, is_clear
+from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_at, line_of, pose_at
+from tactile_bayes.mechanics.branches.outline import Half, Outline, mirrored
+from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS, Found, Samples, write_state
+from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_of, varied_of
+from tactile_bayes.mechanics.poses.forward_table import NO_TABLES, Tables, prepare
+from tactile_bayes.mechanics.reachability import Reachability, SnapOff
+from tactile_bayes.mechanics.rods.profile import Profile
+from tactile_bayes.tasks import in_parts
+
+__all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
+
+_SAME_ANGLE = 1e-5
+"""Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
+
+_TOUCHES, _NEVER, _RELEASE = int(Reachability.TOUCHES), int(SnapOff.NEVER), int(SnapOff.RELEASE)
+
+_EXACT = Accuracy(resolved=1e-9, sharp=np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True)
+"""Accuracy with states and events to rounding."""
+
+_SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
+"""Accuracy with events to rounding and states from series."""
+
+_FAST = Accuracy(resolved=1e-3, sharp=1e-6, halvings=12, first_step=1e-6, last_step=1e-4, polished=True)
+"""Accuracy that noise requires."""
+
+_EXACT_ORDER, _FAST_ORDER = 32, 12
+"""Numbers of nodes on a stretch."""
+
+_NEVER_MISSED = np.full(3, np.inf)
+
+_FEWEST = 16
+"""Fewest sweeps that another thread shares."""
+
+
+class Shapes(NamedTuple):
+    """Contours, in their own unit of length."""
+
+    kinds: tuple[int, int]
+    """Kinds of the left and the right half of all contours."""
+    halves: Floats
+    """Size and shape of the left and the right half, and the vertex, shape (n, 6)."""
+    tables: Floats
+    """Tables, shape (n, rows, columns), without rows if there are formulas."""
+    knots: Floats
+    """Parameters at which contours may not be smooth, increasing, shape (n, knots)."""
+
+
+class Sweeps(NamedTuple):
+    """Sweeps to solve, as arrays of shape (sweeps,)."""
+
+    contour: Index
+    """Index of the contour; the loads of a contour's sweeps are put together."""
+    segment: Index
+    """Index of the sweep segment whose samples are read."""
+    base_x: Floats
+    base_y: Floats
+    length: Floats
+    standoff: Floats
+    backward: Flags
+    friction_angle: Floats
+    compliance: Floats
+    rest_curvature: Floats
+    """Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]; with a profile, what is added to its own."""
+    taper: Floats
+    """Taper, for rods with a profile."""
+    stem: Floats
+    """Rigid piece between pivot and rod [L]."""
+    offset: Floats
+    """Encoder offset in the laboratory frame [rad]."""
+    rigidity: Floats
+    """Flexural rigidity over the rigidity in the units of loads."""
+    relative_length: Floats
+    """Length of the rod over the length in the units of loads and drives."""
+
+
+class Segments(NamedTuple):
+    """Samples of sweep segments, one segment after the other."""
+
+    first: Index
+    """First sample of every segment, and the number of samples at the end."""
+    rows: Index
+    """Row of the results of each sample."""
+    angles: Floats
+    """Drive angles as read, in the sweep frame, increasing in each segment [rad]."""
+    lines: Floats | None = None
+    """Lines of the drives that carry the base, in the sweep frame from their beginnings, as in `lines_through`, shape
+    (segments, lines, columns), NaN after the last; without any, the pivots rest. Angles are then travels."""
+    relative: bool = False
+    """True if they are shares of the drive angle from first contact to snap-off."""
+
+
+class Solutions(NamedTuple):
+    """Solutions of sweeps. Drive angles are in the sweep frame; events have the shape (sweeps,), NaN without a path."""
+
+    loads: Floats
+    """Loads in the laboratory frame [EI/L, EI/L² for a rigidity of 1], 0 out of contact, shape (contours, rows, 3)."""
+    states: Floats
+    """States as in `Found`, shape (contours, rows or 0, columns)."""
+    changes: Floats
+    """Events as in `Found`, shape (sweeps, phases + 1 or 0, 6)."""
+    phases: Index
+    """Number of phases."""
+    reach: NDArray[np.int8]
+    distance: Floats
+    first_angle: Floats
+    first_parameter: Floats
+    snap_angle: Floats
+    snap_parameter: Floats
+    snap_off: NDArray[np.int8]
+    curvature: Floats
+    """Largest curvature of the rod up to snap-off [1/L], if states are computed."""
+    clear_angle: Floats
+    """Drive angle beyond which the unloaded rod is clear [rad]; NaN if it is not computed."""
+
+
+_INDICES, _FLAGS, _CODES = ("contour", "segment", "phases"), ("backward",), ("reach", "snap_off")
+
+
+def _as_sweeps(sweeps: Sweeps) -> NDArray[np.void]:
+    """Sweeps as a structured array."""
+    out = np.empty(sweeps.contour.size, dtype=_SWEEP)
+    for name, values in zip(Sweeps._fields, sweeps, strict=True):
+        out[name] = values
+    return out
+
+
+def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
+    """Structured type, so that compiled code takes one array instead of one for each name."""
+    kinds = {**dict.fromkeys(_INDICES, np.intp), **dict.fromkeys(_FLAGS, np.bool_), **dict.fromkeys(_CODES, np.int8)}
+    return np.dtype([(name, kinds.get(name, np.float64)) for name in names], align=True)
+
+
+_SWEEP, _EVENTS = _side_by_side(Sweeps._fields), _side_by_side(Solutions._fields[3:])
+
+
+@compiled
+def _half(kind: int, size: float, shape: float, length: float) -> Half:
+    """Half of a contour in rod lengths."""
+    if kind == PARABOLA:
+        return Half(kind, size * length, shape, 1.0)
+    if kind == OVAL:
+        return Half(kind, size / length, shape / length, 1.0)
+    if kind == POWER_LAW:
+        return Half(kind, size * length ** (shape - 1.0), shape, length ** min(1.0, shape - 1.0))
+    return Half(kind, size, shape, 1.0)
+
+
+@compiled
+def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
+    """Contour of a sweep in the sweep frame; its table is written to `table`."""
+    c, length = sweep.contour, sweep.length
+    kind, of = shapes.kinds[0], shapes.halves[c]
+    left, right = _half(kind, of[0], of[1], length), _half(shapes.kinds[1], of[2], of[3], length)
+    if kind in (SLOPES, CELLS):
+        begin, end = (2, 2 + 2 * (table.shape[1] - 2) // 3) if kind == CELLS else (0, table.shape[1])
+        for r in range(table.shape[0]):
+            for k in range(table.shape[1]):
+                table[r, k] = shapes.tables[c, r, k] / (length if begin <= k < end else 1.0)
+    x, y = (of[4] - sweep.base_x) / length, (of[5] - sweep.base_y) / length
+    low = -left.size if kind == SLOPES else left.size
+    standoff = sweep.standoff / length
+    half_angle = math.atan(standoff * sweep.taper)
+    sin, cos = math.sin(half_angle), math.cos(half_angle)
+    reach = 1.0 + sweep.stem
+    outline = Outline(left, right, low, right.size, 1.0, x, y, standoff * cos, half_angle, sin, reach, table)
+    return mirrored(outline) if sweep.backward else outline
+
+
+@compiled
+def _scene(
+    shapes: Shapes,
+    varied: Varied | None,
+    known: Tables,
+    sweep: Any,
+    line: Line | None,
+    exact: bool,
+    table: Floats,
+) -> Scene:
+    """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
+    sign = -1.0 if sweep.backward else 1.0
+    offset = sign * sweep.offset if line is None else 0.0  # it is in the lines
+    moment = sweep.rigidity / sweep.relative_length
+    rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, moment, moment / sweep.relative_length)
+    outline = _outline(shapes, sweep, table)
+    beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
+    return Scene(outline, beam, rig, exact, line)
+
+
+@compiled
+def _place_lines(lines: Floats | None, sweep: Any, room: Floats | None) -> None:
+    """Write the lines of a sweep with its encoder offset, and in lengths of its rod, to the room."""
+    if room is not None and lines is not None:
+        offset = -sweep.offset if sweep.backward else sweep.offset
+        for k in range(room.shape[0]):
+            for c in range(room.shape[1]):
+                room[k, c] = lines[sweep.segment, k, c] / (sweep.relative_length if c in (0, 1, 3, 4) else 1.0)
+            room[k, 2] -= offset
+
+
+@compiled
+def _beam(
+    varied: Varied | None, known: Tables, sweep: Any, sign: float, half_angle: float, may_slip_back: bool
+) -> Beam:
+    """Rod of a sweep, with coefficients for its friction, and for friction of the other sense if that may act."""
+    if varied is None:
+        return beam_of(sign * sweep.rest_curvature, varied, sweep.stem)
+    edges, curvature, rigidity, _, bend, _ = varied.profile
+    room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
+    angle, own, other = sweep.friction_angle, varied.sheet, varied.other_sheet
+    slenderness, otherwise = 0.0, 0.0
+    for table in known:
+        if prepare(table, room, angle - half_angle, own):
+            slenderness = table.slenderness
+            if may_slip_back and angle > 0.0 and prepare(table, room, -angle - half_angle, other):
+                otherwise = table.slenderness
+            break
+    return beam_of(0.0, Varied(room, varied.work, own, slenderness, sign, other, otherwise), sweep.stem)
+
+
+@cached
+def _solve_events(
+    shapes: Shapes,
+    varied: Varied | None,
+    known: Tables,
+    sweeps: Any,
+    lines: Floats | None,
+    room: Floats | None,
+    line: Line | None,
+    events: Floats,
+    table: Floats,
+    out: Floats,
+) -> None:
+    """Write the states of events; see `solve_events`."""
+    for i in range(sweeps.size):
+        _place_lines(lines, sweeps[i], room)
+        scene = _scene(shapes, varied, known, sweeps[i], line, True, table)
+        for k in range(events.shape[1]):
+            out[i, k] = math.nan
+            out[i, k, 0] = 0.0
+            if not math.isnan(events[i, k, 0]):
+                tip = events[i, k, 3] > 0.0
+                at = Equilibrium(events[i, k, 0], events[i, k, 1], events[i, k, 2])
+                there = on_line(with_friction(scene, events[i, k, 5]), room, int(events[i, k, 4]))
+                state = balance(in_phase(there, tip), at)[0]
+                write_state(state, tip, there, out[i, k])
+                out[i, k, STATE_COLUMNS] = state.travel
+
+
+def solve_events(
+    shapes: Shapes, sweeps: Sweeps, events: Floats, profile: Profile | None = None, lines: Floats | None = None
+) -> Floats:
+    """States of events of sweeps, and their travel, from their coordinates as in `Found`.
+
+    The phase is `NONE` and the rest NaN for coordinates that are NaN.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    sweeps : Sweeps
+    events : ndarray, shape (sweeps, k, 6)
+    profile : Profile, optional
+    lines : ndarray, optional
+        As in `Segments`.
+
+    Returns
+    -------
+    ndarray, shape (sweeps, k, columns + 1)
+    """
+    out = np.empty((*events.shape[:2], STATE_COLUMNS + 1))
+    table, drive = np.empty(shapes.tables.shape[1:]), _carried(lines)
+    _solve_events(shapes, varied_of(profile), NO_TABLES, _as_sweeps(sweeps), *drive, events, table, out)
+    return out
+
+
+def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line | None]:
+    """Lines, room for those of one sweep, and a line of their type, or None: all is compiled for both."""
+    return (None, None, None) if lines is None else (lines, np.empty(lines.shape[1:]), NO_LINE)
+
+
+@compiled
+def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: float) -> float:
+    """Travel beyond which the unloaded rod is clear; on lines, only whether it is clear where contact ends.
+
+    A rod that is released touches there without load, which small errors alone would decide: −∞ if it does so nowhere
+    else.
+    """
+    if lines is None:
+        clear = clear_angle(scene.outline, scene.beam, first_step)
+        return -math.inf if ends.snap_off == _RELEASE and clear < ends.snap_angle + _SAME_ANGLE else clear
+    if ends.snap_off == _RELEASE:
+        return -math.inf
+    pose = pose_at(line_of(lines, line_at(lines, ends.snap_angle)), ends.snap_angle)
+    return -math.inf if ends.snap_off == _NEVER or is_clear(scene.outline, scene.beam, pose, first_step) else math.inf
+
+
+@cached
+def _solve(
+    shapes: Shapes,
+    varied: Varied | None,
+    known: Tables,
+    sweeps: Any,
+    segments: Segments,
+    lines: Floats | None,
+    room: Floats | None,
+    line: Line | None,
+    exact: bool,
+    accuracy: Accuracy,
+    tolerance: Floats,
+    asks_clearance: bool,
+    workspace: BranchWorkspace,
+    table: Floats,
+    loads: Floats,
+    all_states: Floats,
+    changes: Floats,
+    events: Any,
+) -> None:
+    """Follow the path of every sweep, and write the results of its samples.
+
+    Parameters
+    ----------
+    sweeps : structured ndarray, shape (sweeps,)
+        Fields as in `Sweeps`.
+    exact : bool
+        Whether states are computed to rounding, even where there are tables.
+    tolerance : ndarray, shape (3,)
+        Tolerated errors of moment and forces [EI/L and EI/L²].
+    workspace : BranchWorkspace
+        Workspace for one path.
+    table : ndarray, shape (rows, columns)
+        Workspace for the table of one contour.
+    loads, all_states, changes, events
+        As in `Solutions`; the events are a structured array.
+    """
+    count, knots = shapes.knots.shape[1], workspace.knots
+    for i in range(sweeps.size):
+        sweep, event, c = sweeps[i], events[i], sweeps[i].contour
+        _place_lines(lines, sweep, room)
+        scene = _scene(shapes, varied, known, sweep, line, exact, table)
+        for k in range(count):
+            knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
+        first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
+        samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
+        found = Found(loads[c], all_states[c], changes[i])
+        ends = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found)
+        event.reach, event.distance = ends.reach, ends.distance
+        event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
+        event.snap_angle, event.snap_parameter = ends.snap_angle, ends.snap_parameter
+        event.snap_off, event.phases, event.curvature = ends.snap_off, ends.phases, ends.curvature
+        event.clear_angle = math.nan
+        if asks_clearance and ends.reach == _TOUCHES:
+            event.clear_angle = _clear_angle(scene, room, ends, accuracy.first_step)
+
+
+def solve_sweeps(
+    shapes: Shapes,
+    sweeps: Sweeps,
+    segments: Segments,
+    shape: tuple[int, int],
+    *,
+    profile: Profile | None = None,
+    known: Tables = NO_TABLES,
+    tolerance: Floats | None = None,
+    states: bool = False,
+    polished: bool = True,
+    asks_clearance: bool = True,
+) -> Solutions:
+    """Follow the paths of sweeps, and compute loads and states of their samples.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    sweeps : Sweeps
+    segments : Segments
+    shape : (int, int)
+        Number of contours, and of rows for each.
+    profile : Profile, optional
+        Rod whose rest curvature or rigidity varies along it, the same in all sweeps except for the taper and an
+        addition to its rest curvature; by default rods are uniform and of constant rest curvature.
+    known : (ForwardTable, ForwardTable), optional
+        Tables of the profile, for loads with errors of some 1e-6 of the largest.
+    tolerance : ndarray, shape (3,), optional
+        Tolerated errors of moment and forces [EI/L and EI/L²], at least 1e-10 of the loads; by default events are
+        exact, and loads have errors of some 1e-8 of the largest.
+    states : bool
+        Whether states are computed.
+    polished : bool
+        Whether they are exact. Otherwise they come from the series, with an error of 1e-10 of the largest and without
+        derivatives.
+    asks_clearance : bool
+        Whether `clear_angle` is computed.
+    """
+    accuracy, order = _FAST, _FAST_ORDER
+    if tolerance is None:
+        accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
+    count, rows = shape
+    sweep = _as_sweeps(sweeps)
+    loads = np.zeros((count, rows, 3))
+    all_states = np.zeros((count, rows if states else 0, STATE_COLUMNS))
+    changes = np.full((sweep.size, MOST_CHANGES + 1 if states else 0, 6), np.nan)
+    events = np.empty(sweep.size, dtype=_EVENTS)
+    longest = int(np.diff(segments.first).max(initial=0))
+    lines = 0 if segments.lines is None else segments.lines.shape[1]
+
+    def solve(part: slice) -> None:
+        _solve(
+            shapes,
+            varied_of(profile),
+            known,
+            sweep[part],
+            segments,
+            *_carried(segments.lines),
+            tolerance is None,
+            accuracy,
+            _NEVER_MISSED if tolerance is None else tolerance,
+            asks_clearance,
+            branch_workspace(longest, order, shapes.knots.shape[1], lines),
+            np.empty(shapes.tables.shape[1:]),
+            loads,
+            all_states,
+            changes[part],
+            events[part],
+        )
+
+    in_parts(solve, sweep.size, _FEWEST)
+    return Solutions(loads, all_states, changes, *(np.ascontiguousarray(events[name]) for name in _EVENTS.names or ()))

@@ -1,0 +1,1 @@
+"""Single contacts: from a contact to the base wrench, and back, compiled."""

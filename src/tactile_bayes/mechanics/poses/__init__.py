@@ -1,0 +1,1 @@
+"""Poses of a rod under a force, compiled."""

@@ -1,0 +1,165 @@
+"""The shape of a rod of any rest curvature and rigidity: loaded, at rest, and where it is bent most.
+
+Shapes begin where the rod does. At rest it lies in the frame of its base, whose direction is that of x; distances and
+directions are from the pivot, which a rigid stem may keep away from the rod.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.poses.rises import peak, rise
+from tactile_bayes.mechanics.poses.taylor import (
+    FARTHEST,
+    FORWARD,
+    March,
+    State,
+    advance,
+    begin,
+    bending_at,
+    cell_at,
+    moved,
+    rest_curvature_at,
+)
+from tactile_bayes.mechanics.rods.profile import Profile
+
+__all__ = [
+    "Chord",
+    "beyond_along",
+    "chord_along",
+    "largest_bending_along",
+    "rest_along",
+    "shape_along",
+]
+
+_SAMPLES = 16
+"""Points of a step at which the bending is compared."""
+
+
+class Chord(NamedTuple):
+    """Point of a rod at rest, in the frame of its base."""
+
+    arclength: float
+    """Arc length from where the rod begins [L]."""
+    distance: float
+    """Distance from the pivot [L]."""
+    bearing: float
+    """Direction in which it is seen from the pivot [rad]."""
+    slope: float
+    """Slope of the rod there [rad]."""
+    curvature: float
+    """Rest curvature there [1/L]."""
+
+
+_AT_REST = State(0.0, 0.0, 0.0, 0.0)
+
+
+@compiled
+def shape_along(
+    profile: Profile,
+    phi0: float,
+    moment: float,
+    fx: float,
+    fy: float,
+    contact: float,
+    arclengths: Floats,
+    x: Floats,
+    y: Floats,
+    work: Floats,
+) -> None:
+    """Write the centreline at increasing arc lengths, for the arc length of the contact: zero if there is none."""
+    force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
+    cos, sin = math.cos(beta), math.sin(beta)
+    march = begin(profile, 0.0, FORWARD, State(phi0 - beta, -moment, 0.0, 0.0))
+    x[:] = math.nan
+    y[:] = math.nan
+    for k in range(arclengths.size):
+        if arclengths[k] == 0.0:
+            x[k], y[k] = 0.0, 0.0
+    tip = arclengths[-1]
+    while march.at < tip:
+        before, acting, end = march, force, min(contact, tip)
+        if not before.at < contact:
+            state = before.state
+            unloaded = State(state.psi, 0.0, state.u, state.v)
+            before, acting, end = March(before.at, before.cell, unloaded, before.steps), 0.0, tip
+        step, march = advance(profile, before, FORWARD, end, acting, work)
+        for k in range(arclengths.size):
+            if before.at < arclengths[k] <= march.at:
+                share = step.share * (arclengths[k] - before.at) / (march.at - before.at)
+                at = moved(before.state, acting, step, share, work)
+                x[k], y[k] = at.u * cos - at.v * sin, at.u * sin + at.v * cos
+
+
+@compiled
+def rest_along(profile: Profile, stem: float, arclength: float, work: Floats) -> Chord:
+    """Point of the rod at rest at an arc length."""
+    march = begin(profile, 0.0, FORWARD, State(0.0, 0.0, stem, 0.0))
+    while march.at < arclength:
+        _, march = advance(profile, march, FORWARD, arclength, 0.0, work)
+    return _chord(profile, march.at, march.state)
+
+
+@compiled
+def beyond_along(profile: Profile, arclength: float, work: Floats) -> tuple[float, float]:
+    """Tip of the rod at rest, along the rod at an arc length, and to its left."""
+    march = begin(profile, arclength, FORWARD, _AT_REST)
+    while march.at < 1.0:
+        _, march = advance(profile, march, FORWARD, 1.0, 0.0, work)
+    return march.state.u, march.state.v
+
+
+@compiled
+def chord_along(profile: Profile, stem: float, distance: float, work: Floats) -> Chord:
+    """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
+
+    The rod is continued beyond its tip as in `contact_along`."""
+    beginning = State(0.0, 0.0, stem, 0.0)
+    march = begin(profile, 0.0, FORWARD, beginning)
+    found, farthest, at = beginning, 0.0, 0.0
+    while march.at < FARTHEST:
+        before = march
+        step, march = advance(profile, before, FORWARD, FARTHEST, 0.0, work)
+        x = rise(before.state, 0.0, step, False, distance, work)
+        reaches = x >= 0.0
+        if not reaches:
+            x = peak(before.state, 0.0, step, False, work)
+        end = moved(before.state, 0.0, step, x, work)
+        far = math.hypot(end.u, end.v)
+        if reaches or far > farthest:
+            found, farthest, at = end, far, before.at + x * step.length
+        if reaches:
+            break
+    if math.isnan(march.state.psi):
+        at, found = march.at, march.state
+    return _chord(profile, at, found)
+
+
+@compiled
+def _chord(profile: Profile, arclength: float, at: State) -> Chord:
+    curvature = rest_curvature_at(profile, cell_at(profile, arclength, FORWARD), arclength)
+    return Chord(arclength, math.hypot(at.u, at.v), math.atan2(at.v, at.u), at.psi, curvature)
+
+
+@compiled
+def largest_bending_along(
+    profile: Profile, phi0: float, moment: float, fx: float, fy: float, contact: float, work: Floats
+) -> float:
+    """Largest change of curvature between pivot and contact, times the diameter over that at the base [1/L].
+
+    It is that of a base wrench and the arc length of its contact, to a part in a thousand."""
+    force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
+    march = begin(profile, 0.0, FORWARD, State(phi0 - beta, -moment, 0.0, 0.0))
+    end = min(contact, 1.0)
+    strain = 0.0
+    while march.at < end:
+        before = march
+        step, march = advance(profile, before, FORWARD, end, force, work)
+        for k in range(_SAMPLES + 1):
+            x = step.share * k / _SAMPLES
+            bending, _ = bending_at(step, moved(before.state, force, step, x, work).load, x, work)
+            strain = max(strain, abs(bending) * (1.0 - profile.taper * (before.at + x * step.length)))
+    return math.nan if math.isnan(march.state.psi) else strain

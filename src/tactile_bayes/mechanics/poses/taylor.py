@@ -1,0 +1,380 @@
+"""Taylor series of a loaded rod along its arc length.
+
+In the frame of the contact force f (`pose`) a rod of rest curvature κ0(s) and rigidity B(s) = EI(s)/EI(0) obeys
+
+    ψ' = ±κ0 + P/B,    P' = f cos ψ,    u' = cos ψ,    v' = sin ψ
+
+with + and P = M, the bending moment, from the pivot to the contact, and with − and P = −M from the contact to the
+pivot. Where κ0 and B are polynomials, the coefficients of all series about a point follow from one another:
+
+    q = P/B from B q = P,      cos ψ and sin ψ from (cos ψ)' = −ψ' sin ψ and (sin ψ)' = ψ' cos ψ.
+
+A step goes as far as the last coefficients allow, and not beyond a cell of the profile. Derivatives by the state at the
+contact and by the force obey the linearised equations, whose series need no other products than
+
+    δψ' = δP/B,    δu' = −sin ψ δψ,    δv' = cos ψ δψ,    δP = f δu + u δf    (from the contact, where P = f u).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.rods.profile import Profile
+
+__all__ = [
+    "BACKWARD",
+    "FARTHEST",
+    "FORWARD",
+    "MOST_STEPS",
+    "March",
+    "Slope",
+    "State",
+    "Step",
+    "advance",
+    "begin",
+    "bending_at",
+    "cell_at",
+    "most_rest_curvature",
+    "moved",
+    "rest_curvature_at",
+    "rigidity_at",
+    "series",
+    "slope_series",
+    "slopes_moved",
+    "workspace",
+]
+
+_TERMS = 24
+"""Terms of the series."""
+
+_REMAINDER = 1e-15
+"""Size of the last terms of a slope [rad]."""
+
+FORWARD, BACKWARD = 1.0, -1.0
+"""Directions: from the pivot, and from the contact."""
+
+FARTHEST = 4.0
+"""Arc length up to which a rod is continued beyond its tip, as it is at its tip [L]."""
+
+MOST_STEPS = 1000
+"""Steps inside cells after which a march ends with NaN: the load is beyond all reason, as in some searches for
+equilibria."""
+
+_INVERSE = 1.0 / np.arange(1.0, _TERMS + 1.0)
+
+_CURVATURE, _RIGIDITY, _QUOTIENT, _RATE, _SIN, _COS, _PSI, _U, _V = range(9)
+_PSI_1, _PSI_S, _PSI_F, _U_1, _U_S, _U_F, _V_F, _QUOTIENT_1, _QUOTIENT_S, _QUOTIENT_F = range(9, 19)
+"""Columns of a workspace: coefficients, and those of derivatives by ψ1, arc length and force."""
+
+
+def workspace() -> Floats:
+    """Return an array to write series to."""
+    return np.zeros((_TERMS + 1, 19))
+
+
+class State(NamedTuple):
+    """State of a rod at a point of it."""
+
+    psi: float
+    """Slope over the direction across the force [rad]."""
+    load: float
+    """P."""
+    u: float
+    """Way from the start, across and against the force."""
+    v: float
+
+
+_NOWHERE = State(math.nan, math.nan, math.nan, math.nan)
+
+
+class March(NamedTuple):
+    """State of a rod, and where it is."""
+
+    at: float
+    """Arc length from the pivot [L]."""
+    cell: int
+    state: State
+    steps: int
+    """Steps so far that ended inside a cell."""
+
+
+class Slope(NamedTuple):
+    """Derivative of a state."""
+
+    psi: float
+    u: float
+    v: float
+
+
+class Step(NamedTuple):
+    """A stretch of the rod on which series converge, in x from 0 to `share`."""
+
+    length: float
+    """Arc length at x = 1 [L]."""
+    share: float
+    terms: int
+    rigid: int
+    """Terms of the rigidity."""
+
+
+@compiled
+def cell_at(profile: Profile, arclength: float, direction: float) -> int:
+    """Cell before or behind a point of the rod."""
+    cell = profile.edges.size - 1
+    while cell > 0 and (profile.edges[cell] > arclength or (direction < 0.0 and profile.edges[cell] == arclength)):
+        cell -= 1
+    return cell
+
+
+@compiled
+def rest_curvature_at(profile: Profile, cell: int, arclength: float) -> float:
+    """Rest curvature at a point of a cell."""
+    value, offset = 0.0, arclength - profile.edges[cell]
+    for k in range(profile.curvature.shape[1] - 1, -1, -1):
+        value = value * offset + profile.curvature[cell, k]
+    return profile.sign * (value + profile.bend)
+
+
+@compiled
+def rigidity_at(profile: Profile, cell: int, arclength: float) -> float:
+    """EI(s)/EI(0) at a point of a cell."""
+    value, offset = 0.0, arclength - profile.edges[cell]
+    for k in range(profile.rigidity.shape[1] - 1, -1, -1):
+        value = value * offset + profile.rigidity[cell, k]
+    width = 1.0 - profile.taper * min(arclength, 1.0)
+    return value * (width * width) * (width * width)
+
+
+@compiled
+def most_rest_curvature(profile: Profile) -> float:
+    """Upper bound of the rest curvature."""
+    most = -math.inf
+    for cell in range(profile.edges.size - 1):
+        bound, power = profile.sign * (profile.curvature[cell, 0] + profile.bend), 1.0
+        for k in range(1, profile.curvature.shape[1]):
+            power *= profile.edges[cell + 1] - profile.edges[cell]
+            bound += max(profile.sign * profile.curvature[cell, k], 0.0) * power
+        most = max(most, bound)
+    return most
+
+
+@compiled
+def _shift(rows: Floats, cell: int, offset: float, step: float, work: Floats, column: int) -> int:
+    """Write a polynomial about a point of its cell, scaled, and return the number of its terms."""
+    count = rows.shape[1]
+    for k in range(count):
+        work[k, column] = rows[cell, k]
+    for i in range(count - 1):
+        for k in range(count - 2, i - 1, -1):
+            work[k, column] += offset * work[k + 1, column]
+    power = 1.0
+    for k in range(1, count):
+        power *= step
+        work[k, column] *= power
+    return count
+
+
+@compiled
+def _expand(
+    profile: Profile, cell: int, arclength: float, direction: float, length: float, work: Floats
+) -> tuple[int, int]:
+    """Write rest curvature and rigidity about a point, and return the numbers of terms."""
+    offset, step = arclength - profile.edges[cell], direction * length
+    bent = _shift(profile.curvature, cell, offset, step, work, _CURVATURE)
+    work[0, _CURVATURE] += profile.bend
+    for k in range(bent):
+        work[k, _CURVATURE] *= direction * profile.sign
+    rigid = _shift(profile.rigidity, cell, offset, step, work, _RIGIDITY)
+    if profile.taper != 0.0:
+        beyond = cell == profile.edges.size - 1
+        width, rate = 1.0 - profile.taper * (1.0 if beyond else arclength), 0.0 if beyond else -profile.taper * step
+        for _ in range(4):
+            work[rigid, _RIGIDITY] = 0.0
+            for k in range(rigid, 0, -1):
+                work[k, _RIGIDITY] = width * work[k, _RIGIDITY] + rate * work[k - 1, _RIGIDITY]
+            work[0, _RIGIDITY] *= width
+            rigid += 1
+    return bent, rigid
+
+
+@compiled
+def _divided(work: Floats, rigid: int, inverse: float, n: int, term: float, column: int) -> float:
+    """Term of a quotient by the rigidity."""
+    for k in range(1, min(n + 1, rigid)):
+        term -= work[k, _RIGIDITY] * work[n - k, column]
+    term *= inverse
+    work[n, column] = term
+    return term
+
+
+@compiled
+def _size(work: Floats, n: int, length: float) -> float:
+    """Size of the terms of an order, of an unloaded rod too: its derivatives by the force are those of a loaded one."""
+    return max(abs(work[n, _RATE]), abs(work[n, _SIN]), abs(work[n, _COS]), abs(length * work[n, _QUOTIENT]))
+
+
+@compiled
+def _is_last(work: Floats, n: int, least: int, length: float) -> bool:
+    """Return whether the terms have become small."""
+    return n >= least and max(_size(work, n, length), _size(work, n - 1, length)) <= _REMAINDER
+
+
+@compiled
+def _share(work: Floats, length: float) -> float:
+    """Share of a step on which the series converge; NaN where they are not finite."""
+    last, before = _size(work, _TERMS - 1, length), _size(work, _TERMS - 2, length)
+    size = max((last / _REMAINDER) ** (1.0 / (_TERMS - 1)), (before / _REMAINDER) ** (1.0 / (_TERMS - 2)))
+    return min(1.0, 1.0 / size) if size < math.inf else math.nan
+
+
+@compiled
+def series(
+    profile: Profile,
+    cell: int,
+    arclength: float,
+    direction: float,
+    length: float,
+    force: float,
+    start: State,
+    work: Floats,
+) -> Step:
+    """Write the series from a point of a cell on, over at most a length."""
+    bent, rigid = _expand(profile, cell, arclength, direction, length, work)
+    inverse, least = 1.0 / work[0, _RIGIDITY], max(bent, rigid, 3)
+    load = start.load
+    work[0, _SIN], work[0, _COS], work[0, _PSI] = math.sin(start.psi), math.cos(start.psi), start.psi
+    work[0, _U], work[0, _V] = start.u, start.v
+    for n in range(_TERMS):
+        rate = _divided(work, rigid, inverse, n, load, _QUOTIENT)
+        if n < bent:
+            rate += work[n, _CURVATURE]
+        work[n, _RATE] = length * rate
+        sin, cos = 0.0, 0.0
+        for k in range(n + 1):
+            sin += work[k, _RATE] * work[n - k, _SIN]
+            cos += work[k, _RATE] * work[n - k, _COS]
+        share = _INVERSE[n]
+        work[n + 1, _PSI] = share * work[n, _RATE]
+        work[n + 1, _U], work[n + 1, _V] = share * length * work[n, _COS], share * length * work[n, _SIN]
+        work[n + 1, _SIN], work[n + 1, _COS] = share * cos, -share * sin
+        load = force * work[n + 1, _U]
+        if _is_last(work, n, least, length):
+            return Step(length, 1.0, n + 1, rigid)
+    return Step(length, _share(work, length), _TERMS, rigid)
+
+
+@compiled
+def moved(start: State, force: float, step: Step, x: float, work: Floats) -> State:
+    """State at a point of a step."""
+    psi, u, v = 0.0, 0.0, 0.0
+    for n in range(step.terms, 0, -1):
+        psi = (psi + work[n, _PSI]) * x
+        u = (u + work[n, _U]) * x
+        v = (v + work[n, _V]) * x
+    return State(start.psi + psi, start.load + force * u, start.u + u, start.v + v)
+
+
+@compiled
+def begin(profile: Profile, arclength: float, direction: float, state: State) -> March:
+    """Start at a point of the rod."""
+    return March(arclength, cell_at(profile, arclength, direction), state, 0)
+
+
+@compiled
+def advance(
+    profile: Profile, march: March, direction: float, until: float, force: float, work: Floats
+) -> tuple[Step, March]:
+    """Write the series of a step toward an arc length, and return the step and its end; NaN after too many steps."""
+    last = profile.edges.size - 1
+    beside = march.cell if direction < 0.0 else march.cell + 1
+    edge = math.inf if beside > last else profile.edges[beside]
+    end = max(edge, until) if direction < 0.0 else min(edge, until)
+    length = direction * (end - march.at)
+    step = series(profile, march.cell, march.at, direction, length, force, march.state, work)
+    state = moved(march.state, force, step, step.share, work)
+    if step.share < 1.0:
+        steps = march.steps + 1
+        if steps == MOST_STEPS:
+            return step, March(math.nan, march.cell, _NOWHERE, steps)
+        return step, March(march.at + direction * step.share * length, march.cell, state, steps)
+    if end != edge:
+        return step, March(end, march.cell, state, march.steps)
+    return step, March(end, march.cell + (-1 if direction < 0.0 else 1), state, march.steps)
+
+
+@compiled
+def bending_at(step: Step, load: float, x: float, work: Floats) -> tuple[float, float]:
+    """Curvature less the rest curvature at a point of a step, and the rigidity there."""
+    rigidity = 0.0
+    for n in range(step.rigid - 1, -1, -1):
+        rigidity = rigidity * x + work[n, _RIGIDITY]
+    return load / rigidity, rigidity
+
+
+@compiled
+def slope_series(
+    profile: Profile,
+    cell: int,
+    arclength: float,
+    length: float,
+    force: float,
+    start: State,
+    by_psi1: Slope,
+    by_arclength: Slope,
+    by_force: Slope,
+    work: Floats,
+) -> Step:
+    """Write the series of a state and its derivatives from the contact's side of a cell on."""
+    bent, rigid = _expand(profile, cell, arclength, BACKWARD, length, work)
+    inverse, least = 1.0 / work[0, _RIGIDITY], max(bent, rigid, 3)
+    work[0, _SIN], work[0, _COS], work[0, _PSI] = math.sin(start.psi), math.cos(start.psi), start.psi
+    work[0, _U], work[0, _V] = start.u, start.v
+    work[0, _PSI_1], work[0, _U_1] = by_psi1.psi, by_psi1.u
+    work[0, _PSI_S], work[0, _U_S] = by_arclength.psi, by_arclength.u
+    work[0, _PSI_F], work[0, _U_F], work[0, _V_F] = by_force.psi, by_force.u, by_force.v
+    stiff = force * length
+    for n in range(_TERMS):
+        quotient = _divided(work, rigid, inverse, n, work[n, _U], _QUOTIENT)
+        rate = stiff * quotient
+        if n < bent:
+            rate += length * work[n, _CURVATURE]
+        work[n, _RATE] = rate
+        rate_1 = stiff * _divided(work, rigid, inverse, n, work[n, _U_1], _QUOTIENT_1)
+        rate_s = stiff * _divided(work, rigid, inverse, n, work[n, _U_S], _QUOTIENT_S)
+        rate_f = stiff * _divided(work, rigid, inverse, n, work[n, _U_F], _QUOTIENT_F) + length * quotient
+        sin, cos, sin_1, sin_s, sin_f, cos_f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(n + 1):
+            j = n - k
+            sin += work[k, _RATE] * work[j, _SIN]
+            cos += work[k, _RATE] * work[j, _COS]
+            sin_1 += work[k, _SIN] * work[j, _PSI_1]
+            sin_s += work[k, _SIN] * work[j, _PSI_S]
+            sin_f += work[k, _SIN] * work[j, _PSI_F]
+            cos_f += work[k, _COS] * work[j, _PSI_F]
+        share = _INVERSE[n]
+        way = share * length
+        work[n + 1, _PSI] = share * rate
+        work[n + 1, _U], work[n + 1, _V] = way * work[n, _COS], way * work[n, _SIN]
+        work[n + 1, _SIN], work[n + 1, _COS] = share * cos, -share * sin
+        work[n + 1, _PSI_1], work[n + 1, _PSI_S], work[n + 1, _PSI_F] = share * rate_1, share * rate_s, share * rate_f
+        work[n + 1, _U_1], work[n + 1, _U_S], work[n + 1, _U_F] = -way * sin_1, -way * sin_s, -way * sin_f
+        work[n + 1, _V_F] = way * cos_f
+        if _is_last(work, n, least, length):
+            return Step(length, 1.0, n + 1, rigid)
+    return Step(length, _share(work, length), _TERMS, rigid)
+
+
+@compiled
+def slopes_moved(step: Step, x: float, work: Floats) -> tuple[Slope, Slope, Slope]:
+    """Derivatives at a point of a step by ψ1, arc length and force; of v only the last."""
+    psi_1, psi_s, psi_f, u_1, u_s, u_f, v_f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for n in range(step.terms, -1, -1):
+        psi_1, u_1 = psi_1 * x + work[n, _PSI_1], u_1 * x + work[n, _U_1]
+        psi_s, u_s = psi_s * x + work[n, _PSI_S], u_s * x + work[n, _U_S]
+        psi_f, u_f, v_f = psi_f * x + work[n, _PSI_F], u_f * x + work[n, _U_F], v_f * x + work[n, _V_F]
+    return Slope(psi_1, u_1, 0.0), Slope(psi_s, u_s, 0.0), Slope(psi_f, u_f, v_f)

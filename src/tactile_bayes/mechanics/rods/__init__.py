@@ -1,0 +1,1 @@
+"""Rods as they are stated or traced."""

@@ -1,0 +1,117 @@
+"""Rest curvature and rigidity along a rod, as piecewise polynomials.
+
+Quantities are dimensionless: arc length s from 0, the base, to 1, the tip; rest curvature in 1/L; rigidity in EI(0).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.checks import check_number
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.rods.along import Along, GivenAlong, along
+
+__all__ = ["STEEPEST_TAPER", "Profile", "Rods", "profile_of", "rods_of"]
+
+STEEPEST_TAPER = 0.95
+"""Largest taper: the rod bends 1.6e5 times as easily at its tip as at its base."""
+
+_SAME = 1e-9
+"""Difference of the rigidity at the base from one that counts as zero."""
+
+
+class Profile(NamedTuple):
+    """A rod in the form that the compiled forward model takes."""
+
+    edges: Floats
+    """Where cells begin, from base to tip, shape (n + 1,); the last one lies beyond the tip, with its values."""
+    curvature: Floats
+    """Coefficients of the rest curvature by powers of the arc length from the beginning of a cell, shape (n + 1, …)."""
+    rigidity: Floats
+    """Coefficients of the rigidity without the taper, likewise."""
+    taper: float
+    """t of a diameter that falls linearly to 1 − t at the tip: a factor (1 − t s)⁴ on the rigidity."""
+    bend: float
+    """A number to be added to the rest curvature [1/L]."""
+    sign: float
+    """−1 for the mirrored rod of backward sweeps, else 1."""
+
+
+class Rods(NamedTuple):
+    """The rods of many contacts: arcs, or one rod, mirrored like the contacts."""
+
+    curvature: Floats
+    """Rest curvatures of arcs [1/L]; with a profile −1 for a mirrored rod, else 1, shape (n,)."""
+    profile: Profile | None = None
+    stem: float = 0.0
+    """Rigid piece between pivot and rod [L]."""
+
+    def take(self, where: Index | slice) -> Rods:
+        return self._replace(curvature=self.curvature[where])
+
+
+def rods_of(rods: Rods | ArrayLike, count: int) -> Rods:
+    """Return rods from themselves, or from the rest curvatures of arcs."""
+    given = rods if isinstance(rods, Rods) else Rods(np.asarray(rods))
+    return given._replace(curvature=np.array(np.broadcast_to(given.curvature, (count,)), dtype=float))
+
+
+def profile_of(rest_curvature: GivenAlong = 0.0, rigidity_profile: GivenAlong = 1.0, taper: float = 0.0) -> Profile:
+    """Return the profile of a rod.
+
+    Parameters
+    ----------
+    rest_curvature : float, callable, (s, curvature) or Along
+        Curvature of the unloaded rod [1/L], > 0 where it bends counter-clockwise.
+    rigidity_profile : float, callable, (s, EI/EI0) or Along
+        Flexural rigidity over that at the base, where it is 1.
+    taper : float
+        The diameter falls linearly to (1 − taper) of that at the base: a factor (1 − taper·s)⁴ on the rigidity.
+
+    Returns
+    -------
+    Profile
+
+    Raises
+    ------
+    ParameterError
+        As in `along`; or if the rigidity is not 1 at the base, or the taper not in its range.
+
+    Examples
+    --------
+    >>> profile = profile_of(rest_curvature=lambda s: 0.3 * s, rigidity_profile=([0.0, 0.5, 1.0], [1.0, 0.5, 0.4]))
+    >>> profile.edges
+    array([0. , 0.5, 1. ])
+    """
+    taper = check_number(
+        "taper", taper, f"give a number from 0 (none) to {STEEPEST_TAPER}", least=0.0, most=STEEPEST_TAPER
+    )
+    bent = _pieces(along("rest_curvature", rest_curvature, 1.0))
+    rigid = _pieces(along("rigidity_profile", rigidity_profile, 1.0, positive=True))
+    base = rigid.coefficients[0][0]
+    if abs(base - 1.0) > _SAME:
+        raise ParameterError(
+            f"rigidity_profile is {base:.6g} at the base: divide it by this value, since it is relative to the base"
+        )
+    edges = np.union1d(bent.edges, rigid.edges)
+    return Profile(edges, _on(edges, bent), _on(edges, rigid), taper, 0.0, 1.0)
+
+
+def _pieces(given: float | Along) -> Along:
+    return given if isinstance(given, Along) else Along((0.0, 1.0), ((given,),))
+
+
+def _on(edges: Floats, pieces: Along) -> Floats:
+    """Coefficients on finer cells, and beyond the tip."""
+    cells = np.clip(np.searchsorted(pieces.edges, edges, side="right") - 1, 0, len(pieces.coefficients) - 1)
+    rows = np.array(pieces.coefficients)[cells]
+    offsets = edges - np.array(pieces.edges)[cells]
+    for i in range(rows.shape[1] - 1):
+        for k in range(rows.shape[1] - 2, i - 1, -1):
+            rows[:, k] += offsets * rows[:, k + 1]
+    rows[-1, 1:] = 0.0
+    return rows

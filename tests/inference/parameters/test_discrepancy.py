@@ -1,0 +1,228 @@
+"""A discrepancy beside a contour: its size, its likelihood against dense covariances, posteriors with it, refusals."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+from helpers.contour_posteriors import BRIEF, CELL, MODEST, TRUTH, swept
+from helpers.refusals import refused
+from tactile_bayes.calibration.calibrate import calibrate, experiment_of
+from tactile_bayes.calibration.simulation import simulate
+from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.parameters.discrepancy import PARAMETERS, load_in_contact
+from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.load_cell import LoadCell, RandomWalk
+from tactile_bayes.load_cell.discrepancy import Course
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.sweep import Translation, scan
+from tactile_bayes.uncertainty.band import contour_band
+
+SMOOTH = ("discrepancy",)
+CONTOUR = Parabola(TRUTH["a"], TRUTH["q"], TRUTH["x_c"])
+
+
+def measured(cell=CELL, seed=1, **options):
+    return cell.measure(swept(CONTOUR, **options), seed=seed)
+
+
+def disturbed(size, seed=1, cell=CELL):
+    """Readings with smooth deviations of a share of the largest load in contact, as of no parabola."""
+    ideal = swept(CONTOUR)
+    angle = ideal.drive_angle.values
+    shapes = (np.sin(7.0 * angle), np.cos(9.0 * angle), np.sin(5.0 * angle + 1.0))
+    for name, shape in zip(CHANNELS, shapes, strict=True):
+        values = ideal[name].values
+        ideal[name].values = values + size * np.abs(values).max() * shape * (values != 0.0)
+    return cell.measure(ideal, seed=seed)
+
+
+def model_of(record, nuisances=SMOOTH, cell=CELL):
+    return Experiment(record, load_cell=cell, nuisances=nuisances).model
+
+
+def points_of(model, **values):
+    every = {**TRUTH, "noise_scale": 1.1, "discrepancy_scale": 0.01, "discrepancy_length": 0.3, **values}
+    return np.array([[every[name] for name in model.names]])
+
+
+def test_it_is_asked_for_by_name_or_by_a_prior():
+    record = measured()
+    for asked in (["discrepancy"], ["discrepancy_scale"], list(PARAMETERS)):
+        assert Experiment(record, load_cell=CELL, nuisances=asked).model.names[-2:] == PARAMETERS
+    priors = {"discrepancy_scale": stats.halfnorm(scale=0.02)}
+    assert Experiment(record, load_cell=CELL, priors=priors).model.names[-2:] == PARAMETERS
+    assert not set(PARAMETERS) & set(Experiment(record, load_cell=CELL).model.names)
+    unknown = Experiment(swept(CONTOUR), nuisances=SMOOTH).model
+    assert unknown.names[-4:] == ("moment_noise", "force_noise", *PARAMETERS)
+
+
+def test_standard_stands_for_the_default():
+    record = measured()
+    usual = Experiment(record, load_cell=CELL).model.names
+    assert Experiment(record, load_cell=CELL, nuisances=["standard"]).model.names == usual
+    more = Experiment(record, load_cell=CELL, nuisances=["standard", "drift", "discrepancy"]).model.names
+    drifts = ("moment_drift", "force_x_drift", "force_y_drift")
+    assert more == (*usual[:-1], *drifts, usual[-1], *PARAMETERS)
+    beside = Experiment(record, load_cell=CELL, nuisances=[*STANDARD, "discrepancy"]).model.names
+    assert beside == (*usual, *PARAMETERS)
+    known = Experiment(record, load_cell=CELL, friction=0.1, nuisances=["standard", "discrepancy"])
+    assert "friction" not in known.model.names
+    assert json.loads(known.about["nuisances"])[-2:] == list(PARAMETERS)
+
+
+def test_it_is_zero_out_of_contact_and_has_the_largest_load_of_its_sweep():
+    course = Course.along(np.array([0.0, 1.0, 2.0, 2.0, 1.0, 0.0]), [np.arange(3), np.arange(3, 6)])
+    loads = np.array([[0, 0, 0], [1, 3, 4], [-2, 0, 1], [0, 0, 0], [0.5, 0, 0.1], [0, 0.1, 0.2]], dtype=float)
+    size = load_in_contact(np.stack([loads, 2.0 * loads]), course)
+    later = [0.5, np.hypot(0.1, 0.2), np.hypot(0.1, 0.2)]
+    np.testing.assert_allclose(size[0], [[0, 0, 0], [2, 5, 5], [2, 5, 5], [0, 0, 0], later, later])
+    np.testing.assert_allclose(size[1], 2.0 * size[0])
+
+
+@pytest.mark.parametrize("frame", ["fixed", "turning"])
+def test_the_likelihood_is_dense(frame):
+    """Readings of a sweep in each direction from two pivots."""
+    record = measured(replace(CELL, frame=frame), bases=((0.0, 0.0), (0.2, 0.0)), step=0.1)
+    model = model_of(record)
+    (point,) = points_of(model)
+    loads = model.loads(point[None])[0]
+    scale, length, n = 0.01, 0.3, record.sizes["sample"]
+    sweep, angle = record.sweep.values, record.drive_angle.values
+    a = np.sqrt(3.0) * np.abs(np.subtract.outer(angle, angle)) / length
+    together = (1.0 + a) * np.exp(-a) * np.equal.outer(sweep, sweep)
+    size = np.stack([np.abs(loads[:, 0]), *[np.hypot(loads[:, 1], loads[:, 2])] * 2], axis=1)
+    largest = np.array([size[sweep == s].max(axis=0) for s in range(4)])[sweep] * (size > 0.0)
+    expected = 0.0
+    for c, noise in enumerate(1.1 * CELL.noise):
+        covariance = np.outer(scale * largest[:, c], scale * largest[:, c]) * together + noise**2 * np.eye(n)
+        expected += stats.multivariate_normal(loads[:, c], covariance).logpdf(model.likelihood.measured[:, c])
+    assert model.log_likelihood(point[None])[0] == pytest.approx(expected, rel=1e-9)
+    assert model.log_likelihood(point[None], pointwise=True).sum() == pytest.approx(expected, rel=1e-9)
+
+
+def test_without_size_it_is_the_likelihood_without_it():
+    record = measured()
+    plain, smooth = model_of(record, ()), model_of(record)
+    points = points_of(smooth, discrepancy_scale=1e-300)
+    np.testing.assert_allclose(smooth.log_likelihood(points), plain.log_likelihood(points[:, :-2]), rtol=1e-13)
+
+
+def test_repeated_sweeps_have_it_in_common():
+    """The likelihood of two equal sweeps depends on how much the second agrees with the first."""
+    one = measured(step=0.1)
+    again = one.assign(sweep=one.sweep + 2)
+    both = xr.concat([one, again], "sample", combine_attrs="override")
+    model = model_of(both)
+    course = model.likelihood.segments.course
+    assert np.count_nonzero(np.isinf(course.step)) == 2
+    assert np.count_nonzero(course.step == 0.0) == one.sizes["sample"]
+    drifting = replace(CELL, drift=RandomWalk(force=0.01))
+    with refused(ParameterError, "repeated sweeps"):
+        model_of(both, cell=drifting).log_likelihood(points_of(model))
+    assert np.isfinite(model_of(one, cell=drifting).log_likelihood(points_of(model))).all()
+
+
+def test_its_coordinate_is_the_travel_where_the_base_is_carried():
+    drive = Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
+    record = CELL.measure(scan(Circle(0.5, 0.5), drive=drive, drive_step=0.04).record, seed=1)
+    model = Experiment(record, "circle", CELL, nuisances=SMOOTH).model
+    course = model.likelihood.segments.course
+    assert course.is_measured_order
+    ways = np.hypot(np.diff(record.base_x.values), np.diff(record.base_y.values))
+    np.testing.assert_allclose(course.step[1:], ways, rtol=1e-9)
+    assert np.isfinite(model.log_likelihood(points_of(model, r=0.5))).all()
+
+
+def test_what_has_no_closed_form_is_refused():
+    record = measured()
+    with refused(ParameterError, "drive_angle_resolution together with a discrepancy"):
+        model_of(record, cell=replace(CELL, drive_angle_noise=0.01))
+    for flaw, reason in (({"degrees_of_freedom": 4.0}, "outliers"), ({"correlation": (0.5, 0.0, 0.0)}, "correlated")):
+        with refused(ParameterError, reason):
+            infer_contour(record, load_cell=replace(CELL, **flaw), nuisances=SMOOTH, seed=1, settings=BRIEF)
+    with refused(ParameterError, "choose from standard, bias"):
+        model_of(record, ["hysteresis"])
+
+
+@pytest.mark.slow
+def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
+    """By bands that are wider, as the readings are less certain."""
+    record = disturbed(0.02, cell=LoadCell(force_noise=0.01, moment_noise=0.004))
+    x = np.linspace(-0.2, 0.2, 5)
+    draw = {"seed": 1, "settings": MODEST}
+    blind, smooth = (infer_contour(record, nuisances=asked, **draw) for asked in ((), SMOOTH))
+    before, after = check_record(blind), check_record(smooth)
+    assert not before.passed
+    assert "--discrepancy" in before.attrs["suggestion"]
+    assert after.passed
+    assert after.attrs["suggestion"] == ""
+    assert json.loads(smooth.attrs["nuisances"]) == list(PARAMETERS)
+    scale, length = (smooth["posterior"][name] for name in PARAMETERS)
+    assert 0.005 < float(scale.median()) < 0.05
+    assert (scale.attrs["units"], length.attrs["units"]) == ("1", "rad")
+    narrow, wide = (contour_band(tree, x) for tree in (blind, smooth))
+    assert np.all((wide.upper - wide.lower).values > 0.0)
+    height = np.asarray(CONTOUR.height(x))
+    assert np.mean((wide.lower.values <= height) & (height <= wide.upper.values)) >= 0.6
+    assert float(smooth["posterior"].noise_scale.median()) < float(blind["posterior"].noise_scale.median())
+    assert np.isfinite((narrow.upper - narrow.lower).values).all()
+
+
+def test_a_good_record_suggests_nothing():
+    assert check_record(infer_contour(measured(), nuisances=(), seed=1, settings=MODEST)).attrs["suggestion"] == ""
+
+
+@pytest.mark.slow
+def test_simulated_readings_have_the_density_of_the_likelihood():
+    """The mean of minus twice the quadratic form is the number of readings: 5 standard errors of 40 records."""
+    priors = {name: stats.norm(value, 1e-12) for name, value in (("a", 0.5), ("q", 0.5), ("x_c", 0.0))}
+    priors |= {
+        "noise_scale": stats.lognorm(s=1e-9),
+        "discrepancy_scale": stats.lognorm(s=1e-9, scale=0.03),
+        "discrepancy_length": stats.lognorm(s=1e-9, scale=0.3),
+    }
+    experiment = experiment_of(
+        seed=1, load_cell=CELL, nuisances=SMOOTH, priors=priors, drive_angles=np.radians(np.arange(-30.0, 211.0, 4.0))
+    )
+    squares = []
+    for seed in range(40):
+        made = simulate(experiment, np.random.default_rng(seed))
+        model = model_of(made.measured)
+        points = points_of(model, noise_scale=1.0, discrepancy_scale=0.03)
+        discrepancy = model.discrepancy_at(points[0])
+        off = model.likelihood.measured - model.loads(points)[0]
+        for c in range(3):
+            covariance = discrepancy.covariance()[..., c] + CELL.noise[c] ** 2 * np.eye(len(off))
+            squares.append(off[:, c] @ np.linalg.solve(covariance, off[:, c]))
+    count = len(squares) * len(off)
+    assert abs(np.sum(squares) - count) < 5.0 * np.sqrt(2.0 * count)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["parabola", "circle"])
+def test_posteriors_with_it_are_calibrated(family):
+    found = calibrate(seed=1, family=family, replicates=50, nuisances=SMOOTH, workers=1)
+    assert found.attrs["calibrated"] == 1, found.attrs["verdict"]
+
+
+def test_it_is_in_the_unit_of_the_readings():
+    """Of a cell that counts, a discrepancy of 1 % is one of counts."""
+    record, gain = swept(Parabola(0.5, 0.5), step=0.1), 900.0 * np.eye(3)
+    counting = LoadCell(force_noise=45.0, moment_noise=18.0, gain=tuple(map(tuple, gain)))
+    counted = record.assign({name: record[name] * 900.0 for name in CHANNELS})
+    models = [
+        Experiment(one, load_cell=cell, nuisances=SMOOTH).model for one, cell in ((record, CELL), (counted, counting))
+    ]
+    values = []
+    for model in models:
+        points = points_of(model, noise_scale=1.0, discrepancy_scale=0.03, discrepancy_length=0.3)
+        values.append(model.log_likelihood(points)[0])
+    np.testing.assert_allclose(values[1], values[0] - 3 * record.sizes["sample"] * np.log(900.0), rtol=1e-10)

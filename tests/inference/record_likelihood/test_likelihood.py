@@ -1,0 +1,545 @@
+"""The likelihood of a whole record, against normal densities summed over exact states."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+from scipy.optimize import brentq
+
+from helpers.contour_posteriors import CELL, DEVIATIONS, swept, without
+from helpers.refusals import refused
+from tactile_bayes.calibration.calibrate import experiment_of
+from tactile_bayes.calibration.simulation import simulate
+from tactile_bayes.contours import Circle, Parabola, PowerLaw
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.contour_events import events_of
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.poses.forward_table import NO_TABLE
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
+from tactile_bayes.record.units import with_rod
+from tactile_bayes.sweep import Motion, Translation, scan
+
+SHARE = {False: 3e-4, True: 1e-6}
+"""Error of the interpolated loads over their largest value, at worst, in 150 contours."""
+
+WIRE = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
+WIRE_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
+
+
+def exact_loads(record, contour, friction=0.0):
+    """What an ideal sensor on the record's rig would have felt under the contour, (samples, 3), from `scan`."""
+    out = np.empty((record.sizes["sample"], 3))
+    for sweep in np.unique(record.sweep.values):
+        rows = np.flatnonzero(record.sweep.values == sweep)
+        direction = str(record.direction.values[rows[0]])
+        base = float(record.base_x[rows[0]]), float(record.base_y[rows[0]])
+        angles = record.drive_angle.values[rows]
+        other = scan(
+            contour, direction=direction, base=base, drive_angles=angles, rod=rod_of(record), friction=friction
+        ).record
+        np.testing.assert_array_equal(other.drive_angle.values, angles)
+        out[rows] = np.stack([other[name].values for name in CHANNELS], axis=-1)
+    return out
+
+
+def stack(contours):
+    family = type(contours[0])
+    return family(*(np.array([getattr(c, name) for c in contours], dtype=float) for name in vars(contours[0])))
+
+
+RIGS = {
+    "dimensionless": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002), Rod(), CELL, ((0.0, 0.0),), 0.0),
+    "far off": (Parabola(0.5, 0.5), Parabola(0.9, 0.35, -0.1), Rod(), CELL, ((0.0, 0.0),), 0.0),
+    "circle": (Circle(0.6, 0.4, 0.1), Circle(0.61, 0.401, 0.1), Rod(), CELL, ((0.0, 0.0),), 0.0),
+    "SI": (Parabola(2.5, 0.1), Parabola(2.52, 0.0999, 0.0004), WIRE, WIRE_CELL, ((0.0, 0.0),), 0.0),
+    "diameter": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002), Rod(diameter=0.02), CELL, ((0.0, 0.0),), 0.0),
+    "pivots": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.2, 0.1), (-0.3, 0.0)), 0.0),
+    "friction": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.0, 0.0),), 0.3),
+    "arc": (Circle(0.4, 0.4, 0.1), Circle(0.41, 0.401, 0.1), Rod(rest_curvature=0.6), CELL, ((0.0, 0.0),), 0.3),
+    "tapered": (
+        Circle(0.4, 0.4, 0.1),
+        Circle(0.41, 0.401, 0.1),
+        Rod(diameter=0.03, taper=0.5),
+        CELL,
+        ((0.0, 0.0),),
+        0.0,
+    ),
+    "curved by a function": (
+        Parabola(0.5, 0.5),
+        Parabola(0.503, 0.4995),
+        Rod(diameter=0.02, taper=0.3, rest_curvature=lambda s: 0.6 * s - 0.2),
+        CELL,
+        ((0.0, 0.0),),
+        0.3,
+    ),
+    "arc in SI": (
+        Parabola(2.5, 0.1),
+        Parabola(2.52, 0.0999, 0.0004),
+        Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9, rest_curvature=1.5),
+        WIRE_CELL,
+        ((0.0, 0.0),),
+        0.0,
+    ),
+}
+
+
+@cache
+def measured_by(rig):
+    """A record of the first contour, in steps of 5°, that is not to be changed."""
+    true, _, rod, cell, bases, friction = RIGS[rig]
+    return cell.measure(swept(true, bases=bases, rod=rod, friction=friction, step=np.radians(5.0)), seed=3)
+
+
+@cache
+def exact_by(rig):
+    """The loads of the first contour there."""
+    return exact_loads(measured_by(rig), RIGS[rig][0], RIGS[rig][5])
+
+
+ALIKE = ("far off", "circle", "diameter")
+"""Rigs of which the loads are compared in every run, and sums of densities on demand."""
+
+SUMMED = [pytest.param(rig, marks=pytest.mark.slow) if rig in ALIKE else rig for rig in RIGS]
+
+
+@pytest.mark.parametrize("rig", SUMMED)
+def test_against_an_independent_sum(rig):
+    """Loads off by e change a normal log-density by r e/σ² + e²/(2σ²) at most, r the residual."""
+    true, other, rod, cell, _, friction = RIGS[rig]
+    whole = measured_by(rig)
+    exact = [exact_by(rig), exact_loads(whole, other, friction)]
+    scale = np.array([1.0, 1.3])
+    for missing in ((), ("force_x", "force_y"), ("holding_moment",)):
+        measured = without(whole, *missing)
+        values = np.stack([measured[name].values for name in CHANNELS], axis=-1)
+        present = ~np.isnan(values[0])
+        deviation = np.array([cell.standard_deviations[name] for name in CHANNELS])[present]
+        units = rod.load_units[present]
+        for exactly in (False,) if missing else (False, True):
+            likelihood = RecordLikelihood(measured, cell, friction, exactly)
+            found = likelihood.log_likelihood(stack([true, other]), scale[:, None])
+            pointwise = likelihood.log_likelihood(stack([true, other]), scale[:, None], pointwise=True)
+            np.testing.assert_allclose(pointwise.sum(axis=1), found, rtol=1e-12)
+            for k, loads in enumerate(exact):
+                sigma = scale[k] * deviation
+                densities = stats.norm.logpdf(values[:, present], loads[:, present], sigma).sum(axis=1)
+                expected = densities + np.log(units).sum()  # densities of dimensionless loads
+                error = SHARE[exactly] * np.abs(loads[:, present]).max(axis=0)
+                slack = (np.abs(values - loads)[:, present] * error + 0.5 * error**2) / sigma**2
+                assert np.all(np.abs(pointwise[k] - expected) <= slack.sum(axis=1) + 1e-9)
+
+
+def test_the_rest_curvature_of_a_rig_is_that_of_the_rod_in_addition():
+    """In both directions; and a straight rod is noticed where the true one is curved."""
+    true, other, rod, cell, _, friction = RIGS["arc"]
+    measured, contours = measured_by("arc"), stack([true, other])
+    stated = RecordLikelihood(measured, cell, friction).log_likelihood(contours)
+    taken_for_straight = RecordLikelihood(with_rod(measured, Rod()), cell)
+    rig = Rig(rest_curvature=rod.rest_curvature, friction=friction)
+    np.testing.assert_array_equal(taken_for_straight.log_likelihood(contours, rig=rig), stated)
+    assert taken_for_straight.log_likelihood(contours, rig=Rig(friction=friction)).max() < stated.max() - 100.0
+
+
+@pytest.mark.parametrize("rod", ["arc", "curved by a function"])
+def test_the_taper_of_a_rig_is_that_of_the_rod_in_addition(rod):
+    """A likelihood that takes it as stated has another table; both have errors as large as noise requires."""
+    true, other, stated, cell, _, friction = RIGS[rod]
+    contours, tapered = stack([true, other]), replace(stated, taper=stated.taper + 0.1)
+    record = cell.measure(swept(true, rod=tapered, friction=friction, step=np.radians(5.0)), seed=3)
+    rig = Rig(taper=np.array([0.1, 0.1]), friction=friction)
+    for exact in (True, False):
+        known = RecordLikelihood(record, cell, friction, exact)
+        with_rig = RecordLikelihood(with_rod(record, stated), cell, friction, exact)
+        found, expected = with_rig.log_likelihood(contours, rig=rig), known.log_likelihood(contours)
+        np.testing.assert_allclose(found, expected, atol=1e-8 if exact else 0.05)
+        assert with_rig.log_likelihood(contours).max() < expected.max() - 10.0
+
+
+@pytest.mark.slow
+def test_rods_that_vary_cost_no_accuracy_where_all_of_the_rig_is_inferred():
+    """Draws of taper, rest curvature and friction in the ranges of the table and beyond them, as without a table."""
+    cell, friction = RIGS["curved by a function"][3], RIGS["curved by a function"][5]
+    measured, rng = measured_by("curved by a function"), np.random.default_rng(1)
+    count = 40
+    contours = stack([Parabola(*place) for place in rng.normal([0.5, 0.5, 0.0], 0.01, (count, 3))])
+    rig = Rig(
+        taper=rng.normal(0.0, 0.1, count),
+        rest_curvature=rng.normal(0.0, 0.1, count),
+        friction=np.abs(rng.normal(0.0, 0.4, count)),
+    )
+    assert np.any(np.abs(rig.taper) > 0.15)
+    assert np.any(np.arctan(rig.friction) > 0.5)
+    loads, usable = RecordLikelihood(measured, cell, friction).predict(contours, rig)
+    exact, usable_exactly = RecordLikelihood(measured, cell, friction, exact=True).predict(contours, rig)
+    np.testing.assert_array_equal(usable, usable_exactly)
+    error = SHARE[False] * np.abs(exact).max(axis=(0, 1))
+    close = np.all(np.abs(loads - exact) <= error, axis=-1)
+    assert np.count_nonzero(~close) <= 4  # samples so near snap-off that they are on the other side of it
+
+
+@pytest.mark.slow
+def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
+    """First contact decides in which sense friction acts: here both occur, on a bent rod with a stem."""
+    rod = Rod(rest_curvature=lambda s: -3.4 / (1.0 + np.exp(-(s - 0.55) / 0.08)), stem=0.03)
+    rng, count, senses = np.random.default_rng(5), 40, []
+    bend, friction = rng.uniform(-0.1, 0.1, count), np.abs(rng.normal(0.2, 0.1, count))
+    rig = Rig(rest_curvature=bend, friction=friction, stem=rng.uniform(-0.02, 0.02, count))
+    for drive in (Translation((0.11, 0.0), np.pi, 1.13, 1.1), Translation((0.3, -1.2), 2.05, 1.13, 1.1)):
+        measured = CELL.measure(scan(Circle(0.29, 0.21), rod=rod, drive=drive, friction=0.2).record, seed=1)
+        places = 0.003 * rng.normal(size=(3, count)) + np.array([[0.29], [0.21], [0.0]])
+        likelihood, exactly = (RecordLikelihood(measured, CELL, exact=exact) for exact in (False, True))
+        loads, usable = likelihood.predict(Circle(*places), rig)
+        assert likelihood._tables.made[False, True, True, False, False] is not NO_TABLE
+        exact, usable_exactly = exactly.predict(Circle(*places), rig)
+        np.testing.assert_array_equal(usable, usable_exactly)
+        assert np.count_nonzero(usable) > 20
+        np.testing.assert_allclose(loads[usable], exact[usable], atol=2e-4 * np.abs(exact).max())
+        senses += np.sign(likelihood.paths(Circle(*places), rig).changes[usable, 0, 5]).tolist()
+    assert set(senses) == {-1.0, 1.0}
+
+
+def test_rods_curved_toward_a_flat_object_touch_it_twice_with_a_table_too():
+    """Whether they do may differ for a few contours that are nearly as curved as the rod."""
+    rng, rod = np.random.default_rng(3), Rod(taper=0.3, rest_curvature=lambda s: 0.6 * s - 0.2)
+    record = swept(Parabola(0.5, 0.5), rod=rod, step=np.radians(10.0))
+    flat = PowerLaw(*rng.uniform([0.3, 2.5, 0.2, -0.2], [2.0, 4.0, 0.8, 0.2], (100, 4)).T)
+    usable = [RecordLikelihood(record, CELL, exact=exact).usable(flat) for exact in (False, True)]
+    assert 20 < np.count_nonzero(usable[1]) < 80
+    assert np.count_nonzero(usable[0] != usable[1]) <= 1
+
+
+def swept_in(rig):
+    true, other, _, cell, _, friction = RIGS[rig]
+    return measured_by(rig), stack([true, other]), cell, friction
+
+
+@pytest.mark.parametrize("rig", SUMMED)
+def test_the_frame_of_the_load_cell_does_not_matter(rig):
+    """With noise of one size on both forces, turning data and prediction alike changes no density."""
+    measured, contours, cell, friction = swept_in(rig)
+    scale = np.array([1.0, 1.3])[:, None]
+    fixed = RecordLikelihood(measured, cell, friction)
+    turning = RecordLikelihood(in_frame(measured, "turning"), cell, friction)
+    for pointwise in (False, True):
+        expected = fixed.log_likelihood(contours, scale, pointwise=pointwise)
+        found = turning.log_likelihood(contours, scale, pointwise=pointwise)
+        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_predictions_are_in_the_frame_of_the_record(rig):
+    measured, contours, cell, friction = swept_in(rig)
+    likelihood = RecordLikelihood(in_frame(measured, "turning"), cell, friction, True)
+    predicted, _ = likelihood.predict(contours)
+    rod = RIGS[rig][2]
+    load, angle = exact_by(rig), measured.drive_angle.values
+    exact = np.stack(
+        [
+            load[:, 0] / rod.moment_unit,
+            (load[:, 1] * np.cos(angle) + load[:, 2] * np.sin(angle)) / rod.force_unit,
+            (load[:, 2] * np.cos(angle) - load[:, 1] * np.sin(angle)) / rod.force_unit,
+        ],
+        axis=-1,
+    )
+    largest = np.abs(load / rod.load_units).max(axis=0)
+    error = SHARE[True] * np.array([largest[0], *[np.sum(largest[1:])] * 2])
+    assert np.all(np.abs(predicted[0] - exact) <= error)
+    np.testing.assert_array_equal(likelihood.measured[:, 0], measured.holding_moment.values / rod.moment_unit)
+
+
+@pytest.mark.parametrize("missing", [("force_x", "force_y"), ("force_x",), ("force_y",), ("holding_moment", "force_y")])
+def test_channels_may_be_missing_where_the_load_cell_turns(missing):
+    """A single force is compared along its own axis, which the record alone could not be turned out of."""
+    measured, contours, cell, _ = swept_in("dimensionless")
+    turning = without(in_frame(measured, "turning"), *missing)
+    likelihood = RecordLikelihood(turning, cell)
+    whole, _ = RecordLikelihood(in_frame(measured, "turning"), cell).predict(contours)
+    present = [k for k, name in enumerate(CHANNELS) if name not in missing]
+    densities = stats.norm.logpdf(
+        np.stack([turning[CHANNELS[k]].values for k in present], axis=-1), whole[..., present], DEVIATIONS[present]
+    )
+    np.testing.assert_allclose(likelihood.log_likelihood(contours), densities.sum(axis=(1, 2)), rtol=1e-11)
+    if missing == ("force_x", "force_y"):
+        fixed = RecordLikelihood(without(measured, *missing), cell)
+        np.testing.assert_array_equal(likelihood.log_likelihood(contours), fixed.log_likelihood(contours))
+
+
+def test_truth_is_more_likely_than_what_is_a_little_off():
+    measured = CELL.measure(swept(Parabola(0.5, 0.5)), seed=3)
+    off = [Parabola(0.5, 0.5), Parabola(0.51, 0.5), Parabola(0.5, 0.502), Parabola(0.5, 0.5, 0.005)]
+    values = RecordLikelihood(measured, CELL).log_likelihood(stack(off))
+    assert np.argmax(values) == 0
+
+
+def test_a_contour_out_of_reach_of_any_pivot_is_impossible():
+    record = swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.3, 0.1)))
+    likelihood = RecordLikelihood(record, CELL)
+    contours = [
+        Parabola(0.5, 0.5),
+        Parabola(0.5, 1.02),  # within reach of the second pivot only
+        Parabola(0.5, 1.3),
+        Parabola(0.5, -0.1),
+        Parabola(2.0, 0.05, 0.3),  # cuts the second pivot
+    ]
+    found = likelihood.log_likelihood(stack(contours))
+    assert np.isfinite(found).tolist() == [True, False, False, False, False]
+    assert np.all(np.isneginf(found[1:]))
+    assert np.all(np.isneginf(likelihood.log_likelihood(stack(contours), pointwise=True)[1:]))
+
+
+def test_snap_off_tells_contours_apart():
+    """Across the contour that lets go at a sample's drive angle, likelihood jumps by what that sample says."""
+    record = swept(Parabola(0.5, 0.5), direction="forward")
+    measured = CELL.measure(record, seed=3)
+    last = int(np.flatnonzero(record.force_y.values)[-1])
+    angle = float(record.drive_angle[last])
+
+    def late(q):
+        return (
+            scan(Parabola(0.5, q), direction="forward", drive_step=0.5).events["forward"].snap_off.drive_angle - angle
+        )
+
+    q = brentq(late, 0.45, 0.55, xtol=1e-13)
+    sides = sorted((q - 1e-9, q + 1e-9), key=late)
+    assert late(sides[0]) < 0.0 < late(sides[1])
+    likelihood = RecordLikelihood(measured, CELL, exact=True)
+    let_go, held_on = likelihood.log_likelihood(stack([Parabola(0.5, q) for q in sides]))
+    values = np.array([float(measured[name][last]) for name in CHANNELS])
+    load = exact_loads(measured, Parabola(0.5, sides[1]))[last]
+    jump = (stats.norm.logpdf(values, load, DEVIATIONS) - stats.norm.logpdf(values, 0.0, DEVIATIONS)).sum()
+    assert held_on - let_go > 1000.0
+    # All loads of a contour that is 1e-9 off change by about as much, over deviations of 0.02 in 100 samples.
+    np.testing.assert_allclose(held_on - let_go, jump, rtol=1e-4)
+
+
+def test_order_of_sweeps_and_their_number_do_not_matter():
+    measured = CELL.measure(swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.2, 0.1))), seed=3)
+    contours = stack([Parabola(0.5, 0.5), Parabola(0.505, 0.5)])
+    expected = RecordLikelihood(measured, CELL).log_likelihood(contours)
+    mixed = measured.isel(sample=np.random.default_rng(1).permutation(measured.sizes["sample"]).argsort(kind="stable"))
+    mixed = mixed.sortby("sweep", ascending=False)
+    pointwise = RecordLikelihood(mixed, CELL).log_likelihood(contours, pointwise=True)
+    np.testing.assert_allclose(pointwise.sum(axis=1), expected, rtol=1e-12)
+    again = measured.copy()
+    again["sweep"] = again.sweep + 4
+    twice = xr.concat([measured, again], "sample", combine_attrs="override")
+    # Of more samples, each is interpolated with a smaller error.
+    np.testing.assert_allclose(RecordLikelihood(twice, CELL).log_likelihood(contours), 2.0 * expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+def test_a_drive_that_turns_back_in_contact_meets_the_same_side(direction):
+    """The way back takes the same states in reverse: contact points and likelihood know it by the moment's sign."""
+    contour = Parabola(0.5, 0.5)
+    out = scan(contour, direction=direction).record
+    out = out.isel(sample=slice(0, 100)).drop_vars([n for n in out.data_vars if n.startswith("truth_holding")])
+    back = out.isel(sample=slice(None, None, -1))
+    other = {"forward": "backward", "backward": "forward"}[direction]
+    columns = {
+        name: np.concatenate([out[name].values, back[name].values])
+        for name in (*CHANNELS, "drive_angle", "truth_contact_x")
+    }
+    columns |= {"sweep": np.repeat([0, 1], 100), "direction": np.repeat([direction, other], 100)}
+    both = make_record(columns)
+    contacts = reconstruct(both)
+    np.testing.assert_allclose(contacts.contact_x, both.truth_contact_x, atol=1e-10)
+    likelihood = RecordLikelihood(both, CELL)
+    predicted, _ = likelihood.predict(stack([contour]))
+    np.testing.assert_allclose(predicted[0], likelihood.measured, atol=1e-3)
+    noisy = RecordLikelihood(CELL.measure(both, seed=1), CELL)
+    np.testing.assert_array_equal(noisy.predict(stack([contour]))[0], predicted)
+
+
+def test_a_channel_without_noise_is_refused():
+    likelihood = RecordLikelihood(swept(Parabola(0.5, 0.5)), LoadCell(moment_noise=0.02))
+    with refused(ParameterError, "force_x", "noise"):
+        likelihood.log_likelihood(stack([Parabola(0.5, 0.5)]))
+
+
+@pytest.mark.parametrize("missing", [(), ("force_x", "force_y")])
+def test_a_moment_that_is_counted_the_other_way_round_turns_no_side(missing):
+    """The side of contact follows the moment's sign, once the cell's known gain and bias are taken out of it."""
+    upright = LoadCell(force_noise=0.05, moment_noise=0.02)
+    turned = LoadCell(
+        force_noise=0.05,
+        moment_noise=0.02,
+        gain=((-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        bias=(30.0, 0.0, 0.0),
+    )
+    contour = Parabola(np.array([0.5]), np.array([0.5]), np.array([0.0]))
+    record = scan(Parabola(0.5, 0.5), drive_step=np.radians(3.0)).record
+    values = []
+    for cell in (upright, turned):
+        measured = without(cell.measure(record, seed=1), *missing)
+        values.append(RecordLikelihood(measured, cell).log_likelihood(contour)[0])
+    # Not one number: the noise on the moment has the other sign.
+    assert values[0] == pytest.approx(values[1], abs=4.0 * np.sqrt(2.0 * record.sizes["sample"]))
+
+
+def exact_sensed(model, point):
+    """What the cell senses of one point, (1, samples, 3), from states at the drive angles to rounding."""
+    likelihood, rig = model.likelihood, model.rig(point)
+    paths = likelihood.paths(model.contours(point), rig)
+    segment = likelihood.segments.of_sample
+    signs = np.array([-1.0 if each.backward else 1.0 for each in likelihood.segments])[segment]
+    found = paths.states(segment, likelihood.segments.angles_in_sweep_frame - signs * likelihood.misread(rig)[0]).wrench
+    loads = np.stack([signs * found.holding_moment, signs * found.force_x, found.force_y], axis=-1)
+    scaled = np.atleast_1d(rig.rigidity_scale)[:, None, None] * np.nan_to_num(loads)[None]
+    return model.nuisances.sensed(scaled, model.values(point), likelihood.load_cell)
+
+
+def off_at_the_truth(noise, family, numbers):
+    """By how much log-likelihoods of records from the default prior differ from exact ones."""
+    cell = LoadCell(force_noise=0.05 * noise, moment_noise=0.02 * noise)
+    experiment = experiment_of(seed=1, family=family, load_cell=cell, friction=0.0)
+    off = []
+    for number in numbers:
+        simulation = simulate(experiment, np.random.default_rng([9, number]))
+        model = experiment.problem_of(simulation.measured).model
+        point = np.array([[simulation.truth[name] for name in model.names]])
+        reached = np.ones(1, dtype=bool)
+        scale = model.noise_scale(point)
+        exact = model.likelihood.score(exact_sensed(model, point)[:, None], reached, scale)
+        off.append(float((model.likelihood.score(model.loads(point)[:, None], reached, scale) - exact)[0]))
+    return np.abs(off)
+
+
+@pytest.mark.parametrize(
+    ("noise", "family", "count"),
+    [
+        (1.0, "parabola", 30),
+        (0.01, "parabola", 30),
+        *(pytest.param(noise, "parabola", 1000, marks=pytest.mark.slow) for noise in (1.0, 0.1, 0.01)),
+        *(
+            pytest.param(noise, name, 300, marks=pytest.mark.slow)
+            for noise in (1.0, 0.1, 0.01)
+            for name in ("power-law", "ellipse")
+        ),
+    ],
+)
+def test_interpolation_is_not_felt_at_the_truth(noise, family, count):
+    """Log-likelihoods of default-prior records, near pivots too, are within 0.05 of the exact ones."""
+    assert off_at_the_truth(noise, family, range(count)).max() < 0.05
+
+
+def test_interpolation_is_not_felt_where_the_tip_touches_for_a_millionth_of_the_path():
+    assert off_at_the_truth(0.01, "parabola", [610]).max() < 0.05
+
+
+VARIED = {
+    "taper of a half": (Rod(taper=0.5), 0.3, False),
+    "taper of nine tenths": (Rod(taper=0.9), 0.0, False),
+    "curved by a function": (Rod(rest_curvature=lambda s: 0.6 * s), 0.0, False),
+    "curved by a function, with friction": (Rod(rest_curvature=lambda s: 0.6 * s - 0.3), 0.3, False),
+    "tapered arc": (Rod(rest_curvature=-0.4, taper=0.4), 0.2, False),
+    "all of the rig inferred": (Rod(taper=0.5), 0.0, True),
+}
+"""Rods, friction coefficients, and whether taper, rest curvature and friction vary from one contour to the next."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", VARIED)
+def test_loads_of_rods_that_vary_are_within_1e_5_of_the_largest(name):
+    """Beyond what an error of 1e-6 rad of the drive angle explains, which is large just before a fold."""
+    rod, friction, inferred = VARIED[name]
+    rng, count, turn = np.random.default_rng(7), 150, 1e-7
+    record = with_rod(swept(Parabola(0.5, 0.6), step=np.radians(1.0)), rod)
+    drawn = Parabola(*rng.uniform([0.2, 0.3, -0.15], [1.0, 0.8, 0.15], (count, 3)).T)
+    rig = Rig(friction=friction)
+    if inferred:
+        taper, bend = rng.uniform(-0.14, 0.14, count), rng.uniform(-0.19, 0.19, count)
+        rig = Rig(friction=np.abs(rng.normal(0.0, 0.2, count)), taper=taper, rest_curvature=bend)
+    by_table, exactly = (RecordLikelihood(record, CELL, friction, exact) for exact in (False, True))
+    loads, usable = by_table.predict(drawn, rig)
+    exact, usable_exactly = exactly.predict(drawn, rig)
+    turned = exactly.predict(drawn, rig._replace(drive_angle_offset=turn))[0]
+    assert np.count_nonzero(usable != usable_exactly) <= 2
+    both = np.all([np.any(found != 0.0, axis=-1) for found in (loads, exact, turned)], axis=0)
+    sample = exactly.segments.of_sample
+    largest = np.stack([np.abs(exact[:, sample == k]).max(axis=1) for k in np.unique(sample)], axis=1)[:, sample]
+    slack = 1e-5 * largest + 1e-6 / turn * np.abs(turned - exact)
+    assert np.count_nonzero(both) > 5_000
+    assert np.all((np.abs(loads - exact) <= slack)[both])
+
+
+def test_a_drive_that_repeats_itself_is_followed_once_and_has_one_discrepancy():
+    """Two sweeps through the same poses, and the same with the second further on by less than what matters."""
+    there, contour = Translation((0.8, 0.0), np.pi, 1.2, 1.6), Circle(0.3, 0.8)
+    whole = scan(contour, drive=[there, there], drive_step=0.05).record
+    measured = CELL.measure(whole, seed=1)
+    apart = measured.assign(base_x=measured.base_x - 1e-12 * (measured.sweep == 1))
+    once, twice = RecordLikelihood(measured, CELL), RecordLikelihood(apart, CELL)
+    assert [len(each.segments) for each in (once, twice)] == [1, 2]
+    contours = Circle(np.array([0.3, 0.305]), np.array([0.8, 0.8]), np.array([0.0, 0.01]))
+    np.testing.assert_allclose(once.log_likelihood(contours), twice.log_likelihood(contours), atol=1e-6)
+    np.testing.assert_array_equal(
+        once.predict(contours)[0][:, : measured.sizes["sample"] // 2],
+        once.predict(contours)[0][:, measured.sizes["sample"] // 2 :],
+    )
+    steps = [np.count_nonzero(np.isinf(each.segments.course.step)) for each in (once, twice)]
+    assert steps == [1, 2]
+    assert once.segments.ways(np.array([[0.5]])) == pytest.approx(twice.segments.ways(np.array([[0.5, 0.5]]))[:, :1])
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("rod", [Rod(rest_curvature=2.0), Rod(rest_curvature=lambda s: 2.0 + 0.3 * s)])
+def test_contours_that_release_a_rod_are_usable_in_a_likelihood_as_well(rod, friction):
+    """Where contact ends without force, only small errors decide whether the rod at rest still touches."""
+    at, rng = Parabola(1.0, 0.8315 if rod.profile is None else 0.81, 0.1), np.random.default_rng(1)
+    found = scan(at, rod=rod, friction=friction, drive_step=0.01)
+    assert "release" in {sweep.snap_off.kind for sweep in found.events.values()}
+    measured = CELL.measure(found.record, seed=1)
+    contours = Parabola(*(rng.normal(0.0, 1e-4, (3, 60)) + np.array([[at.a], [at.q], [at.x_c]])))
+    exact, fast = (RecordLikelihood(measured, CELL, friction, one, is_always_clear=False) for one in (True, False))
+    np.testing.assert_array_equal(fast.usable(contours), exact.usable(contours))
+    assert exact.usable(contours).any()
+
+
+@pytest.mark.parametrize("rig", ["straight", "arc", "curved by a function", "carried"])
+def test_the_length_of_a_rig_is_that_of_a_rod_of_the_same_proportions(rig):
+    """Against a likelihood for which the rod is stated, in SI units; with a suspension and a stem."""
+    shape = {
+        "arc": {"rest_curvature": 4.0, "stem": 0.003},
+        "curved by a function": {"rest_curvature": lambda s: 80.0 * s},
+    }
+    stated = Rod(0.1, 2e-4, diameter=5e-4, **shape.get(rig, {}))
+    longer = stated.reshaped(stated.mean_rest_curvature / 1.02, 0.0, length=0.102)
+    np.testing.assert_allclose(longer.mean_rest_curvature * longer.length, stated.mean_rest_curvature * stated.length)
+    drive = Motion([0.08, 0.0, -0.08], [0.0, 0.002, 0.0], [0.9, 1.1, 1.1]) if rig == "carried" else None
+    true = Circle(0.03, 0.045)
+    record = scan(true, rod=longer, drive=drive, friction=0.2).record
+    cell = LoadCell(force_noise=1e-4, moment_noise=1e-5)
+    contours = stack([true, Circle(0.0303, 0.0452)])
+    off = {
+        "friction": 0.2,
+        "suspension_compliance": np.full(2, 0.01),
+        "rigidity_scale": 1.1,
+        "drive_angle_offset": 1e-3,
+    }
+    for exact in (True, False):
+        known = RecordLikelihood(with_rod(record, longer), cell, exact=exact)
+        found = RecordLikelihood(with_rod(record, stated), cell, exact=exact)
+        # The compliance is in rad per EI/L of the stated rod.
+        expected, usable = known.predict(contours, Rig(**off | {"suspension_compliance": np.full(2, 0.01 / 1.02)}))
+        loads, usable_too = found.predict(contours, Rig(**off, length=1.02))
+        assert usable.all()
+        np.testing.assert_array_equal(usable_too, usable)
+        expected, loads = expected * longer.load_units, loads * stated.load_units
+        error = SHARE[exact] * np.abs(expected).max(axis=(0, 1))
+        assert np.all(np.abs(loads - expected) <= error)
+    events = [
+        events_of(likelihood, contours, Rig(**off | more))
+        for likelihood, more in (
+            (known, {"suspension_compliance": np.full(2, 0.01 / 1.02)}),
+            (found, {"length": np.full(2, 1.02)}),
+        )
+    ]
+    for name, expected in events[0].items():
+        np.testing.assert_allclose(events[1][name], expected, atol=1e-9, err_msg=name)

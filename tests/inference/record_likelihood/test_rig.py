@@ -1,0 +1,339 @@
+"""A rig inferred on a gauge, and its posterior as prior: against the truth and other priors, and what is refused."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+from helpers.contour_posteriors import CELL, QUICK, SOUND, assert_near, swept
+from helpers.refusals import refused
+from tactile_bayes.comparison.families import compare_families
+from tactile_bayes.contours import Circle, Parabola, from_function
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.contour import infer_contour, infer_rig
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.inference.parameters.nuisances import CURVE
+from tactile_bayes.inference.parameters.rig_prior import RigPrior, rig_prior
+from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.inference.streams.stream import Stream
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.record import with_rod
+from tactile_bayes.uncertainty.band import contour_band
+
+PIN, OBJECT = Circle(r=0.2, q=0.5), Parabola(0.7, 0.45)
+UNKNOWN = ("rigidity_scale", "drive_angle_offset", "lever")
+TRUE = {"rigidity_scale": 1.04, "drive_angle_offset": 0.01, "lever_x": 0.004, "lever_y": -0.003}
+NAMES = tuple(TRUE)
+
+
+def read(contour, seed, **options):
+    """A record with the true rig, whose header states an ideal one."""
+    lever = TRUE["lever_x"], TRUE["lever_y"]
+    gain = tuple(map(tuple, TRUE["rigidity_scale"] * np.eye(3)))
+    cell = replace(CELL, drive_angle_offset=TRUE["drive_angle_offset"], gain=gain, lever=lever)
+    record = cell.measure(swept(contour, step=0.05, **options), seed=seed)
+    record.attrs = {name: v for name, v in record.attrs.items() if not name.startswith("load_cell_")}
+    return record
+
+
+def read_from(*pivots):
+    """Sweeps of a record of the pin from some of its pivots."""
+    record = read(PIN, 1, bases=((0.0, 0.0), (0.1, 0.15)))
+    return record.isel(sample=np.isin(record.sweep.values // 2, pivots))
+
+
+@cache
+def rig_from(*pivots):
+    return infer_rig(read_from(*pivots), contour=PIN, load_cell=CELL, nuisances=UNKNOWN, seed=1, settings=SOUND)
+
+
+def rig():
+    return rig_from(0)
+
+
+@cache
+def rig_of_two():
+    """The rig from two records, one after the other."""
+    known = {"load_cell": CELL, "nuisances": UNKNOWN, "seed": 1, "settings": SOUND}
+    return infer_rig(read_from(1), contour=PIN, rig=rig(), **known)
+
+
+@cache
+def found(which):
+    known = {
+        "rig": {"nuisances": (), "rig": rig()},
+        "default": {"nuisances": UNKNOWN},
+        "truth": {"nuisances": (), "priors": {name: stats.norm(value, 1e-7) for name, value in TRUE.items()}},
+    }[which]
+    return infer_contour(read(OBJECT, 2), load_cell=CELL, seed=1, settings=SOUND, **known)
+
+
+def drawn(priors=("rigidity_scale", "lever_x"), **attrs):
+    """A posterior of a rig, as of `infer_rig`, with correlated draws."""
+    rng = np.random.default_rng(1)
+    scores = rng.standard_normal((20_000, len(priors)))
+    folded = np.abs(0.03 * rng.standard_normal(len(scores)))
+    scores[:, -1] = 0.8 * scores[:, 0] + 0.6 * scores[:, -1]
+    values = {"rigidity_scale": np.exp(0.01 * scores[:, 0]), "lever_x": 0.002 * scores[:, -1]}
+    values |= {"suspension_compliance": folded, "taper": np.abs(0.03 * scores[:, -1])}
+    draws = xr.Dataset({name: (("chain", "draw"), values[name][None]) for name in priors})
+    tree = xr.DataTree.from_dict({"posterior": draws})
+    stated = {"gauge": "", "converged": 1, "nuisances": json.dumps(list(priors)), "data_sha256": "0"}
+    stated |= {"load_cell_frame": "fixed", "rod_length": 1.0, "rod_flexural_rigidity": 1.0, "rod_diameter": 0.0}
+    tree.attrs = {**stated, "units": "dimensionless", **attrs}
+    return tree
+
+
+def test_the_rig_is_found_with_its_gauge():
+    assert_near(rig(), TRUE)
+    assert rig().attrs["gauge"] == repr(PIN)
+    assert list(rig()["posterior"].data_vars) == [*NAMES, "noise_scale"]
+
+
+def test_a_stem_is_found_and_lasts():
+    """The rod is stated to begin at the pivot, and begins 4 % of its length from there."""
+    true = Rod(stem=0.04)
+    record = CELL.measure(swept(PIN, step=0.05, rod=true), seed=1)
+    record = with_rod(record, Rod())
+    found = infer_rig(record, contour=PIN, load_cell=CELL, nuisances=["stem", "rigidity_scale"], seed=1, settings=SOUND)
+    assert_near(found, {"stem": 0.04, "rigidity_scale": 1.0})
+    assert float(found["posterior"].stem.std()) < 0.01
+    prior = rig_prior(found)
+    assert set(prior.priors) == {"stem", "rigidity_scale"}
+    model = Experiment(record, load_cell=CELL, nuisances=(), joint=prior).model
+    assert model.may_vanish[model.names.index("stem")]
+
+
+@pytest.mark.slow
+def test_two_records_tell_as_much_as_one_of_both():
+    """Of one pin, touched from two pivots.
+
+    A mean of 400 effective draws scatters by 0.05 deviations, a deviation by 4 %: limits are six times those of two
+    posteriors, which leaves room for the error of the density.
+    """
+    for name in NAMES:
+        both, one = rig_of_two()["posterior"][name], rig_from(0, 1)["posterior"][name]
+        assert abs(float(both.mean() - one.mean())) < 0.42 * float(one.std())
+        assert float(both.std()) == pytest.approx(float(one.std()), rel=0.25)
+        assert float(both.std()) < 0.9 * float(rig()["posterior"][name].std())
+    assert_near(rig_of_two(), TRUE)
+
+
+def test_a_record_counts_once():
+    first, second = rig_of_two(), read_from(1)
+    assert rig_prior(first).source.split() == [rig().attrs["data_sha256"], first.attrs["data_sha256"]]
+    assert rig_prior(first).error >= rig_prior(rig()).error
+    known = {"load_cell": CELL, "nuisances": UNKNOWN, "seed": 1, "settings": QUICK}
+    for record in (read_from(0), second):
+        with refused(ParameterError, "twice"):
+            infer_rig(record, contour=PIN, rig=first, **known)
+    with refused(ParameterError, "twice"):
+        infer_contour(second, rig=first, **known)
+
+
+def test_the_gauge_predicts_as_its_family():
+    """The same density as a family's at the gauge's parameters, up to the prior of these."""
+    record = read(PIN, 1)
+    known = Experiment(record, load_cell=CELL, nuisances=UNKNOWN, gauge=Gauge(PIN)).model
+    free = Experiment(record, "circle", CELL, nuisances=UNKNOWN).model
+    points = np.array([[*TRUE.values(), 1.0], [1.0, 0.0, 0.0, 0.0, 1.2]])
+    contour = np.tile([0.2, 0.5, 0.0], (2, 1))
+    expected = free.log_likelihood(np.hstack([contour, points]))
+    np.testing.assert_allclose(known.log_likelihood(points), expected, rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_band_with_the_rig_lies_between_those_of_no_and_of_full_knowledge():
+    x = np.linspace(-0.3, 0.3, 7)
+    bands = [contour_band(found(which), x, 0.9) for which in ("truth", "rig", "default")]
+    widths = [float((band.upper - band.lower).mean()) for band in bands]
+    assert 1.05 * widths[0] < widths[1] < widths[2] / 1.3
+    assert_near(found("rig"), {"a": 0.7, "q": 0.45, "x_c": 0.0, **TRUE})
+
+
+def test_the_density_is_that_of_a_multivariate_normal():
+    """Of log-normal and normal parameters: the fit of moments is the likeliest normal of (log x, y)."""
+    tree = drawn()
+    prior = rig_prior(tree)
+    draws = np.stack([tree["posterior"][name].values[0] for name in prior.priors], axis=1)
+    flat = np.column_stack([np.log(draws[:, 0]), draws[:, 1]])
+    expected = stats.multivariate_normal(flat.mean(axis=0), np.cov(flat.T, bias=True)).logpdf(flat) - flat[:, 0]
+    marginals = sum(p.logpdf(x) for p, x in zip(prior.priors.values(), draws.T, strict=True))
+    np.testing.assert_allclose(marginals + prior.log_dependence(draws), expected, rtol=1e-6, atol=1e-6)
+    assert prior.error < 0.05  # sampling error of a 5 % quantile of 20,000 draws: 0.015
+    again = prior.draw(np.random.default_rng(2), 20_000)
+    np.testing.assert_allclose(np.corrcoef(np.log(again[:, 0]), again[:, 1])[0, 1], 0.8, atol=0.02)
+
+
+def test_a_parameter_that_may_vanish_has_a_density_at_zero():
+    prior = rig_prior(drawn(("rigidity_scale", "suspension_compliance")))
+    assert prior.priors["suspension_compliance"].cdf(0.03) == pytest.approx(0.683, abs=0.03)
+    assert prior.error < 0.15
+
+
+def test_the_error_shows_a_dependence_that_is_not_normal():
+    """A folded normal parameter, dependent on another but uncorrelated with it."""
+    assert rig_prior(drawn(("rigidity_scale", "taper"))).error > 0.2
+
+
+def test_independent_parameters_are_as_priors_given_by_hand():
+    """Without correlations the log-prior is the sum of marginals."""
+    prior = rig_prior(drawn())
+    alone = RigPrior(prior.priors, np.eye(2), 0.0, "0")
+    record = read(OBJECT, 2)
+    joint = Experiment(record, load_cell=CELL, nuisances=(), joint=alone).model
+    by_hand = Experiment(record, load_cell=CELL, nuisances=(), priors=prior.priors).model
+    assert joint.names == by_hand.names
+    points = by_hand.draw_prior(np.random.default_rng(1), 50)[0]
+    np.testing.assert_allclose(joint.log_prior(points), by_hand.log_prior(points), rtol=1e-12)
+
+
+def test_draws_from_the_prior_have_the_correlations():
+    model = Experiment(read(OBJECT, 2), load_cell=CELL, nuisances=(), joint=rig_prior(drawn())).model
+    points = model.draw_prior(np.random.default_rng(1), 2000)[0]
+    i, j = model.names.index("rigidity_scale"), model.names.index("lever_x")
+    assert np.corrcoef(points[:, i], points[:, j])[0, 1] == pytest.approx(0.8, abs=0.05)
+
+
+@pytest.mark.slow
+def test_a_stored_posterior_has_the_same_prior():
+    tree = infer_contour(read(OBJECT, 2), load_cell=CELL, nuisances=(), rig=rig(), seed=1, settings=QUICK)
+    model = experiment_of(tree).model
+    points = np.array([[0.7, 0.45, 0.0, *TRUE.values(), 1.0]])
+    given = Experiment(read(OBJECT, 2), load_cell=CELL, nuisances=(), joint=rig_prior(rig())).model
+    np.testing.assert_allclose(model.log_prior(points), given.log_prior(points), atol=0.02)  # six digits of priors
+
+
+@pytest.mark.slow
+def test_families_are_compared_with_the_rig():
+    """One parameter has no correlations: its prior given by hand has the same evidence, up to the error of bridges."""
+    record, alone = read(OBJECT, 2), drawn(("rigidity_scale",))
+    priors = dict.fromkeys(("parabola", "circle"), rig_prior(alone).priors)
+    known = {"families": list(priors), "load_cell": CELL, "nuisances": (), "leave_one_out": False, "seed": 1}
+    with_rig = compare_families(record, rig=alone, settings=SOUND, **known)
+    by_hand = compare_families(record, priors=priors, settings=SOUND, **known)
+    assert with_rig.attrs["most_probable"] == "parabola"
+    evidences = (one["log_evidence"].sel(family="parabola") for one in (with_rig, by_hand))
+    assert abs(float(next(evidences) - next(evidences))) < 0.2
+    with refused(ParameterError, "rod_length"):
+        compare_families(record, rig=drawn(rod_length=0.1), settings=QUICK, **known)
+
+
+@pytest.mark.slow
+def test_its_dependence_counts_as_the_prior_of_the_rig(monkeypatch):
+    """What is left for the likelihood is the likelihood."""
+    from tactile_bayes.assessment import prior_sensitivity as module
+
+    tree, parts = found("rig"), []
+    monkeypatch.setattr(
+        module, "_weights", lambda part, power: parts.append(part) or np.full(part.shape, 1 / part.size)
+    )
+    model = experiment_of(tree).model
+    module.prior_sensitivity(tree, model, {})
+    points = np.stack([tree["posterior"][name].values for name in model.names], axis=-1)
+    expected = model.log_likelihood(points[:, :5].reshape(-1, len(model.names)))
+    offset = parts[-1][:, :5].ravel() - expected
+    np.testing.assert_allclose(offset, offset[0], atol=0.05)  # six digits of priors
+
+
+def test_what_a_record_does_not_show_is_left_out_and_what_it_cannot_tell_is_kept():
+    record = read(OBJECT, 2)
+    record["holding_moment"] = record.holding_moment * np.nan
+    model = Experiment(record, load_cell=CELL, nuisances=(), joint=rig_prior(drawn())).model
+    assert "rigidity_scale" in model.names
+    assert "lever_x" not in model.names
+    forward = read(OBJECT, 2).isel(sample=read(OBJECT, 2).direction.values == "forward")
+    backlash = RigPrior({"backlash": stats.norm(0.0, 0.002)}, np.eye(1), 0.0, "0")
+    assert "backlash" in Experiment(forward, load_cell=CELL, nuisances=(), joint=backlash).model.names
+
+
+def test_others_are_refused():
+    record = read(OBJECT, 2)
+    infer = {"load_cell": CELL, "nuisances": (), "seed": 1, "settings": QUICK}
+    with refused(InferenceError, "infer_rig"):
+        infer_contour(record, rig=found_nothing(), **infer)
+    with refused(InferenceError, "converged"):
+        infer_contour(record, rig=drawn(converged=0), **infer)
+    with refused(InferenceError, "lasts"):
+        infer_contour(record, rig=drawn(nuisances='["friction"]'), **infer)
+    with refused(ParameterError, "units"):
+        infer_contour(record, rig=drawn(units="SI"), **infer)
+    with refused(ParameterError, "lever_x"):
+        infer_contour(record, rig=drawn(), priors={"lever_x": stats.norm(0.0, 0.1)}, **infer)
+    with refused(ParameterError, "rod_length"):
+        infer_contour(record, rig=drawn(rod_length=0.1), **infer)
+    with refused(ParameterError, "load_cell_drive_angle_offset"):
+        infer_contour(record, rig=drawn(load_cell_drive_angle_offset=0.1), **infer)
+
+
+def test_other_gauges_are_refused():
+    record = read(PIN, 1)
+    for contour in ("circle", Circle(r=[0.2, 0.3], q=0.5), from_function(lambda x: 0.5 + x * x, (-1.0, 1.0))):
+        with refused(ParameterError, "contour"):
+            infer_rig(record, contour=contour, seed=1)
+    with refused(ParameterError, "nuisances"):
+        infer_rig(record, contour=PIN, nuisances=(), seed=1)
+
+
+def found_nothing():
+    tree = drawn()
+    del tree.attrs["gauge"]
+    return tree
+
+
+@pytest.mark.slow
+def test_a_sensor_in_counts_is_calibrated_on_a_gauge_whose_place_is_uncertain():
+    """From the moment alone, whose reading is a curve; the object is then inferred with it."""
+    true = {"moment_gain": 1.1, "moment_curve_quadratic": 0.06, "moment_curve_cubic": 0.03}
+    true |= {"gauge_x": 0.01, "gauge_y": -0.006}
+    stated = LoadCell(moment_noise=5.0, gain=counts(900.0))
+    real = LoadCell(moment_noise=5.0, gain=counts(900.0 * 1.1), moment_curve=(0.06, 0.03))
+
+    def read_by(sensor, contour, seed):
+        record = sensor.measure(swept(contour, step=0.05), seed=seed)
+        record.attrs = {name: v for name, v in record.attrs.items() if not name.startswith("load_cell_")}
+        return record.assign({name: np.nan * record[name] for name in ("force_x", "force_y")})
+
+    known = {"load_cell": stated, "seed": 1, "settings": SOUND}
+    wide = {"moment_gain": stats.lognorm(s=0.3)}
+    place = Circle(r=0.2, q=0.5 - 0.006, x_c=0.01)
+    calibrated = infer_rig(
+        read_by(real, place, 1), contour=PIN, nuisances=("gauge", "moment_curve", "moment_bias"), priors=wide, **known
+    )
+    assert_near(calibrated, true)
+    assert set(rig_prior(calibrated).priors) == {"moment_gain", *CURVE}
+    posterior = infer_contour(read_by(real, OBJECT, 2), nuisances=("moment_bias",), rig=calibrated, **known)
+    assert_near(posterior, {"a": 0.7, "q": 0.45, **{name: true[name] for name in ("moment_gain", *CURVE)}})
+    with refused(ParameterError, "gauge"):
+        infer_contour(read_by(real, OBJECT, 2), nuisances=("gauge_x",), **known)
+
+
+def counts(gain):
+    return ((gain, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@pytest.mark.slow
+def test_a_stream_takes_it_as_prior(tmp_path):
+    """Its posterior is that of the whole record, within their Monte-Carlo errors: a quarter of a deviation."""
+    record, known = read(OBJECT, 2), {"load_cell": CELL, "nuisances": [], "seed": 1, "rig": rig()}
+    stream = Stream(**known, particles=500)
+    for block in np.array_split(np.arange(record.sizes["sample"]), 3):
+        stream.update(record.isel(sample=block))
+    found = stream.posterior()
+    whole = infer_contour(record, **known, settings=QUICK)
+    assert found.attrs["rig_density_error"] == whole.attrs["rig_density_error"]
+    assert list(found["posterior"].data_vars) == list(whole["posterior"].data_vars)
+    for name, draws in whole["posterior"].data_vars.items():
+        assert abs(float(found["posterior"][name].median() - draws.median())) < 0.5 * float(draws.std()), name
+    stream.save(tmp_path / "stream.nc")
+    Stream.resume(tmp_path / "stream.nc", **known, particles=500)
+    with refused(InferenceError, "rig_parameters"):
+        Stream.resume(tmp_path / "stream.nc", **{**known, "rig": None}, particles=500)
+    with refused(ParameterError, "inferred from this very record"):
+        Stream(**known).update(read_from(0))

@@ -1,0 +1,128 @@
+"""Coordinates of a flank: a bijection of the contour's parameters, and its Jacobian determinant."""
+
+import numpy as np
+import pytest
+
+from tactile_bayes.calibration.calibrate import calibration_replicate, experiment_of
+from tactile_bayes.calibration.simulation import simulate
+from tactile_bayes.contours import Ellipse, PowerLaw
+from tactile_bayes.inference.ensembles import Logarithms
+from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
+from tactile_bayes.inference.starts.flank_coordinates import FlankCoordinates
+
+PLACE = 0.1
+BASES = {
+    "power-law": Logarithms(np.array([True, False, False, False, True])),
+    "ellipse": Logarithms(np.array([True, True, False, False, True])),
+}
+FLANKS = pytest.mark.parametrize(("family", "side"), [(name, side) for name in BASES for side in (-1.0, 1.0)])
+
+
+def flank(family, side, x=PLACE):
+    return FlankCoordinates(family, BASES[family], x, side)
+
+
+def points_of(family, side, count=50):
+    """Two sizes, q, x_c and a size of the rig, the vertex on one side of the place."""
+    rng = np.random.default_rng(3)
+    first, distance, size = np.exp(rng.normal(-0.5, 0.7, (3, count)))
+    second = 1.1 + 3.0 * rng.random(count)
+    if family == "ellipse":  # which ends at its half-axis
+        first = distance / (0.05 + 0.9 * rng.random(count))
+    return np.stack([first, second, rng.normal(size=count), PLACE - side * distance, size], axis=1)
+
+
+@FLANKS
+def test_coordinates_of_points_lead_back_to_them(family, side):
+    points = points_of(family, side)
+    there, _ = flank(family, side).parameters(flank(family, side).of(points))
+    np.testing.assert_allclose(there, points, rtol=1e-9, atol=1e-11)
+
+
+@FLANKS
+def test_they_are_slope_shape_height_and_slope_ratio_at_the_place(family, side):
+    """The contour's own slope and curvature, from its class, at the place."""
+    points = points_of(family, side)
+    found = flank(family, side).of(points)
+    for point, row in zip(points, found, strict=True):
+        contour = (PowerLaw.of_width if family == "power-law" else Ellipse)(*point[:4])
+        height, slope_angle = contour.height(PLACE), contour.locate(contour.parameter_of_x(PLACE)).slope_angle
+        slope = np.tan(slope_angle)
+        assert np.sign(slope) == side
+        bend = (1.0 + slope**2) ** 1.5 / contour.radius_of_curvature(slope_angle)
+        # Of an ellipse, with the circle of which it is a shadow.
+        shape = point[1] - 1.0 if family == "power-law" else np.tan(np.arcsin(abs(PLACE - point[3]) / point[0]))
+        np.testing.assert_allclose(
+            row, [np.log(abs(slope)), np.log(shape), height, np.log(abs(slope) / bend), np.log(point[4])], rtol=1e-9
+        )
+
+
+@FLANKS
+def test_volumes_grow_as_the_determinant_of_the_jacobian_says(family, side):
+    """By differences of third order, whose errors are a millionth."""
+    coordinates = flank(family, side)
+    for place in coordinates.of(points_of(family, side, 10)):
+        steps = 1e-4 * np.eye(5)
+        ends = [coordinates.parameters(place + k * steps)[0] for k in (-2, -1, 1, 2)]
+        jacobian = (ends[0] - 8.0 * ends[1] + 8.0 * ends[2] - ends[3]) / 12e-4
+        growth = coordinates.parameters(place[None])[1]
+        np.testing.assert_allclose(np.linalg.slogdet(jacobian)[1], growth, atol=1e-6)
+
+
+@FLANKS
+def test_vertices_on_the_other_side_have_none(family, side):
+    found = flank(family, side).of(points_of(family, -side))
+    assert np.isnan(found[:, [0, 3]]).any(axis=1).all()
+
+
+def test_a_checkpoint_distinguishes_them():
+    proposal = Mixture((Proposal(np.zeros(5), np.eye(5)),))
+    several = [flank("power-law", *where) for where in ((1.0, 0.1), (-1.0, 0.1), (1.0, 0.2))]
+    several += [flank("ellipse", 1.0, 0.1), several[0].with_proposal(proposal)]
+    assert len({one.digest for one in several} | {BASES["power-law"].digest}) == 6
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_flank_of_joined_contours_is_that_of_its_own_parameters(side):
+    """Beside parameters of the other flank, which stay as they are."""
+    points = points_of("ellipse", side)
+    other = np.linspace(0.5, 2.0, len(points))
+    alone = flank("ellipse", side)
+    columns = (1, 2, 3, 4) if side > 0.0 else (0, 1, 3, 4)
+    base = Logarithms(np.array([True, True, True, False, False, True]))
+    joined = FlankCoordinates("ellipse", base, PLACE, side, columns)
+    at = 0 if side > 0.0 else 2
+    both = np.insert(points, at, other, axis=1)
+    np.testing.assert_allclose(joined.of(both), np.insert(alone.of(points), at, np.log(other), axis=1))
+    there, growth = joined.parameters(joined.of(both))
+    np.testing.assert_allclose(there, both, rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(growth, alone.parameters(alone.of(points))[1] + np.log(other))
+
+
+@pytest.mark.parametrize(("contour", "flank"), [("parabola/power-law", "power-law"), ("ellipse/parabola", None)])
+def test_of_joined_contours_the_flank_that_was_touched_counts(contour, flank):
+    """A record of the right flank alone, which is none of an ellipse where that is on the left."""
+    replicate = experiment_of(family=contour, seed=2026)
+    measured = simulate(replicate, np.random.default_rng(1)).measured
+    model = replicate.problem_of(measured).model
+    point = np.concatenate([[0.7, 1.3, 1.6][: len(model.family.parameters) - 2], [0.3, -0.9]])
+    found = FlankCoordinates.at_contacts(model, np.append(point, model.prior_medians(model.names[point.size :])))
+    assert found is None if flank is None else (found.flank, found.side) == (flank, 1.0)
+    if found is not None:
+        assert [model.names[k] for k in found.columns] == ["right_w", "right_n", "q", "x_c"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("family", "number"),
+    [
+        *(("power-law", number) for number in (15, 25, 43, 65, 373, 420)),
+        *(("ellipse", number) for number in (39, 51, 53)),
+        ("parabola/power-law", 54),
+    ],
+)
+def test_a_flank_known_to_a_hundred_thousandth_is_found_and_sampled(family, number):
+    """Pivots next to the object, loads of up to 65,000 times their noise: replicates of the published calibration."""
+    replicate = calibration_replicate(number, family=family, seed=2026)
+    assert replicate.outcome.ranks, replicate.outcome.message
+    assert replicate.outcome.numbers["converged"] == 1.0

@@ -1,0 +1,183 @@
+"""Where walkers start: optimum and cloud, for problems whose answer is known."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.starts.start import gather, optima
+
+DESIGN = np.random.default_rng(1).normal(size=(50, 2))
+TRUE = np.array([3.0, -0.02])
+SPREAD = np.array([10.0, 0.1])
+MIDDLE = TRUE
+
+
+def best_optimum(*problem, **options):
+    return min(optima(*problem, **options), key=lambda found: found.cost)
+
+
+def linear(data):
+    return lambda points: data - points / SPREAD @ DESIGN.T
+
+
+def test_optimum_of_a_linear_problem():
+    noise = 0.1 * np.random.default_rng(2).normal(size=50)
+    data = DESIGN @ (TRUE / SPREAD) + noise
+    found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
+    # Residuals far below _HUBER_THRESHOLD: robust and plain least squares agree to their square over 4 · 2².
+    expected = np.linalg.lstsq(DESIGN, data, rcond=None)[0] * SPREAD
+    np.testing.assert_allclose(found.point, expected, rtol=0.02)
+    information = DESIGN.T @ DESIGN + np.eye(2)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(information) * np.outer(SPREAD, SPREAD), rtol=0.02)
+    np.testing.assert_allclose(found.residuals, linear(data)(found.point[None])[0])
+
+
+def test_a_jump_at_the_optimum_is_no_slope():
+    """A sample that lets go of the object right there does not say how sure the rest is."""
+    data = DESIGN @ (TRUE / SPREAD)
+
+    def jumping(points):
+        lost = np.where(points[:, :1] > TRUE[0] + 2e-5 * SPREAD[0], 20.0, 0.0)
+        return np.hstack([linear(data)(points), lost])
+
+    found = best_optimum(jumping, np.zeros((1, 2)), MIDDLE, SPREAD)
+    assert abs(found.point[0] - TRUE[0]) < 5e-5 * SPREAD[0]
+    information = DESIGN.T @ DESIGN + np.eye(2)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(information) * np.outer(SPREAD, SPREAD), rtol=0.02)
+
+
+def test_an_outlier_pulls_little():
+    data = DESIGN @ (TRUE / SPREAD)
+    data[7] += 1000.0
+    found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
+    # By least squares it would pull by 1000 · |design| / 50, some 20 spreads; so by about 2 · |design| / 50.
+    assert np.all(np.abs(found.point - TRUE) < 0.2 * SPREAD)
+
+
+def test_a_tight_prior_is_heeded():
+    """Data say 3.0 with a deviation of about 10/√50; a prior that is a million times tighter wins."""
+    spread = np.array([1e-6, 0.1])
+    found = best_optimum(lambda p: linear(DESIGN @ (TRUE / SPREAD))(p), MIDDLE[None], np.array([2.0, -0.02]), spread)
+    assert found.point[0] == pytest.approx(2.0, abs=1e-5)
+    assert found.covariance[0, 0] == pytest.approx(1e-12, rel=0.5)
+
+
+def test_the_better_of_two_valleys_is_taken():
+    def residuals(points):
+        return np.where(points > 0.0, points - 1.0, 0.25 * (points + 1.0) ** 2 + 2.0) + np.zeros((1, 3))
+
+    for order in ([[-1.5], [0.7]], [[0.7], [-1.5]]):
+        assert best_optimum(residuals, np.array(order), np.ones(1), np.ones(1)).point == pytest.approx(1.0)
+
+
+def test_a_search_from_far_off_is_as_good_as_one_from_near():
+    """Residuals of thousands pull by their squares at first, else forty steps would not lead here."""
+    data = 1e4 * DESIGN @ (TRUE / SPREAD)
+    found = best_optimum(lambda p: data - 1e4 * p / SPREAD @ DESIGN.T, [100.0 * SPREAD], MIDDLE, SPREAD)
+    np.testing.assert_allclose(found.point, TRUE, rtol=1e-6)
+    assert found.fits
+
+
+def test_to_be_far_from_the_prior_costs_its_square():
+    """One datum of ten deviations against a prior as sharp: both give way alike, though data alone may be outliers."""
+    found = best_optimum(lambda p: 10.0 - p / SPREAD[:1], [np.zeros(1)], np.zeros(1), SPREAD[:1])
+    robust = found.residuals[0] / np.sqrt(1.0 + (found.residuals[0] / 2.0) ** 2)
+    assert found.point[0] / SPREAD[0] == pytest.approx(robust, rel=1e-4)
+
+
+COVARIANCE = np.array([[1.0, 0.6], [0.6, 0.5]]) * 1e-4
+
+
+def gaussian(points):
+    return np.atleast_1d(stats.multivariate_normal([1.0, 2.0], COVARIANCE).logpdf(points))
+
+
+def test_a_good_guess_is_kept_and_its_cloud_is_twice_as_wide():
+    cloud = gather(gaussian, np.array([1.0, 2.0]), COVARIANCE, np.random.default_rng(1))
+    np.testing.assert_array_equal(cloud.centre, [1.0, 2.0])
+    np.testing.assert_allclose(cloud.root @ cloud.root.T, 4.0 * COVARIANCE)
+    # Hardly any point misses the floor: χ² of two degrees above 2 · 24 / 4 is rarer than 0.3 %.
+    points = cloud.draw(np.random.default_rng(2), 1000)
+    assert np.mean(gaussian(points) > cloud.floor) > 0.98
+
+
+@pytest.mark.parametrize("width", [1e-2, 1.0, 100.0])
+def test_a_bad_guess_is_mended(width):
+    guess = np.array([1.0, 2.0]) + 0.3 * np.array([1.0, -1.0])
+    cloud = gather(gaussian, guess, width * np.eye(2), np.random.default_rng(1))
+    points = cloud.draw(np.random.default_rng(2), 1000)
+    good = points[gaussian(points) > cloud.floor]
+    assert len(good) > 300
+    # Nothing hopeless: all within √(2 (12 · 2 + some)) standard deviations, yet at least as wide as the target.
+    assert gaussian(good).min() > gaussian(np.array([1.0, 2.0])) - 24.0 - 5.0
+    assert np.all(good.std(axis=0) > 0.8 * np.sqrt(np.diag(COVARIANCE)))
+
+
+def test_a_sharp_peak_is_not_left_for_what_lies_around_it():
+    """Nearly all points of a wide cloud are hopeless beside its centre: it shrinks, and does not move away."""
+
+    def sharp(points):
+        apart = np.abs(points - np.array([1.0, 2.0])).max(axis=1)
+        return np.where(apart < 1e-3, gaussian(points), -1e5 - 1e3 * points[:, 0])
+
+    cloud = gather(sharp, np.array([1.0, 2.0]), np.eye(2), np.random.default_rng(1))
+    points = cloud.draw(np.random.default_rng(2), 1000)
+    assert np.mean(sharp(points) > -100.0) > 0.3
+
+
+def test_a_wall_is_respected():
+    def walled(points):
+        return np.where(points[:, 0] > 1.0, gaussian(points), -np.inf)
+
+    cloud = gather(walled, np.array([0.5, 2.0]), np.eye(2), np.random.default_rng(1))
+    points = cloud.draw(np.random.default_rng(2), 1000)
+    assert np.mean(walled(points) > cloud.floor) > 0.15
+
+
+def test_a_search_that_ends_beyond_what_is_possible_goes_on_inside():
+    """Of two parameters that are told apart by the data the one at its end stays there, the other moves freely."""
+    data = DESIGN @ (TRUE / SPREAD)
+    free = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
+    low, high = free.point - np.array([10.0, 0.5]) * SPREAD, free.point + np.array([10.0, -0.1]) * SPREAD
+    found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD, low, high)
+    np.testing.assert_allclose(found.beyond, free.point)
+    assert found.point[1] == pytest.approx(high[1], abs=1e-3 * SPREAD[1])
+    assert np.all((found.point > low) & (found.point < high))
+    assert found.excess == pytest.approx(found.cost - free.cost)
+    assert found.excess > 0.0
+
+
+PASSED = Deadline.after(0.0)
+
+
+def test_past_the_deadline_one_candidate_has_to_do():
+    """With the covariance that belongs to it, and no word of what lies beyond what is possible."""
+    data = DESIGN @ (TRUE / SPREAD)
+    first, second = TRUE + 5.0 * SPREAD, TRUE
+    found = best_optimum(linear(data), np.array([first, second]), MIDDLE, SPREAD, deadline=PASSED)
+    np.testing.assert_allclose(found.point, first, rtol=1e-14)
+    np.testing.assert_allclose(found.residuals, linear(data)(first[None])[0])
+    assert np.all(np.linalg.eigvalsh(found.covariance) > 0.0)
+    low = first + SPREAD
+    inside = best_optimum(linear(data), np.array([first]), MIDDLE, SPREAD, low, deadline=PASSED)
+    assert inside.beyond is None
+    assert np.all(inside.point > low)
+
+
+def test_past_the_deadline_a_cloud_is_left_as_wide_as_it_is_and_has_no_floor():
+    far = np.array([1.0, 2.0]) + 0.3 * np.array([1.0, -1.0])
+    cloud = gather(gaussian, far, np.eye(2), np.random.default_rng(1), PASSED)
+    np.testing.assert_array_equal(cloud.centre, far)
+    np.testing.assert_allclose(cloud.root @ cloud.root.T, 4.0 * np.eye(2), rtol=1e-12)
+    assert cloud.floor_by(PASSED) == -np.inf
+    assert cloud.floor_by(NEVER) == cloud.floor > -np.inf
+
+
+def test_past_the_deadline_a_cloud_is_sought_as_long_as_little_of_it_is_possible():
+    def walled(points):
+        return np.where(np.abs(points - [1.0, 2.0]).max(axis=1) < 1e-4, 0.0, -np.inf)
+
+    cloud = gather(walled, np.array([1.0, 2.0]), np.eye(2), np.random.default_rng(1), PASSED)
+    points = cloud.draw(np.random.default_rng(2), 10_000)
+    assert np.mean(np.isfinite(walled(points))) > 0.02  # more than 6 of 120 were: 1 % of seeds, if it is less

@@ -1,0 +1,277 @@
+"""The posterior of a growing record, against the posterior of the whole record."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+import tactile_bayes as tb
+from helpers.refusals import refused
+from tactile_bayes.errors import InferenceError, ParameterError, RecordError
+from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour_evidence import contour_evidence
+from tactile_bayes.inference.contour_problem import contour_problem
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.streams.stream import surprise_after
+
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+X = [-0.2, 0.0, 0.2]
+
+
+@pytest.fixture(scope="module")
+def measured():
+    scan = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.1)
+    return CELL.measure(scan.record, seed=1)
+
+
+def stream_of(**changes):
+    return tb.Stream(**({"load_cell": CELL, "nuisances": [], "seed": 1, "particles": 500, "x": X} | changes))
+
+
+def fed(stream, measured, blocks):
+    parts = np.array_split(np.arange(measured.sizes["sample"]), blocks)
+    return [stream.update(measured.isel(sample=part)) for part in parts]
+
+
+@pytest.fixture(scope="module")
+def streamed(measured):
+    stream = stream_of(stop=lambda now: now.samples > 50)
+    return stream, fed(stream, measured, 4)
+
+
+@pytest.fixture(scope="module")
+def whole(measured):
+    problem = contour_problem(Experiment(measured, "parabola", CELL, nuisances=[]))
+    return problem, sampled(problem, seed=2, settings=tb.SamplerSettings(min_ess=1000))
+
+
+@pytest.mark.slow
+def test_the_last_update_agrees_with_the_whole_record(streamed, whole):
+    last, draws = streamed[1][-1], whole[1].draws.samples.reshape(-1, 4)
+    expected, deviation = np.quantile(draws, last.level.values, axis=0), draws.std(axis=0)
+    assert np.abs((last.parameters.values - expected) / deviation)[1:-1].max() < 0.25
+    assert np.abs((last.parameters.values - expected) / deviation).max() < 0.5
+    band = tb.contour_band(whole[1].tree, X)
+    width = band["upper"].values - band["lower"].values
+    assert np.abs(last.height.sel(level=0.025).values - band["lower"].values).max() < 0.15 * width.max()
+    assert np.abs(last.height.sel(level=0.975).values - band["upper"].values).max() < 0.15 * width.max()
+    assert last.correlation < 0.2
+
+
+@pytest.mark.slow
+def test_the_evidence_agrees_with_bridge_sampling(streamed, whole):
+    problem, found = whole
+    expected = contour_evidence(problem.model, found, np.random.default_rng(3)).log_evidence[1]
+    assert abs(float(streamed[1][-1].log_evidence) - expected) < 1.5
+
+
+@pytest.mark.slow
+def test_one_block_and_many_agree(streamed, measured):
+    (once,) = fed(stream_of(seed=5), measured, 1)
+    last = streamed[1][-1]
+    spread = once.parameters.sel(level=0.975) - once.parameters.sel(level=0.025)
+    assert float((abs(once.parameters - last.parameters).sel(level=0.5) / spread).max()) < 0.1
+    assert abs(float(once.log_evidence - last.log_evidence)) < 1.5
+
+
+@pytest.mark.slow
+def test_the_result_grows_with_the_record(streamed, measured):
+    results = streamed[1]
+    assert [int(now.samples) for now in results] == [28, 56, 84, measured.sizes["sample"]]
+    assert [bool(now.may_stop) for now in results] == [False, True, True, True]
+    assert all(now.seconds > 0.0 and 0.0 < now.effective_number <= 500.0001 for now in results)
+    xr.testing.assert_equal(streamed[0].record.drive_angle.drop_vars("sample", errors="ignore"), measured.drive_angle)
+
+
+def test_the_posterior_is_one_of_a_contour(streamed, measured):
+    tree = streamed[0].posterior()
+    assert tree["posterior"].sizes == {"chain": 1, "draw": 500}
+    assert tree.attrs["converged"] == 1
+    assert tb.contour_band(tree, [0.0])["median"].values == pytest.approx([0.5], abs=0.005)
+    assert tb.gap(tree).sizes["stroke"] == 2
+    tb.to_arviz(tree)
+
+
+@pytest.mark.slow
+def test_particles_that_have_lost_the_posterior_are_told(streamed, measured):
+    """They climb towards it as soon as they move."""
+    assert 0.0 < float(streamed[1][-1].log_density_shift) < 1.0
+    stream = stream_of(particles=200)
+    stream.update(measured.isel(sample=slice(0, 40)))
+    assert stream.posterior().attrs["converged"] == 1
+    state = stream._state
+    lost = state.points + [4.0, 0.0, 0.0, 0.0] * state.points.std(axis=0)
+    stream._state = replace(state, points=lost, values=state.experiment.model.log_probability(lost))
+    assert stream.update(measured.isel(sample=slice(40, 109))).steps > 0
+    stream.update(measured.isel(sample=slice(109, None)))
+    assert float(stream.latest().log_density_shift) > 1.2
+    posterior = stream.posterior()
+    assert posterior.attrs["converged"] == 0
+    assert "they have lost the posterior" in posterior.attrs["message"]
+
+
+@pytest.mark.slow
+def test_a_wrong_model_shows_early_and_a_right_one_never(streamed):
+    assert all(float(now.e_value) < 2.0 for now in streamed[1])
+    sliding = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.05, friction=0.2).record
+    stream = stream_of(particles=200)
+    first, *_, last = fed(stream, CELL.measure(sliding, seed=1).isel(sample=slice(0, 60)), 4)
+    assert float(first.e_value) < 2.0
+    assert float(last.e_value) > 1000.0
+
+
+def test_an_e_value_is_of_the_blocks_since_the_model_went_wrong():
+    """Against the sum over all blocks from which it may be wrong."""
+    ratios = np.random.default_rng(1).normal(-0.5, 1.0, (6, 3))
+    state, largest = None, -np.inf
+    for count in range(1, 7):
+        products, surprise = surprise_after(state, ratios[count - 1])
+        weights = [1.0 / (k * (k + 1.0)) for k in range(1, count + 1)]
+        value = sum(w * np.exp(ratios[k:count].sum(axis=0)).mean() for k, w in enumerate(weights)) + 1.0 - sum(weights)
+        largest = max(largest, value)
+        assert np.exp(surprise) == pytest.approx(largest, rel=1e-12)
+        state = SimpleNamespace(updates=count - 1, log_products=products, surprise=surprise)
+
+
+def test_samples_without_contact_are_informative(measured):
+    stream = stream_of(particles=200)
+    now = stream.update(measured.isel(sample=slice(0, 5)))
+    assert np.isfinite(float(now.log_evidence))
+
+
+@pytest.mark.slow
+def test_a_seed_reproduces(measured):
+    one, other = (fed(stream_of(particles=100), measured.isel(sample=slice(0, 20)), 2)[-1] for _ in range(2))
+    xr.testing.assert_identical(one.drop_vars("seconds"), other.drop_vars("seconds"))
+
+
+def spoilt(block):
+    return block.assign(force_x=block.force_x.where(np.arange(block.sizes["sample"]) != 1))
+
+
+REFUSED = {
+    "force_x": spoilt,
+    "drive angle": lambda block: block.isel(sample=slice(None, None, -1)),
+    "holding_moment": lambda block: block.drop_vars("holding_moment"),
+    "load_cell_frame": lambda block: block.assign_attrs(load_cell_frame="turning"),
+    "xarray": lambda block: None,
+}
+
+
+def test_refusals_leave_the_stream_as_it_was(measured):
+    stream, untouched = stream_of(particles=100), stream_of(particles=100)
+    first, block = measured.isel(sample=slice(0, 12)), measured.isel(sample=slice(12, 20))
+    stream.update(first)
+    untouched.update(first)
+    for what, change in REFUSED.items():
+        with pytest.raises(RecordError, match=what):
+            stream.update(change(block))
+    one, other = stream.update(block), untouched.update(block)
+    xr.testing.assert_identical(one.drop_vars("seconds"), other.drop_vars("seconds"))
+
+
+def test_samples_that_come_twice_or_late_are_refused(measured):
+    stream = stream_of(particles=100)
+    stream.update(measured.isel(sample=slice(0, 12)))
+    with pytest.raises(RecordError, match="behind the last one"):
+        stream.update(measured.isel(sample=slice(4, 12)))
+
+
+def test_arguments_are_checked():
+    with pytest.raises(ParameterError, match="particles"):
+        stream_of(particles=10)
+    with pytest.raises(ParameterError, match="stop"):
+        stream_of(stop=1)
+    with pytest.raises(InferenceError, match="no samples"):
+        stream_of().posterior()
+
+
+@pytest.mark.slow
+def test_the_backlash_enters_with_the_second_direction(measured):
+    stream = stream_of(nuisances=["standard"], particles=100)
+    turns = int((measured.direction.values == "forward").sum())
+    before = stream.update(measured.isel(sample=slice(0, turns)))
+    now = stream.update(measured.isel(sample=slice(turns, turns + 20)))
+    assert "backlash" not in before.parameter.values
+    assert "backlash" in now.parameter.values
+
+
+# --- The file of a stream -------------------------------------------------------------------------------------------
+
+SAVED = {"load_cell": CELL, "nuisances": [], "seed": 1, "particles": 100}
+
+
+@pytest.fixture(scope="module")
+def saved(measured, tmp_path_factory):
+    """A file after two blocks, and the result of a third one, of the stream that wrote the file."""
+    path, stream = tmp_path_factory.mktemp("stream") / "stream.nc", tb.Stream(**SAVED)
+    fed(stream, measured.isel(sample=slice(0, 30)), 2)
+    stream.save(path)
+    return path, stream.update(measured.isel(sample=slice(30, 45))), stream.posterior()
+
+
+@pytest.mark.parametrize("with_record", [False, True])
+def test_a_stream_that_goes_on_has_the_numbers_of_one_that_was_not_stopped(measured, saved, with_record):
+    path, expected, posterior = saved
+    stream = tb.Stream.resume(path, measured if with_record else None, **SAVED)
+    now = stream.update(measured.isel(sample=slice(30, 45)))
+    xr.testing.assert_identical(now.drop_vars("seconds"), expected.drop_vars("seconds"))
+    for group in ("posterior", "events", "posterior_predictive"):
+        xr.testing.assert_equal(stream.posterior()[group].to_dataset(), posterior[group].to_dataset())
+    assert stream.posterior().attrs["data_sha256"] == posterior.attrs["data_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"seed": 2}, "seed (was '1, pool of 4', now '2, pool of 4')"),
+        ({"family": "circle"}, "family (was 'parabola', now 'circle')"),
+        ({"particles": 200}, "particles (was '100', now '200')"),
+        ({"nuisances": ["friction"]}, "nuisances"),
+        ({"load_cell": tb.LoadCell(force_noise=0.06, moment_noise=0.02)}, "load_cell_force_noise"),
+        ({"priors": {"q": stats.norm(0.5, 0.1)}}, "priors"),
+        ({"record": "shorter"}, "samples (was '30', now '20')"),
+        ({"record": "another"}, "record (its SHA-256)"),
+    ],
+)
+def test_the_file_of_another_stream_is_refused_with_what_differs(measured, saved, change, words):
+    records = {"shorter": measured.isel(sample=slice(0, 20)), "another": measured.assign(force_x=-measured.force_x)}
+    change = {**change, "record": records.get(change.get("record"))}
+    with refused(InferenceError, words):
+        tb.Stream.resume(saved[0], **(SAVED | change))
+
+
+def test_a_prior_that_differs_in_no_printed_digit_is_refused(measured, tmp_path):
+    priors = [{"q": stats.norm(centre, 0.05)} for centre in (0.5, 0.5000004)]
+    stream = tb.Stream(**SAVED, priors=priors[0])
+    stream.update(measured.isel(sample=slice(0, 20)))
+    stream.save(tmp_path / "stream.nc")
+    with refused(InferenceError, "log-density of the particles"):
+        tb.Stream.resume(tmp_path / "stream.nc", **SAVED, priors=priors[1])
+
+
+def test_a_file_that_is_damaged_or_no_state_is_refused(measured, saved, tmp_path):
+    path = tmp_path / "stream.nc"
+    path.write_bytes(saved[0].read_bytes()[:-3000])
+    for where, words in ((path, "is damaged"), (tmp_path / "none.nc", "there is no file")):
+        with refused(InferenceError, words):
+            tb.Stream.resume(where, **SAVED)
+    tb.write_record(measured, path)
+    with refused(InferenceError, "holds no state of a stream"):
+        tb.Stream.resume(path, **SAVED)
+    with refused(InferenceError, "no samples yet"):
+        tb.Stream(**SAVED).save(path)
+
+
+def test_columns_of_the_users_own_survive_the_file(measured, tmp_path):
+    more = measured.assign(note=("sample", ["", "å"] * 10 + [""] * (measured.sizes["sample"] - 20)))
+    more = tb.make_record(dict(more.data_vars), attrs=more.attrs)
+    stream = tb.Stream(**SAVED)
+    stream.update(more.isel(sample=slice(0, 12)))
+    stream.save(tmp_path / "stream.nc")
+    resumed = tb.Stream.resume(tmp_path / "stream.nc", **SAVED)
+    xr.testing.assert_equal(resumed.record, stream.record)
+    assert resumed.update(more.isel(sample=slice(12, 14))).samples == 14

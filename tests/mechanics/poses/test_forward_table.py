@@ -1,0 +1,224 @@
+"""Poses and chords from tables against integrated ones."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+
+from helpers.profiled_rods import drawn_rods
+from tactile_bayes.mechanics.poses import beam, forward_table, profile_pose, taylor
+from tactile_bayes.mechanics.poses.forward_table import NO_TABLE, PARTS, Box
+from tactile_bayes.mechanics.poses.forward_table import forward_table as tabulated
+from tactile_bayes.mechanics.rods.profile import profile_of
+from tactile_bayes.mechanics.rods.rod import Rod
+
+_beam_of, _beam_pose, _chord_to, _prepare = beam.beam_of, beam.beam_pose, beam.chord_to, forward_table.prepare
+_Varied, _mirrored_beam = beam.Varied, beam.mirrored_beam
+_write_parts, _part_in, _has_parts = forward_table._write_parts, forward_table.part_in, forward_table.has_parts
+_State, _at_contact, _part_along = taylor.State, profile_pose.at_contact, profile_pose.part_along
+
+RODS = {name: drawn_rods()[name].profile for name in ("uniform", "half cone", "cone", "parabolic")}
+
+ERROR, ERROR_OF_SLOPES = 1e-5, 1e-3
+"""Largest errors of a pose, over the arc length, and of its derivatives by share of the ranges."""
+
+
+@numba.njit(error_model="numpy", _nrt=False)
+def _poses(varied, table, delta, psi1, arclength, force, tip, out):
+    profile = varied.profile
+    slenderness = table.slenderness if _prepare(table, profile, delta, varied.sheet) else 0.0
+    rod = _beam_of(
+        0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0), 0.0
+    )
+    for i in range(psi1.size):
+        for k, pose in enumerate(_beam_pose(rod, psi1[i], arclength[i], force[i], tip)):
+            out[i, k, 0], out[i, k, 1], out[i, k, 2] = pose
+    return slenderness > 0.0
+
+
+@numba.njit(error_model="numpy", _nrt=False)
+def _chords(varied, table, stem, mirrored, distances, out):
+    profile = varied.profile
+    slenderness = table.slenderness if _prepare(table, profile, 0.0, varied.sheet) else 0.0
+    rod = _beam_of(
+        0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0), stem
+    )
+    if mirrored:
+        rod = _mirrored_beam(rod)
+    for i in range(distances.size):
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = _chord_to(rod, distances[i])
+    return slenderness > 0.0
+
+
+def poses(profile, table, delta, psi1, arclength, force, tip):
+    """Poses and slopes, shape (n, 3, 3), and whether the table holds the rod."""
+    columns = [np.array(a, dtype=float) for a in np.broadcast_arrays(psi1, arclength, force)]
+    out = np.empty((columns[0].size, 3, 3))
+    return _poses(beam.varied(profile), table, delta, *columns, tip, out), out
+
+
+def length(profile, arclength):
+    """Λ of a rod without a rigidity profile."""
+    return arclength / (1.0 - profile.taper * arclength)
+
+
+def compared(profile, table, delta, seed=1):
+    """Compare poses before the thrust in all of a table's ranges, with those at their ends."""
+    rng = np.random.default_rng(seed)
+    share = np.concatenate([rng.uniform(size=200), [0.0, 1.0, 0.0, 1.0, 0.5]])
+    scaled = 18.0 * np.concatenate([rng.uniform(size=200), [0.0, 0.0, 1.0, 1.0, 0.0]])
+    for tip in (True, False):
+        psi1 = 1.39 * share - delta * (1.0 - share) if tip else np.full(share.size, -delta)
+        arclength = np.ones(share.size) if tip else np.maximum(share, 1e-3)
+        force = scaled / length(profile, arclength) ** 2
+        held, found = poses(profile, table, delta, psi1, arclength, force, tip)
+        _, exact = poses(profile, NO_TABLE, delta, psi1, arclength, force, tip)
+        assert held
+        before = exact[:, 0, 0] >= 0.0
+        scale = np.stack([arclength, arclength, np.ones(share.size)], axis=1)
+        np.testing.assert_array_less((np.abs(found - exact)[:, 0] / scale)[before], ERROR)
+        by_q = np.abs(found - exact)[:, 1]
+        by_force = np.abs(found - exact)[:, 2] / length(profile, arclength)[:, None] ** 2 / scale
+        assert by_q[before].max() < ERROR_OF_SLOPES
+        assert by_force[before].max() < ERROR_OF_SLOPES
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("rod", RODS)
+def test_poses_of_a_rod(rod, sign):
+    profile = RODS[rod]
+    table = tabulated(profile, Box((profile.taper,) * 2, (0.0, 0.0), (0.3, 0.3)))
+    compared(profile._replace(sign=sign), table, 0.3)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_poses_of_a_rod_with_a_bend_need_a_fine_table(sign):
+    profile = profile_of(lambda s: 1.5 + 1.5 * np.tanh((s - 0.65) / 0.2))._replace(sign=sign)
+    box = Box((0.0, 0.0), (0.0, 0.0), (0.0, 0.5))
+    assert tabulated(profile, box) is NO_TABLE
+    table = tabulated(profile, box, grade=1)
+    compared(profile, table, 0.3)
+    far = np.array([[-0.7, 1.0, 1.0], [2.5, 1.0, 1.0], [0.2, 1.0, 21.0]]).T
+    held, found = poses(profile, table, 0.0, *far, True)
+    assert held
+    np.testing.assert_array_equal(found, poses(profile, NO_TABLE, 0.0, *far, True)[1])
+
+
+@pytest.mark.parametrize("sign", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
+def test_poses_of_rods_between_nodes_and_at_the_ends_of_ranges(sign):
+    profile = profile_of(lambda s: 0.5 - s, 1.0, 0.5)
+    table = tabulated(profile, Box((0.35, 0.65), (-0.2, 0.2), (0.0, 0.5)))
+    for taper, bend, delta in ((0.35, 0.2, 0.0), (0.65, -0.2, 0.5), (0.41, 0.07, 0.2), (0.6, 0.0, 0.01)):
+        compared(profile._replace(taper=taper, bend=bend, sign=sign), table, delta)
+
+
+@pytest.mark.slow
+def test_beyond_its_ranges_a_pose_is_integrated():
+    """A table never extrapolates, in what differs between sweeps and in what differs in one."""
+    profile = RODS["half cone"]
+    table = tabulated(profile, Box((0.45, 0.55), (-0.1, 0.1), (0.0, 0.5)))
+    for far in ({"taper": 0.56}, {"taper": 0.44}, {"bend": -0.11}):
+        assert not poses(profile._replace(**far), table, 0.0, [0.1], [1.0], [1.0], True)[0]
+    assert not poses(profile, table, 0.51, [0.1], [1.0], [1.0], True)[0]
+    tip = np.array([[-1.1, 1.0, 1.0], [1.5, 1.0, 1.0], [0.2, 1.0, 40.0]]).T
+    tangential = np.array([[0.0, -0.01, 1.0], [0.0, 1.4, 1.0], [0.0, 0.5, 400.0]]).T
+    for places, is_tip in ((tip, True), (tangential, False)):
+        held, found = poses(profile, table, 0.0, *places, is_tip)
+        assert held
+        np.testing.assert_array_equal(found, poses(profile, NO_TABLE, 0.0, *places, is_tip)[1])
+
+
+@pytest.mark.parametrize("stem", [0.0, 0.2])
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("rod", ["half cone", "cone", "parabolic"])
+def test_chords_of_a_rod_at_rest(rod, mirrored, stem):
+    """Also beyond the tip, where it is continued as an arc, whose angle to the chord is exact without a stem."""
+    profile = RODS[rod]._replace(bend=0.1)
+    table = tabulated(profile, Box((profile.taper,) * 2, (-0.2, 0.2), (0.0, 0.0)))
+    distances = stem + np.array([0.01, 0.1, 0.3, 0.7, 0.9, 0.95])
+    found, exact = np.empty((2, distances.size, 4))
+    assert _chords(beam.varied(profile), table, stem, mirrored, distances, found)
+    assert not _chords(beam.varied(profile), NO_TABLE, stem, mirrored, distances, exact)
+    np.testing.assert_allclose(found, exact, atol=1e-7)
+    (beyond, exact), far = np.empty((2, 3, 4)), np.array([1.0, 1.2, 1.5])
+    _chords(beam.varied(profile), table, stem, mirrored, stem + far, beyond)
+    _chords(beam.varied(profile), NO_TABLE, stem, mirrored, stem + far, exact)
+    count = 1 if stem else 3
+    np.testing.assert_allclose(beyond[:count, 2:], exact[:count, 2:], atol=1e-6)
+
+
+def test_a_rod_that_needs_too_many_terms_has_no_table():
+    wavy = profile_of(lambda s: 4.0 * np.cos(40.0 * s))
+    for profile in (wavy, drawn_rods()["stepped"].profile):
+        assert tabulated(profile, Box((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))) is NO_TABLE
+
+
+def test_the_bound_of_the_rest_curvature_is_not_below_it():
+    for rod in drawn_rods().values():
+        for sign in (1.0, -1.0):
+            profile = rod.profile._replace(sign=sign, bend=0.1)
+            s = np.linspace(0.0, 1.0, 1001)
+            most = max(sign * (rod.curvature(at) + 0.1) for at in s)
+            assert bound(profile) >= most - 1e-9
+
+
+@numba.njit(error_model="numpy", _nrt=False)
+def bound(profile):
+    return _most(profile)
+
+
+_most = taylor.most_rest_curvature
+
+
+def test_strong_friction_of_a_hooked_rod_needs_a_small_range_of_the_force():
+    """A rod bent toward the object, that is pulled along it, is far from its rest shape under larger forces."""
+    profile = profile_of(lambda s: -2.6 * (1.0 + np.tanh((s - 0.75) / 0.12)))
+    box = Box((0.0, 0.0), (0.0, 0.0), (0.5, 0.7))
+    assert tabulated(profile, box, grade=1) is NO_TABLE
+    table = tabulated(profile, box, grade=2)
+    assert table is not NO_TABLE
+    rng, count = np.random.default_rng(1), 200
+    force, arclength, tangential = rng.uniform(0.0, 6.9, count), rng.uniform(0.05, 1.0, count), np.full(count, -0.6)
+    for sign, tip in ((1.0, True), (-1.0, True), (1.0, False), (-1.0, False)):
+        bent, ends = profile._replace(sign=sign), np.ones(count)
+        psi1 = rng.uniform(-0.6, 2.3, count) if tip else tangential
+        scaled = force if tip else force / arclength**2
+        held, found = poses(bent, table, 0.6, psi1, ends if tip else arclength, scaled, tip)
+        exact = poses(bent, NO_TABLE, 0.6, psi1, ends if tip else arclength, scaled, tip)[1]
+        assert held
+        before = exact[:, 0, 0] >= 0.0
+        assert np.abs(found - exact)[before, 0].max() < 1e-5
+
+
+@numba.njit(error_model="numpy", _nrt=False)
+def _write_distances(profile, psi1, forces, sheet, work, out):
+    """Distances of the ends of parts from those of the exact walk; NaN where parts do not hold."""
+    _write_parts(profile, sheet)
+    for i in range(psi1.size):
+        state, march = _State(psi1[i], 0.0, 0.0, 0.0), _at_contact(profile, psi1[i], 1.0)
+        for part in range(1, PARTS):
+            state = _part_in(sheet, psi1[i], forces[i], part, state)
+            march = _part_along(profile, march, 1.0 - part / PARTS, forces[i], work)
+            apart = np.hypot(state.u - march.state.u, state.v - march.state.v)
+            out[i, part] = apart if _has_parts(sheet, forces[i]) and march.state.u >= 0.0 else np.nan
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    "rod",
+    [
+        Rod(rest_curvature=lambda s: 1.5 + 1.5 * np.tanh((s - 0.65) / 0.2)),
+        Rod(rest_curvature=0.8, taper=0.5),
+        Rod(rest_curvature=0.8, taper=0.8),
+    ],
+    ids=["bent", "cone", "sharp cone"],
+)
+def test_parts_of_a_rod_in_tip_contact_lie_where_it_is(rod, sign):
+    """Under forces of all sizes for which they hold, with the moment of a push."""
+    rng, profile, out = np.random.default_rng(1), rod.as_profile()._replace(sign=sign), np.zeros((2000, PARTS))
+    forces = 10.0 ** rng.uniform(-4.0, 2.0, 2000)
+    _write_distances(profile, rng.uniform(-0.3, 1.4, 2000), forces, forward_table.sheet(), taylor.workspace(), out)
+    holds = np.isfinite(out).all(axis=1)
+    assert np.count_nonzero(holds) > 500
+    assert out[holds].max() < 4e-4
