@@ -28,6 +28,7 @@ from tactile_bayes.mechanics.poses.profile_shape import chord_along, rest_along
 from tactile_bayes.mechanics.poses.taylor import BACKWARD, State, cell_at, rest_curvature_at, rigidity_at, workspace
 from tactile_bayes.mechanics.rods.profile import Profile
 from tactile_bayes.numerics import chebyshev
+from tactile_bayes.tasks import in_parts
 
 __all__ = [
     "GRADES",
@@ -191,12 +192,16 @@ def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:
     A grade of 1 or 2 is a fine table. It has more terms, and smaller ranges of ψ1 and of the force, the smallest for 2,
     except that rods curved backward touch at larger ψ1: it holds rods of strong and uneven curvature, and costs more.
     """
-    table = _tabulated(profile, box, grade)
-    return table if _errors(profile, table).max() <= _WORST else NO_TABLE
+    middle = Box(*((0.5 * (low + high),) * 2 for low, high in box))
+    table = NO_TABLE
+    for each in dict.fromkeys((middle, box)):  # a single rod tells soon where terms are too few for all
+        table = _tabulated(profile, each, grade)
+        if _errors(profile, table).max() > _WORST:
+            return NO_TABLE
+    return table
 
 
 def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
-    work = workspace()
     rows, low, high, most = _ROWS, -box.friction_angle[1] - _BELOW, _PSI1, _FORCE
     if grade:
         rows, low, high = _MOST_ROWS, -box.friction_angle[1] - _FINE_BELOW, _FINE_PSI1
@@ -213,15 +218,21 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
     tip, tangential = np.empty((2, *outer[:2], rows, _TERMS, 3)), np.empty((2, *outer, 2, rows, _TERMS, 3))
     chord, distances = np.empty((2, outer[1], 3, _TERMS)), chebyshev.nodes(_TERMS)
     psi1, at_tip = low + (high - low) * ways, np.ones(rows)
-    for (i, sign), (b, bend) in product(enumerate((1.0, -1.0)), enumerate(bends)):
-        for a, taper in enumerate(tapers):
+    rods = list(product(enumerate((1.0, -1.0)), enumerate(bends), enumerate(tapers)))
+
+    def write(part: slice) -> None:
+        work = workspace()
+        for (i, sign), (b, bend), (a, taper) in rods[part]:
             rod = profile._replace(taper=taper, bend=bend, sign=sign)
             _write_poses(rod, psi1, at_tip, forces, slenderness, work, tip[i, a, b])
             for (d, delta), k in product(enumerate(deltas), range(2)):
                 lengths, out = (1.0 + _BEYOND * (1.0 - taper) * ways if k else ways), tangential[i, a, b, d, k]
                 _write_poses(rod, -delta * at_tip, lengths, forces, slenderness, work, out)
                 out[..., :2] /= lengths[:, None, None]
-        _write_chords(profile._replace(bend=bend, sign=sign), distances, work, chord[i, b])
+            if a == 0:  # the rod at rest does not depend on the taper
+                _write_chords(rod, distances, work, chord[i, b])
+
+    in_parts(write, len(rods), 1)
     felt = np.where(forces > 0.0, forces < _THRUST, _AT_ONSET)[:, None]
     return ForwardTable(
         _phase(tip[:, :, :, None], felt, loading),
