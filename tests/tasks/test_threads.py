@@ -13,7 +13,7 @@ from tactile_bayes.tasks import in_parts, one_thread
 
 @pytest.fixture(autouse=True)
 def three_threads(monkeypatch):
-    monkeypatch.setenv("NUMBA_NUM_THREADS", "3")
+    monkeypatch.setattr("numba.core.config.NUMBA_NUM_THREADS", 3)
 
 
 def seen(count, fewest):

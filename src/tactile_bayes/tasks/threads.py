@@ -61,7 +61,9 @@ def one_thread() -> Generator[None, None, None]:
 
 
 def _threads() -> int:
-    return int(os.environ.get("NUMBA_NUM_THREADS", cores()))
+    from numba.core import config  # numba takes a second to load
+
+    return int(vars(config)["NUMBA_NUM_THREADS"])  # from the environment, by default the number of cores
 
 
 @functools.cache
