@@ -122,3 +122,12 @@ def test_out_of_reach_there_is_no_fit():
     model = Experiment(record, load_cell=CELL, nuisances=[]).model
     starts = np.array([[0.5, 3.0, 0.0, 1.0]])
     assert Linearisation(model, SCALES).fits(model.likelihood.measured[None], starts) == [None]
+
+
+def test_differences_stay_within_the_bounds_of_parameters():
+    """A posterior that is wide over a parameter's size reaches the bound, at which there is no contour."""
+    record = CELL.measure(swept(Parabola(**TRUTH)), seed=11)
+    model = Experiment(record, load_cell=CELL, nuisances=[]).model
+    starts = np.array([[1e-3, TRUTH["q"], TRUTH["x_c"], 1.0]])
+    (found,) = Linearisation(model, np.array([10.0, *SCALES[1:]])).fits(model.likelihood.measured[None], starts)
+    assert np.isfinite(found.residuals).all()

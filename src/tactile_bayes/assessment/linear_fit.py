@@ -143,7 +143,7 @@ class Linearisation:
             for name, known in zip(names, precision, strict=True)
         ]
         self._mean, self._prior = np.array(means), precision * self._scales**2
-        margin, ends = _DIFFERENCE * self._scales, model.ends
+        margin, ends = 2.0 * _DIFFERENCE * self._scales, model.ends  # differences stay within the bounds
         self._low, self._high = ends.low[: self._count] + margin, ends.high[: self._count] - margin
         self._shared: Whitening | None = None
         cell, (samples, channels) = model.likelihood.load_cell, model.likelihood.measured.shape
