@@ -27,6 +27,7 @@ from helpers.exact_rod import mp
 from helpers.single_states import states_at
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, paper_profile
 from tactile_bayes.errors import ContourError
+from tactile_bayes.mechanics.branches.curves import DIP
 from tactile_bayes.mechanics.elastica import tangential_arclength
 from tactile_bayes.mechanics.phases import NONE
 from tactile_bayes.mechanics.reachability import SnapOff
@@ -101,6 +102,7 @@ def check_against_forty_digits(scene):
 def check_that_it_rises(scene):
     """From first contact on the drive angle grows all the way to the snap-off, and falls after it.
 
+    Before a join, where the curvature jumps, it may fall by less than is a snap-off, and grow again.
     At 400 slope angles, the denser the nearer to the snap-off; the contour is asked for its states there, not the path.
     Rounding of the point that a slope angle stands for is 1e-15 over what a tip's onset makes of it.
     """
@@ -110,7 +112,8 @@ def check_that_it_rises(scene):
     side = 1.0 if scene.direction == "forward" else -1.0
     angles = side * equilibria(scene.contour, slopes, base=scene.base, direction=scene.direction).drive_angle.values
     assert np.isfinite(angles[:-1]).all()
-    assert np.all(np.diff(angles[:-1]) > -1e-10)
+    dip = DIP if isinstance(scene.contour, Joined) else 1e-10
+    assert np.all(np.maximum.accumulate(angles[:-1]) - angles[:-1] < dip)
     end = side * events.snap_off.drive_angle
     assert np.all(angles[:-1] <= end + 1e-12)
 
@@ -146,6 +149,13 @@ HARD = {
     "slim ellipse": Scene(Ellipse(0.07, 0.19, 0.85, 0.42), (0.0, 0.0), "backward"),
     "flat ellipse": Scene(Ellipse(5.0, 0.05, 0.3, 0.1)),
     "nearly square vertex": Scene(PowerLaw(6.8, 2.2, 0.54, -0.14), (0.06, 0.15), "backward"),
+    "a dip before a join": Scene(
+        Joined(
+            Parabola(1.000000100000005, 0.18313132137207438, 0.6255873257122484),
+            Parabola(6.000047198999893, 0.27490671355641705, 0.3164781380477987),
+            x=0.3223065825372089,
+        )
+    ),
     "two ellipses": Scene(Joined(Ellipse(2.7, 0.17, 0.15, -0.24), Ellipse(1.8, 0.17, 0.15, -0.24)), (0.21, -0.07)),
     "pivot below a slope": Scene(Joined(PowerLaw(0.34, 3.93, 0.26, 0.1), Ellipse(1.72, 0.11, 0.26, 0.1)), (0.57, 0.19)),
     # The path is not smooth where it ends, at the flat vertex.
