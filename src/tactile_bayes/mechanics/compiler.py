@@ -71,9 +71,7 @@ class _PartCompiler(CompilerBase):
 
 def compiled(function: Function) -> Function:
     """Compile a function as a part of its callers; Python cannot call it."""
-    options = {**_OPTIONS, "no_cpython_wrapper": True}
-    made: Function = numba.njit(function, pipeline_class=_PartCompiler, **options)
-    return made
+    return _part(function)
 
 
 def inlined(function: Function) -> Function:
@@ -81,7 +79,11 @@ def inlined(function: Function) -> Function:
 
     A call copies all fields of its arguments. For small functions of many fields that takes longer than they do.
     """
-    options = {**_OPTIONS, "no_cpython_wrapper": True, "forceinline": True}
+    return _part(function, forceinline=True)
+
+
+def _part(function: Function, **more: bool) -> Function:
+    options = {**_OPTIONS, "no_cpython_wrapper": True, **more}
     made: Function = numba.njit(function, pipeline_class=_PartCompiler, **options)
     return made
 
