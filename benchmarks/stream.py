@@ -6,12 +6,19 @@ it the truth has a rank among draws, and the band of 95 % is compared with it at
 vertex, all of them at once. The last update is compared with the posterior that `infer_contour` has of the whole
 record. A rule asks for a band that is nowhere wider than a tolerance. Records are kept in results/stream, from which a
 stopped run resumes.
+
+    python -m benchmarks.stream [RECORDS]
+    python -m benchmarks.stream --wrong [RECORDS]
+
+With --wrong, each record is of a rig or a shape that the model does not have, one of several, and its e-values are
+printed beside those of right models.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +26,11 @@ import numpy as np
 import xarray as xr
 
 import tactile_bayes as tb
-from tactile_bayes.calibration.calibrate import calibration_replicate
+from tactile_bayes.calibration.calibrate import calibration_replicate, experiment_of
 from tactile_bayes.calibration.ranks import uniformity_p_value
+from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.errors import StudyError, TactileBayesError
+from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.inference.streams.particles import SETTLED
 from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
 
@@ -35,6 +44,18 @@ TOLERANCES = (0.02, 0.01, 0.005)
 """Largest widths of the band [L] at which a rule stops."""
 ALARMS = (0.2, 0.05, 0.01, 0.001)
 """Rates of false alarms that an e-value may have at most."""
+
+WORLDS: Mapping[str, dict[str, Any]] = {
+    "none": {},
+    "friction of 0.1, not inferred": {"friction": 0.1},
+    "friction of 0.3, not inferred": {"friction": 0.3},
+    "rod tapered by 30 %": {"taper": 0.3},
+    "rod curved by 0.2/L": {"rest_curvature": 0.2},
+    "circle": {"family": "circle"},
+    "flat spot in the gap": {"flat_spot": (0.0, 2.0)},
+    "outliers (t, 2.5)": {"load_cell": replace(CELL, degrees_of_freedom=2.5)},
+}
+"""What the model does not have: it takes all for parabolas without friction and backlash."""
 
 Row = Mapping[str, Any]
 RECORDS = Kind("records", StudyError, dict, lambda row: {name: v for name, v in row.items() if name != "number"})
@@ -63,14 +84,57 @@ def one(task: tuple[tuple[()], int]) -> Row:
         return {"error": f"{number}: {error}"}
 
 
+def wrong(records: int = 20) -> None:
+    print(f"e-values of {records} records each; a right model exceeds 1,000 in at most 0.1 % of them\n")
+    print(
+        f"{'what the model does not have':<32}{'told (1,000)':>13}{'after':>8}{'told (20)':>11}{'no particle left':>18}"
+    )
+    for name in WORLDS:
+        folder = OUT / ("without-" + "".join(c if c.isalnum() else "-" for c in name))
+        with open_results_store({"world": repr(WORLDS[name]), "seed": str(SEED)}, folder, RECORDS) as store:
+            kept = keep_outcomes(store, surprised, name, records, workers=None, scheduler=None, progress=None)
+        every = [row["e_values"] for row in kept.values() if "error" not in row]
+        values = np.array([row + [row[-1]] * (BLOCKS - len(row)) for row in every])
+        told = values > 1000.0
+        early = told.any(axis=1)
+        after = f"{np.median(told[early].argmax(axis=1) + 1) / BLOCKS:.0%}" if early.any() else ""
+        some = (values[:, -1] > 20.0).mean()
+        ended = sum("error" in row or row["ended"] for row in kept.values())
+        print(f"{name:<32}{early.mean():>13.0%}{after:>8}{some:>11.0%}{ended:>18}", flush=True)
+
+
+def surprised(task: tuple[str, int]) -> Row:
+    """Return the e-values of one record of a world, and whether no particle explained it."""
+    name, number = task
+    nuisances = tuple(each for each in STANDARD if each not in ("friction", "backlash"))
+    experiment = experiment_of(
+        seed=SEED, load_cell=CELL, nuisances=nuisances, world=tb.Misspecification(**WORLDS[name])
+    )
+    random = np.random.default_rng(np.random.SeedSequence(SEED, spawn_key=(number,)))
+    try:
+        measured = simulate(experiment, random).measured
+    except TactileBayesError as error:
+        return {"error": f"{number}: {error}"}
+    stream = tb.Stream(load_cell=CELL, nuisances=nuisances, seed=number, particles=PARTICLES)
+    row: dict[str, Any] = {"e_values": [], "ended": False}
+    for block in np.array_split(np.arange(measured.sizes["sample"]), BLOCKS):
+        try:
+            row["e_values"].append(float(stream.update(measured.isel(sample=block)).e_value))
+        except TactileBayesError:
+            row["ended"] = True
+            break
+    return row
+
+
 def compared(measured: xr.Dataset, truth: Mapping[str, float], posterior: xr.DataTree, number: int) -> Row:
     x = float(posterior["posterior"]["x_c"].median()) + AROUND
     stream = tb.Stream(load_cell=CELL, seed=number, particles=PARTICLES, x=x)
     height = tb.contours.Parabola(truth["a"], truth["q"], truth["x_c"]).height(x)
-    row: dict[str, Any] = {"ranks": [], "held": [], "width": [], "seconds": []}
+    row: dict[str, Any] = {"ranks": [], "held": [], "width": [], "seconds": [], "stages": []}
     for k, block in enumerate(np.array_split(np.arange(measured.sizes["sample"]), BLOCKS), start=1):
         now = stream.update(measured.isel(sample=block))
         row["seconds"].append(float(now.seconds))
+        row["stages"].append(int(now.stages))
         low, high = now.height.sel(level=0.025).values, now.height.sel(level=0.975).values
         row["width"].append(float(np.max(high - low)))
         row["held"].append(bool(np.all((low <= height) & (height <= high))))
@@ -101,7 +165,9 @@ def report(rows: list[Row], errors: list[str]) -> None:
     print(f"{len(rows)} records; {len(errors)} ended with an error {'; '.join(errors)}")
     seconds = np.array([row["seconds"] for row in rows])
     print(f"an update takes {np.median(seconds):.2f} s (median), 5 to 95 %: {_range(seconds)}, the longest of a record")
-    print(f"{np.median(seconds.max(axis=1)):.2f} s (median)\n")
+    print(f"{np.median(seconds.max(axis=1)):.2f} s (median); without its first two, {_range(seconds[:, 2:])}")
+    moves = seconds / np.maximum([row["stages"] for row in rows], 1)
+    print(f"a stage takes {np.median(moves):.2f} s (median), 5 to 95 %: {_range(moves)}\n")
     print(f"{'of the record':<18}{'smallest p':>12}{'band holds':>12}{'width [L]':>12}")
     for k, (name, at) in enumerate(zip(QUARTERS, range(BLOCKS // 4 - 1, BLOCKS, BLOCKS // 4), strict=True)):
         names = sorted({one for row in rows for one in row["ranks"][k]})
@@ -144,4 +210,5 @@ def _share(held: Any) -> str:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    given = [int(argument) for argument in sys.argv[1:] if argument != "--wrong"]
+    wrong(*given) if "--wrong" in sys.argv else main(*given)

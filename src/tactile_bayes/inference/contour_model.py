@@ -64,6 +64,8 @@ class ContourModel:
         Names of the parameters of the forward model: those of contour and rig.
     names : tuple of str
         Names of all parameters.
+    of_path : list of int
+        Places of the parameters that change the path, or where along it the samples lie.
     low, high : ndarray, shape (d,)
         Bounds of the parameters, whatever the priors.
     likelihood : RecordLikelihood
@@ -96,7 +98,7 @@ class ContourModel:
             columns.setdefault(id(priors[name]), []).append(i)
         self._columns = [(log_density_of(priors[self.names[which[0]]]), which) for which in columns.values()]
         of_path = (*family.parameters, *nuisances.of_path)
-        self._of_path = [i for i, name in enumerate(self.forward_parameters) if name in of_path]
+        self.of_path = [i for i, name in enumerate(self.forward_parameters) if name in of_path]
         self._jointly = [self.names.index(name) for name in nuisances.joint.priors] if nuisances.joint else []
         rubs = bool(nuisances.friction) or "friction" in nuisances.names
         self.likelihood = RecordLikelihood(
@@ -180,7 +182,7 @@ class ContourModel:
 
         Points that differ only in what the load cell senses, as many do in differences, share one path.
         """
-        _, first, path = np.unique(points[:, self._of_path], axis=0, return_index=True, return_inverse=True)
+        _, first, path = np.unique(points[:, self.of_path], axis=0, return_index=True, return_inverse=True)
         different = points[first]
         loads, _, events = self.likelihood.predict_with_events(self.contours(different), self.rig(different))
         sensed = self.nuisances.sensed(loads[path], self.values(points), self.likelihood.load_cell)

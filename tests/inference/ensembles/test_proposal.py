@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from tactile_bayes.inference.ensembles import approximate
-from tactile_bayes.inference.ensembles.proposal import Ends, Mixture, Proposal
+from tactile_bayes.inference.ensembles.proposal import Ends, Proposal
 
 MEAN = np.array([1.0, -2.0, 0.5])
 ROOT = np.array([[0.01, 0.0, 0.0], [3.0, 2.0, 0.0], [10.0, -20.0, 50.0]])
@@ -125,25 +125,3 @@ def test_a_fit_continues_what_is_cut_off(middle):
     np.testing.assert_allclose(fitted.mean, [middle, 3.0], atol=0.06)
     wider = Proposal.fitted(points).root
     np.testing.assert_allclose(fitted.root @ fitted.root.T, wider @ wider.T, atol=0.06)
-
-
-def two_modes():
-    parts = [Proposal(MEAN, ROOT, 0.5, np.log(0.3)), Proposal(MEAN + 100.0, 0.5 * ROOT, 0.8, np.log(0.7))]
-    return Mixture(tuple(parts))
-
-
-def test_density_of_a_mixture_is_that_of_its_parts():
-    mixture = two_modes()
-    points, density = mixture.draw(np.random.default_rng(1), 50)
-    exact = [stats.multivariate_t(p.mean, p.root @ p.root.T, df=10).pdf(points) for p in mixture.parts]
-    expected = np.log(0.3 * exact[0] + 0.7 * exact[1])
-    np.testing.assert_allclose(density - density[0], expected - expected[0], atol=1e-9)
-    assert mixture.efficiency == pytest.approx(1.0 / (0.3 / 0.5 + 0.7 / 0.8))
-
-
-def test_draws_of_a_mixture_do_not_know_their_place():
-    """Each place has a draw of the first mode with probability 0.3: of 4000 draws, five standard errors are 0.036."""
-    points, _ = two_modes().draw(np.random.RandomState(1), 4000)
-    first = np.linalg.solve(ROOT, (points - MEAN).T)[0] < 5000.0
-    assert np.mean(first) == pytest.approx(0.3, abs=0.036)
-    assert np.mean(first[:2000]) == pytest.approx(0.3, abs=0.051)

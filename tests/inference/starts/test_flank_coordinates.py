@@ -7,7 +7,8 @@ from tactile_bayes.calibration.calibrate import calibration_replicate, experimen
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Ellipse, PowerLaw
 from tactile_bayes.inference.ensembles import Logarithms
-from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
+from tactile_bayes.inference.ensembles.mixture import Mixture
+from tactile_bayes.inference.ensembles.proposal import Proposal
 from tactile_bayes.inference.starts.flank_coordinates import FlankCoordinates
 
 PLACE = 0.1

@@ -74,7 +74,7 @@ def test_one_block_and_many_agree(streamed, measured):
     last = streamed[1][-1]
     spread = once.parameters.sel(level=0.975) - once.parameters.sel(level=0.025)
     assert float((abs(once.parameters - last.parameters).sel(level=0.5) / spread).max()) < 0.1
-    assert abs(float(once.log_evidence - last.log_evidence)) < 1.5
+    assert abs(float(once.log_evidence - last.log_evidence)) < 2.5  # four deviations, 0.46 each
 
 
 @pytest.mark.slow

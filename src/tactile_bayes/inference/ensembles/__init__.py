@@ -24,10 +24,11 @@ the walkers and the states of their random numbers, so that a killed run makes t
 
 from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithms, Plain, Proposing, in_coordinates
 from tactile_bayes.inference.ensembles.draws import Draws
+from tactile_bayes.inference.ensembles.mixture import Mixture
 from tactile_bayes.inference.ensembles.modes import Mode
 from tactile_bayes.inference.ensembles.moves import whitened_moves
 from tactile_bayes.inference.ensembles.pilot import learn_coordinates, standardise
-from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends, Mixture, Proposal, approximate
+from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
 from tactile_bayes.inference.ensembles.straightened import Straightened

@@ -7,8 +7,8 @@ from typing import Protocol, Self
 import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.inference.ensembles.mixture import Mixture
 from tactile_bayes.inference.ensembles.moves import Moves, standard_moves
-from tactile_bayes.inference.ensembles.proposal import Mixture
 from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = ["Coordinates", "Logarithms", "Plain", "Proposing", "Standardising", "in_coordinates"]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import emcee
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
+from tactile_bayes.inference.ensembles.mixture import Mixture
+from tactile_bayes.inference.ensembles.proposal import Proposal
 from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = ["FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "step_ensembles", "whitened_moves"]
@@ -78,20 +79,23 @@ class FixedMove(emcee.moves.RedBlueMove):
 
 
 class FittedMove(emcee.moves.RedBlueMove):
-    """Proposals from Student's t distribution, fitted to the half of the ensemble that does not move meanwhile.
+    """Proposals from a distribution that is fitted to the half of the ensemble that does not move meanwhile.
 
-    If a posterior is nearly normal, a walker forgets its position in a few steps. The proposal does not depend on the
-    moving half, so that the target stays invariant however bad the fit is. If the other half lies in a plane, no
-    distribution can be fitted, and no walker moves.
+    By default it is Student's t. If a posterior is nearly normal, a walker forgets its position in a few steps. The
+    proposal does not depend on the moving half, so that the target stays invariant however bad the fit is. If the other
+    half lies in a plane, no distribution can be fitted, and no walker moves.
 
     Proposals of this kind beside differential evolution are due to Boehl (2022), doi 10.2139/ssrn.4250395, who adapts
     them to the whole run instead.
     """
 
-    def __init__(self, columns: slice = slice(None)) -> None:
-        """Move the parameters in `columns` alone."""
+    def __init__(
+        self, columns: slice = slice(None), fit: Callable[[Floats], Proposal | Mixture] = Proposal.fitted
+    ) -> None:
+        """Move the parameters in `columns` alone, by what `fit` returns for points, shape (n, parameters)."""
         super().__init__()
         self._columns = columns
+        self._fit = fit
 
     def get_proposal(
         self, sample: Floats, complement: Sequence[Floats], random: np.random.RandomState
@@ -100,7 +104,7 @@ class FittedMove(emcee.moves.RedBlueMove):
         moving, others = sample[:, self._columns], np.concatenate(complement)[:, self._columns]
         proposed = sample.copy()
         try:
-            proposal = Proposal.fitted(others)
+            proposal = self._fit(others)
         except np.linalg.LinAlgError:
             return proposed, np.full(len(moving), -np.inf)
         proposed[:, self._columns], density = proposal.draw(random, len(moving))

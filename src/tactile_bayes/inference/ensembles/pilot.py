@@ -13,8 +13,9 @@ from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.block import Block, make_block
 from tactile_bayes.inference.ensembles.coordinates import Proposing, Standardising, in_coordinates
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time
+from tactile_bayes.inference.ensembles.mixture import Mixture
 from tactile_bayes.inference.ensembles.moves import Moves
-from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
+from tactile_bayes.inference.ensembles.proposal import Proposal
 from tactile_bayes.inference.ensembles.straightened import Straightened
 from tactile_bayes.inference.ensembles.target import LogProbability
 from tactile_bayes.inference.ensembles.walkers import RandomState, first_random_state

@@ -1,4 +1,4 @@
-"""Proposal distributions for walkers, and their efficiency for a target."""
+"""A proposal distribution for walkers, and its efficiency for a target."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["ANYTHING", "Ends", "Mixture", "Proposal", "Random", "approximate", "effective", "flattened"]
+__all__ = ["ANYTHING", "WIDENING", "Ends", "Proposal", "Random", "approximate", "effective", "flattened", "normalised"]
 
 _DEGREES_OF_FREEDOM = 10.0
 """Degrees of freedom of the t distribution: its tails are heavier than normal tails, at little cost."""
 
-_WIDENING = 1.1
+WIDENING = 1.1
 """Scale over that of the fitted points: too wide a proposal costs less than too narrow a one."""
 
 _ROUNDS = 8
@@ -134,7 +134,7 @@ class Proposal:
             along = correlation[:, j] / correlation[j, j]
             mean = mean + deviation * along * shift
             correlation = correlation + extra * np.outer(along, along)
-        return cls(mean, _WIDENING * deviation[:, None] * np.linalg.cholesky(correlation), ends=ends)
+        return cls(mean, WIDENING * deviation[:, None] * np.linalg.cholesky(correlation), ends=ends)
 
     @property
     def digest(self) -> str:
@@ -169,62 +169,6 @@ class Proposal:
         return float(np.log(np.diag(self.root)).sum())
 
 
-@dataclass(frozen=True, eq=False)
-class Mixture:
-    """Several proposals, each for a mode of the target.
-
-    Parameters
-    ----------
-    parts : tuple of Proposal
-    """
-
-    parts: tuple[Proposal, ...]
-
-    @property
-    def size(self) -> int:
-        """Number of coordinates."""
-        return self.parts[0].mean.size
-
-    @cached_property
-    def shares(self) -> Floats:
-        """Shares of the parts, in proportion to the target's integral; equal if no integral is known."""
-        masses = np.array([part.log_mass for part in self.parts])
-        return normalised(masses if np.any(np.isfinite(masses)) else np.zeros(masses.size))
-
-    @property
-    def efficiency(self) -> float:
-        """Efficiency of the mixture, as if each part covered its own mode alone."""
-        each = np.array([part.efficiency for part in self.parts])
-        return float(1.0 / np.sum(self.shares / each)) if np.all(each > 0.0) else 0.0
-
-    def with_efficiency(self, efficiency: float) -> Mixture:
-        """Return the mixture with another efficiency for all parts."""
-        return Mixture(tuple(replace(part, efficiency=efficiency) for part in self.parts))
-
-    @property
-    def digest(self) -> str:
-        """Identity of the mixture, as text."""
-        return hashlib.sha256("".join(part.digest for part in self.parts).encode()).hexdigest()
-
-    def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
-        """Return points and their log-density, as `Proposal.draw` does."""
-        points = self.parts[0].ends.drawn(lambda count: self.draw_unbounded(random, count), count)
-        return points, self.log_density(points)
-
-    def draw_unbounded(self, random: Random, count: int) -> Floats:
-        """Return points of the mixture without bounds, as `Proposal.draw_unbounded` does."""
-        counts = random.multinomial(count, self.shares)
-        parts = [part.draw_unbounded(random, int(each)) for part, each in zip(self.parts, counts, strict=True)]
-        return np.concatenate(parts)[random.permutation(count)]
-
-    def log_density(self, points: Floats) -> Floats:
-        """Return the log-density, as `Proposal.log_density` does."""
-        with np.errstate(divide="ignore"):  # a part without mass has no share
-            shares = np.log(self.shares)
-        each = [share + part.log_density(points) for share, part in zip(shares, self.parts, strict=True)]
-        return np.asarray(np.logaddexp.reduce(each))
-
-
 def approximate(
     log_probability: LogProbability,
     centre: Floats,
@@ -240,7 +184,7 @@ def approximate(
     gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin & Robert 2004, doi
     10.1198/106186004X12803). After the deadline there is no further round.
     """
-    proposal = Proposal(centre, _WIDENING * np.asarray(np.linalg.cholesky(covariance)), ends=ends)
+    proposal = Proposal(centre, WIDENING * np.asarray(np.linalg.cholesky(covariance)), ends=ends)
     best = proposal
     for _ in range(_ROUNDS):
         if deadline.has_passed:

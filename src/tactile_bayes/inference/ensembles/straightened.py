@@ -9,8 +9,8 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
+from tactile_bayes.inference.ensembles.mixture import Mixture
 from tactile_bayes.inference.ensembles.moves import Moves, standard_moves
-from tactile_bayes.inference.ensembles.proposal import Mixture
 
 __all__ = ["Straightened"]
 
