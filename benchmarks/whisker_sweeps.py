@@ -7,13 +7,14 @@ the peak, over some 6 mm. Taken from that README are the direction of the whiske
 coordinates, and 4.1 mm between the hinge of the sensor and the first traced point. From that point the rod is 51 mm
 long: there it lets go of the smaller cylinder. Its rigidity is that of a wire of 0.24 mm, and scales the gain.
 
-    python -m benchmarks.whisker_sweeps [--stem] [--length] FOLDER [SWEEP ...]
+    python -m benchmarks.whisker_sweeps [--stem] [--length] [--shape-free] FOLDER [SWEEP ...]
 
 keeps the rig, every posterior and its figure in FOLDER, and goes on from there. SWEEP is like cylinder_may25/trial0, or
 cylinder_may25, the sweeps of a session in one record, which have one hysteresis if they repeat each other. With --stem
 the piece before the first traced point is rigid, and its length inferred, with a prior of 4.1 ± 2 mm. With --length the
 length of the rod is inferred from the sweeps, with a prior of ± 1.5 mm. Where a table shows that the rod lets go, after
-its record has ended, that is compared with what the posterior predicts.
+its record has ended, that is compared with what the posterior predicts. With --shape-free the contour need not be a
+circle, and how far the arc that was touched is from one is printed.
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ BEFORE = np.radians(-108.0)
 SWEEPS = tuple(f"cylinder_may25/trial{k}" for k in range(5)) + tuple(f"cylinder_may03/trial{k}" for k in range(1, 5))
 LONG = tb.SamplerSettings(walkers=40, min_ess=400, max_r_hat=1.03, max_seconds=420)
 ENOUGH = tb.SamplerSettings(min_ess=400, max_r_hat=1.03, max_seconds=300)
+ENOUGH_OF_ANY_SHAPE = tb.SamplerSettings(min_ess=400, max_r_hat=1.03, max_seconds=1200)
 
 
 def whisker(on_stem: bool = False) -> tb.Rod:
@@ -181,25 +183,59 @@ def calibrated(folder: Path, rod: tb.Rod) -> xr.DataTree:
     return tb.read_result(path)
 
 
-def measured(folder: Path, name: str, rod: tb.Rod, rig: xr.DataTree, of_any_length: bool = False) -> xr.DataTree:
+def measured(
+    folder: Path, name: str, rod: tb.Rod, rig: xr.DataTree, of_any_length: bool = False, of_any_shape: bool = False
+) -> xr.DataTree:
     """Return the posterior of the cylinder of a sweep, or of all sweeps of a session."""
-    path = folder / f"{name.replace('/', '-')}{'-length' if of_any_length else ''}.nc"
+    path = folder / f"{file_name(name, of_any_length, of_any_shape)}.nc"
     if not path.exists():
         priors = {"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(ON_SWEEPS, rod)}
         if of_any_length:
             priors["length"] = stats.norm(rod.length, FREE)
         found = tb.infer_contour(
             record_of(name, rod),
-            family="circle",
+            family="shape-free" if of_any_shape else "circle",
             load_cell=SENSOR,
             nuisances=("moment_bias", "friction", "discrepancy"),
             priors=priors,
             rig=rig,
             seed=1,
-            settings=ENOUGH,
+            settings=ENOUGH_OF_ANY_SHAPE if of_any_shape else ENOUGH,
         )
         tb.write_result(found, path)
     return tb.read_result(path)
+
+
+def file_name(name: str, of_any_length: bool, of_any_shape: bool) -> str:
+    """Return the name of a posterior's files, without an ending."""
+    return f"{name.replace('/', '-')}{'-length' if of_any_length else ''}{'-shape-free' if of_any_shape else ''}"
+
+
+def roundness(found: xr.DataTree) -> str:
+    """Return the radius of a circle fitted to the arc that was touched, and its largest distance from the arc."""
+    touched = np.nanquantile(tb.implied_contacts(found, draws=100)["posterior"].slope_angle, [0.02, 0.98])
+    draws = found["posterior"].dataset.stack(every=("chain", "draw"))
+    contours = contours_of(draws.isel(every=slice(None, None, max(1, draws.sizes["every"] // 200))), "shape-free")
+    radii, off = [], []
+    for k in range(*contours.shape):
+        x, y = (1e3 * each for each in contours.take(k).point(np.linspace(*touched, 60)))
+        twice_x, twice_y, rest = np.linalg.lstsq(np.stack([x, y, np.ones(x.size)], axis=1), x**2 + y**2)[0]
+        radii.append(np.sqrt(rest + (twice_x**2 + twice_y**2) / 4.0))
+        off.append(np.abs(np.hypot(x - twice_x / 2.0, y - twice_y / 2.0) - radii[-1]).max())
+    low, high = np.degrees(touched)
+    middle, least, most = np.quantile(radii, [0.5, 0.025, 0.975])
+    off_by, off_least, off_most = np.quantile(off, [0.5, 0.025, 0.975])
+    return (
+        f"slopes of {low:.0f} to {high:.0f}°: a circle of {middle:.2f} mm ({least:.2f} to {most:.2f}), off by at most "
+        f"{off_by:.2f} mm ({off_least:.2f} to {off_most:.2f})"
+    )
+
+
+def radius(found: xr.DataTree) -> str:
+    """Return the radius with its interval of 95 %."""
+    r = 1e3 * found["posterior"].r
+    low, high = r.quantile([0.025, 0.975]).values
+    return f"radius {float(r.mean()):.2f} mm ({low:.2f} to {high:.2f})"
 
 
 def releases(found: xr.DataTree, name: str, rod: tb.Rod) -> list[str]:
@@ -255,23 +291,23 @@ def picture(posterior: xr.DataTree) -> Figure:
 
 
 def main() -> None:
-    arguments = [argument for argument in sys.argv[1:] if argument not in ("--stem", "--length")]
+    arguments = [argument for argument in sys.argv[1:] if argument not in ("--stem", "--length", "--shape-free")]
     folder, names = Path(arguments[0]), arguments[1:] or SWEEPS
     folder.mkdir(parents=True, exist_ok=True)
     rod, began = whisker(on_stem="--stem" in sys.argv), perf_counter()
+    free = "--length" in sys.argv, "--shape-free" in sys.argv
     rig = calibrated(folder, rod)
     print(f"rig: {rig.attrs['message']} ({perf_counter() - began:.0f} s)")
     for name, draws in rig["posterior"].mean().items():
         print(f"  {name:24s} {float(draws):12.5g} ± {float(rig['posterior'][name].std()):.2g}")
     for name in names:
         began = perf_counter()
-        found = measured(folder, name, rod, rig, "--length" in sys.argv)
-        r, friction = (found["posterior"][one].values.ravel() for one in ("r", "friction"))
-        predicted = found["posterior_predictive"].holding_moment.mean(("chain", "draw"))
-        off = found["observed_data"].holding_moment - predicted
-        low, high = 1e3 * np.quantile(r, [0.025, 0.975])
+        found = measured(folder, name, rod, rig, *free)
+        friction = found["posterior"].friction.values.ravel()
+        off = found["observed_data"].holding_moment
+        off = off - found["posterior_predictive"].holding_moment.mean(("chain", "draw"))
         print(
-            f"{name}: radius {1e3 * r.mean():.2f} mm ({low:.2f} to {high:.2f}), friction {friction.mean():.2f} ± "
+            f"{name}: {roundness(found) if free[1] else radius(found)}, friction {friction.mean():.2f} ± "
             f"{friction.std():.2f}, residuals {float(np.sqrt((off**2).mean())):.1f} counts, "
             f"{perf_counter() - began:.0f} s; {found.attrs['message']}",
             flush=True,
@@ -279,7 +315,8 @@ def main() -> None:
         if "length" in found["posterior"]:
             length = 1e3 * found["posterior"].length
             print(f"  length {float(length.mean()):.1f} ± {float(length.std()):.1f} mm of {1e3 * rod.length:.1f} mm")
-        picture(found).savefig(folder / f"{name.replace('/', '-')}.png", dpi=110, bbox_inches="tight")
+        if not free[1]:
+            picture(found).savefig(folder / f"{file_name(name, *free)}.png", dpi=110, bbox_inches="tight")
         for words in releases(found, name, rod):
             print(f"  lets go at {words}")
 

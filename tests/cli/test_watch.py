@@ -14,12 +14,15 @@ import pytest
 from helpers import commands
 from helpers.report_pages import Page
 from tactile_bayes.cli import watching
+from tactile_bayes.contours import paper_profile
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell, RandomWalk
-from tactile_bayes.record import read_record
+from tactile_bayes.record import read_record, write_record
 from tactile_bayes.runs import contour as contour_run
+from tactile_bayes.runs import watch
 from tactile_bayes.runs.watch import open_watch
+from tactile_bayes.sweep import scan
 
 FEW = ("--as-stated", "--particles", 120)
 
@@ -257,6 +260,31 @@ def test_of_several_families_the_probabilities_are_told(path, lines, follow):
     assert said[0].startswith("60 samples, resumed; band up to ")
     assert said[1].startswith("    Probability of the shapes: parabola ")
     assert "Probability of the shapes" in (path.parent / "run" / "watch.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_wrong_model_is_told_once(path, follow, tmp_path):
+    """Friction that is not inferred."""
+    cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.05, friction=0.2).record, seed=1)
+    write_record(record.isel(sample=slice(0, 60)), tmp_path / "whole.csv")
+    text = (tmp_path / "whole.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    write(path, text[:-45])
+    result = follow(then=[partial(write, path, text[: len(text) - left]) for left in (30, 15, 0)])
+    assert result.exit_code == 0
+    assert result.stderr.count("samples are not what the shape, the rig and the noise predict (e-value") == 1
+    assert "--nuisance" in result.stderr
+
+
+@pytest.mark.slow
+def test_no_family_is_probable_while_an_evidence_is_too_small(path, lines, follow, monkeypatch):
+    monkeypatch.setattr(watch, "LOST_ONCE", -1.0)
+    head, rows = lines
+    write(path, head, rows[:60])
+    options = ("--family", "circle", "--family", "parabola", "--until-probability", 0.9)
+    said = follow(*options).stdout
+    assert "; too small for circle, parabola: their particles had lost the posterior for a while; parameters" in said
+    assert "Ended after 60 samples: no new rows for 0 s." in said
 
 
 def test_control_c_ends_it_with_the_answer(path, lines, monkeypatch):

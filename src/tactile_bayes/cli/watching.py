@@ -30,6 +30,9 @@ _STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl
 
 _PAGE = "watch.html"
 
+_SURPRISING = 1000.0
+"""E-value above which the model is wrong: a right one reaches it in one record of a thousand at most."""
+
 _RARE = 0.001
 """Smallest probability of a shape that is written out."""
 
@@ -221,6 +224,13 @@ class _Follower:
             self.tell(
                 f"earlier samples have changed or new ones do not follow in order: all {update.samples:,} taken again"
             )
+        if update.e_value > _SURPRISING >= self.e_value:
+            self.tell(
+                f"samples are not what the shape, the rig and the noise predict (e-value {update.e_value:.2g}, which a "
+                f"right model exceeds {_SURPRISING:,.0f} with in one record of a thousand at most): do not rely on the "
+                "band, and try another --family, or infer more of the rig (--nuisance)"
+            )
+        self.e_value = max(self.e_value, update.e_value)
         words = [
             *_families(update),
             f"{sentence(_band(update))}.",
@@ -323,8 +333,10 @@ def _families(update: WatchUpdate) -> list[str]:
     if not update.probabilities:
         return []
     in_order = sorted(update.probabilities.items(), key=lambda item: -item[1])
+    less = f"; too small for {', '.join(update.underrated)}: their particles had lost the posterior for a while"
     shares = [f"{name} {'<' if p < _RARE else ''}{percent(max(round(p, 3), _RARE))}" for name, p in in_order]
-    return [f"Probability of the shapes: {', '.join(shares)}; parameters are those of the first, the band is averaged."]
+    probable = f"{', '.join(shares)}{less if update.underrated else ''}"
+    return [f"Probability of the shapes: {probable}; parameters are those of the first, the band is averaged."]
 
 
 def _band(update: WatchUpdate) -> str:

@@ -17,6 +17,7 @@ from tactile_bayes.checks import check_numbers, check_positive, check_probabilit
 from tactile_bayes.comparison.streams import StreamComparison
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
+from tactile_bayes.inference.streams.particles import LOST_ONCE
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import record_hash
@@ -57,10 +58,13 @@ class WatchUpdate(NamedTuple):
     """Largest width of the band [length]; NaN without one."""
     probabilities: Mapping[str, float]
     """Probability of each family, if there are several."""
+    underrated: Sequence[str]
+    """Families whose evidence is too small, since their particles had lost the posterior for a while."""
     e_value: float
     """That of `Stream.update`; of several families the least; NaN if there is none."""
     enough: str
-    """Reason why measuring may stop; empty if it may not, or the particles have kept their places in the last moves."""
+    """Reason why measuring may stop; empty if it may not, or the posterior has not converged. Probabilities are none if
+    an evidence is too small."""
 
 
 @contextmanager
@@ -256,9 +260,12 @@ class Watch:
         posterior.attrs["samples_taken_every"] = self._every
         self.folder.write_posterior(posterior)
         self._answer = posterior, record
-        band, probabilities, latest = None, {}, stream.latest()
+        band, latest = None, stream.latest()
+        probabilities: dict[str, float] = {}
+        underrated: list[str] = []
         if isinstance(stream, StreamComparison):
             probabilities = dict(zip(latest.family.values.tolist(), latest.probability.values.tolist(), strict=True))
+            underrated = latest.family.values[latest.log_density_shift.values > LOST_ONCE].tolist()
         with suppress(InferenceError):  # nothing is touched yet
             x = reach(posterior) if self._x is None else self._x
             band = contour_band(latest if probabilities else posterior, x, self._probability)
@@ -274,8 +281,9 @@ class Watch:
             band=band,
             width=float(np.nanmax(widths)) if np.isfinite(widths).any() else np.nan,
             probabilities=probabilities,
+            underrated=underrated,
             e_value=float(latest.e_value.min()),
-            enough=self._enough(widths, probabilities) if posterior.attrs["converged"] else "",
+            enough=self._enough(widths, {} if underrated else probabilities) if posterior.attrs["converged"] else "",
         )
 
     def _stride(self, record: xr.Dataset, load_cell: LoadCell | None) -> int:
@@ -290,7 +298,7 @@ class Watch:
         """Return the first reason why measuring may stop."""
         if self._until_width is not None and np.all(widths < self._until_width):
             return "the band is narrow enough"
-        if self._until_probability is not None:
+        if self._until_probability is not None and probabilities:
             family = max(probabilities, key=probabilities.__getitem__)
             if probabilities[family] > self._until_probability:
                 return f"{family} is probable enough"

@@ -15,6 +15,7 @@ from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import contour_evidence
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.streams import particles
 from tactile_bayes.inference.streams.stream import surprise_after
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -96,21 +97,25 @@ def test_the_posterior_is_one_of_a_contour(streamed, measured):
 
 
 @pytest.mark.slow
-def test_particles_that_have_lost_the_posterior_are_told(streamed, measured):
-    """They climb towards it as soon as they move."""
-    assert 0.0 < float(streamed[1][-1].log_density_shift) < 1.0
+@pytest.mark.parametrize(("steps", "converged"), [(40, 1), (2, 0)])
+def test_particles_that_have_lost_the_posterior_find_it_again_or_tell(
+    streamed, measured, monkeypatch, steps, converged
+):
+    """They climb towards it as soon as they move, for as many steps as they have."""
+    last = streamed[1][-1]
+    assert abs(float(last.log_density_rise)) < 0.2
+    assert 0.0 <= float(last.log_density_shift) < 1.0
+    monkeypatch.setattr(particles, "_MOST_STEPS", steps)
     stream = stream_of(particles=200)
     stream.update(measured.isel(sample=slice(0, 40)))
-    assert stream.posterior().attrs["converged"] == 1
     state = stream._state
     lost = state.points + [4.0, 0.0, 0.0, 0.0] * state.points.std(axis=0)
     stream._state = replace(state, points=lost, values=state.experiment.model.log_probability(lost))
-    assert stream.update(measured.isel(sample=slice(40, 109))).steps > 0
-    stream.update(measured.isel(sample=slice(109, None)))
-    assert float(stream.latest().log_density_shift) > 1.2
-    posterior = stream.posterior()
-    assert posterior.attrs["converged"] == 0
-    assert "they have lost the posterior" in posterior.attrs["message"]
+    assert stream.update(measured.isel(sample=slice(40, None))).steps > 0
+    latest, posterior = stream.latest(), stream.posterior()
+    assert float(latest.log_density_shift) > 1.2
+    assert (float(latest.log_density_rise) < 0.4) == posterior.attrs["converged"] == converged
+    assert ("they had lost the posterior" in posterior.attrs["message"]) != converged
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from tactile_bayes.inference.ensembles.proposal import Proposal, effective
 from tactile_bayes.inference.streams.stream_state import StreamState
 from tactile_bayes.numerics.selection import resampled
 
-__all__ = ["DECORRELATED", "SETTLED", "WIDER", "Particles", "effective_number"]
+__all__ = ["DECORRELATED", "LOST_ONCE", "SETTLED", "WIDER", "Particles", "effective_number"]
 
 _LEAST_SHARE = 0.35
 """Effective number of particles over their number below which they are resampled and moved."""
@@ -29,14 +29,20 @@ DECORRELATED, _BRIDGED = 0.2, 0.35
 """Largest correlation of a parameter before and after the moves at which these end, after the last stage of an update
 and after each before it. With 0.5 in place of 0.35, evidences were too small by a factor of 0.7."""
 
-SETTLED = 1.2
+SETTLED = 0.4
 """Largest increase of the mean log-density in the moves of a stage, over its standard deviation, of particles that
-represent a posterior, whose moves change it by chance alone. With 1,000 particles and 12 blocks it was 4.7 in the one
-of 52 records whose posterior was lost, by nine standard deviations, and at most 0.6 in eight others; with 100 particles
-and one block 1.0 to 2.5, where medians were off by 2.6 to 16, and with 200 to 650 at most 1.1, where they were not."""
+represented a posterior before, whose moves change it by chance alone: with 1,000 particles it was 0.15 at most, and 0.5
+to 1.2 in the last stage of particles on their way to a posterior that was 4 to 54 deviations off."""
+
+LOST_ONCE = 1.2
+"""That increase in any stage, of particles that had lost the posterior for a while: evidences were then too small by
+7."""
+
+_RISING = 3.0
+"""Increase of the mean log-density in a step, over the standard error of that mean, from which moves go on."""
 
 _MOST_STEPS, _BRIDGE_STEPS = 40, 10
-"""Largest numbers of steps after these stages."""
+"""Largest numbers of steps after these stages; up to the first one while the log-density rises."""
 
 _PARTS = 8
 """Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28
@@ -84,6 +90,8 @@ class Particles:
         Largest correlation of a parameter before and after the last moves; NaN without moves.
     shift : float
         Largest increase of the mean log-density in the moves of a stage, over its standard deviation; 0 without moves.
+    rise : float
+        That increase in the moves of the last stage.
     log_ratios : ndarray, shape (factors,)
         Logarithms of the predictive density of the new samples with wider noise, over that with the model's.
     evaluations : int
@@ -96,7 +104,8 @@ class Particles:
 
     def __init__(self, model: ContourModel, old: StreamState | None, count: int, random: np.random.Generator) -> None:
         self.model = model
-        self.stages, self.steps, self.correlation, self.shift, self.evaluations = 0, 0, np.nan, 0.0, 0
+        self.stages, self.steps, self.evaluations = 0, 0, 0
+        self.correlation, self.shift, self.rise = np.nan, 0.0, 0.0
         self._random = np.random.RandomState(random.integers(2**32))
         self._generator = random
         self._before, self._added = _model_of(old), []
@@ -230,23 +239,27 @@ class Particles:
         at = coordinates.of(self.points)
         began = at
         ensemble = at[None]
-        _, growth = coordinates.parameters(at)
-        density = (_between(self.values, self._old, power) + growth)[None]
+        _, log_jacobian = coordinates.parameters(at)
+        density = (_between(self.values, self._old, power) + log_jacobian)[None]
         transformed = in_coordinates(target, coordinates)
         enough, at_first = DECORRELATED if last else _BRIDGED, density.mean()
-        for step in range(_MOST_STEPS if last else _BRIDGE_STEPS):
-            before, move = ensemble, self._next_move()
+        rises = False
+        for step in range(_MOST_STEPS):
+            before, move, was = ensemble, self._next_move(), density.mean()
             ensemble, density = step_ensembles(transformed, [(move, 1.0)], [self._random], ensemble, density)
             if move is self._fitted:
                 self._accepted = float(np.mean(np.any(ensemble != before, axis=-1)))
+                rises = density.mean() - was > _RISING * density.std() / np.sqrt(density.size)
             self.steps += 1
             self.correlation = _correlation(began, ensemble[0])
-            if step and self.correlation < enough:
+            is_enough = self.correlation < enough or (not last and step + 1 >= _BRIDGE_STEPS)
+            if step and is_enough and not rises:
                 break
-        self.shift = max(self.shift, float((density.mean() - at_first) / max(density.std(), 1e-12)))
-        self.points, growth = coordinates.parameters(ensemble[0])
+        self.rise = float((density.mean() - at_first) / max(density.std(), 1e-12))
+        self.shift = max(self.shift, self.rise)
+        self.points, log_jacobian = coordinates.parameters(ensemble[0])
         if last:
-            self.values = density[0] - growth
+            self.values = density[0] - log_jacobian
         else:
             self.values, self._old = self._both(self.points)
 

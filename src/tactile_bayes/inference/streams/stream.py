@@ -153,9 +153,10 @@ class Stream:
             `samples`, their number so far; `log_evidence`, the logarithm of the density of the record under the prior
             of contours within reach; `effective_number` of the particles; `stages` and `steps` of this update (0 if
             weights alone changed), and `correlation`, the largest one of a parameter before and after the last steps,
-            which end below 0.2, or after 40 (NaN without steps); `log_density_shift`, the largest increase of the mean
-            log-density in the steps of a stage so far, over its standard deviation: above 1.2 the posterior has been
-            lost, and it takes more particles from the start; `e_value`, above 1,000 for a model that is wrong, see
+            which end below 0.2, or after 40 (NaN without steps); `log_density_rise`, the increase of the mean
+            log-density in the steps of the last stage, over its standard deviation: above 0.4 the particles had lost
+            the posterior, and are on their way to it; `log_density_shift`, the largest one of a stage so far: above 1.2
+            `log_evidence` is too small; `e_value`, above 1,000 for a model that is wrong, see
             Notes of `Stream`; `seconds` that the update took; `parameters` by `parameter` and `level`, their quantiles;
             with `x`, `height` by `level` and `x`; with a rule, `may_stop`.
 
@@ -189,6 +190,7 @@ class Stream:
             share,
             advance.correlation if advance.steps else had,
             max(advance.shift, 0.0 if old is None else old.shift),
+            advance.rise if advance.steps or old is None else old.rise,
             surprise,
             updates,
             evaluations + advance.evaluations,
@@ -217,8 +219,8 @@ class Stream:
         """Return the posterior of the record so far, as `infer_contour` does, with equally weighted particles as draws.
 
         There is one chain, whose convergence is not judged by R̂: `converged` is 0 if the last moves of the particles
-        ended before they had lost their places, or the posterior was lost (`log_density_shift`), and the message states
-        their effective number. Where that is less than their number, some draws are repeated.
+        ended before they had lost their places, or they had lost the posterior (`log_density_rise`), and the message
+        states their effective number. Where that is less than their number, some draws are repeated.
 
         Raises
         ------
@@ -228,8 +230,8 @@ class Stream:
         state = self._known_state()
         model, random = state.experiment.model, self._random(1, state.updates)
         left = effective_number(state.log_weights)
-        if state.shift > SETTLED:
-            fault = "; not converged, they have lost the posterior: take more of them from the start"
+        if state.rise > SETTLED:
+            fault = "; not converged, they had lost the posterior and are on their way to it: take more from the start"
         elif state.correlation >= DECORRELATED:
             fault = f"; not converged, the last moves left a correlation of {state.correlation:.2f}: take more of them"
         else:
@@ -397,6 +399,7 @@ class Stream:
                 "effective_number": effective_number(state.log_weights),
                 "correlation": state.correlation,
                 "log_density_shift": state.shift,
+                "log_density_rise": state.rise,
                 "e_value": np.exp(state.surprise),
                 "parameters": (("level", "parameter"), _weighted_quantiles(points, weights)),
             },

@@ -21,7 +21,7 @@ __all__ = ["StoredState", "StreamState", "read_tree", "state_in", "tree_of"]
 
 _KIND = "stream of tactile-bayes"
 
-_FORMAT = 1
+_FORMAT = 2
 
 _HOW = "begin a new stream, or put a copy of the file back"
 
@@ -49,6 +49,8 @@ class StreamState:
     """Correlation of the last steps of any update; NaN if there were none."""
     shift: float
     """Largest one of all updates, as of `Particles`."""
+    rise: float
+    """That of the last stage of any update, as of `Particles`; 0 if there was none."""
     surprise: float
     """Logarithm of the largest e-value so far."""
     updates: int
