@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
-
-import emcee
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import logsumexp, softmax
@@ -14,9 +10,8 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import in_coordinates
-from tactile_bayes.inference.ensembles.mixture import Mixture
-from tactile_bayes.inference.ensembles.moves import FittedMove, step_ensembles
-from tactile_bayes.inference.ensembles.proposal import Proposal, effective
+from tactile_bayes.inference.ensembles.proposal import effective
+from tactile_bayes.inference.streams.mover import Mover
 from tactile_bayes.inference.streams.stream_state import StreamState
 from tactile_bayes.numerics.selection import resampled
 
@@ -38,25 +33,8 @@ LOST_ONCE = 1.2
 """That increase in any stage, of particles that had lost the posterior for a while: evidences were then too small by
 7."""
 
-_RISING = 3.0
-"""Increase of the mean log-density in a step, over the standard error of that mean, from which moves go on."""
-
 _MOST_STEPS, _BRIDGE_STEPS = 40, 10
 """Largest numbers of steps after these stages; up to the first one while the log-density rises."""
-
-_PARTS = 8
-"""Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28
-samples of a double sweep were accepted, 0.20 of those of 4 parts, 0.29 of 12, and 0.05 of a single distribution."""
-
-_POOR, _GOOD = 0.3, 0.45
-"""Shares of accepted proposals below which a mixture takes the place of a single distribution, and above which a single
-one is tried again."""
-
-_DIFFERENCES, _MOSTLY_DIFFERENCES = 0.1, 0.5
-"""Shares of steps by differences of particles, and where hardly any proposal of a fitted distribution is accepted."""
-
-_HARDLY = 0.1
-"""Share of accepted proposals below which that is so."""
 
 WIDER = (1.5, 3.0, 6.0)
 """Factors on the noise of the alternatives with which the e-value compares the model."""
@@ -106,7 +84,7 @@ class Particles:
         self.model = model
         self.stages, self.steps, self.evaluations = 0, 0, 0
         self.correlation, self.shift, self.rise = np.nan, 0.0, 0.0
-        self._random = np.random.RandomState(random.integers(2**32))
+        self._mover = Mover(model, np.random.RandomState(random.integers(2**32)))
         self._generator = random
         self._before, self._added = _model_of(old), []
         if old is None:
@@ -118,10 +96,6 @@ class Particles:
             self.log_weights, self.log_integral = old.log_weights, old.log_integral
         self._coordinates = model.coordinates
         self._is_continued = _is_continued(self._before, model)
-        ends = model.walked_ends
-        self._single = FittedMove(fit=partial(Proposal.fitted, ends=ends))
-        self._mixture = FittedMove(fit=partial(Mixture.fitted, bent=model.of_path, parts=_PARTS, ends=ends))
-        self._fitted, self._accepted = self._single, 1.0
         self.values, wider = self._with_wider_noise(self.points)
         self._old = model.log_prior(self.points) if old is None else old.values + self._log_prior_of_added(self.points)
         expected = logsumexp(self.log_weights[:, None] + wider, axis=0) + self.log_integral
@@ -243,17 +217,12 @@ class Particles:
         density = (_between(self.values, self._old, power) + log_jacobian)[None]
         transformed = in_coordinates(target, coordinates)
         enough, at_first = DECORRELATED if last else _BRIDGED, density.mean()
-        rises = False
         for step in range(_MOST_STEPS):
-            before, move, was = ensemble, self._next_move(), density.mean()
-            ensemble, density = step_ensembles(transformed, [(move, 1.0)], [self._random], ensemble, density)
-            if move is self._fitted:
-                self._accepted = float(np.mean(np.any(ensemble != before, axis=-1)))
-                rises = density.mean() - was > _RISING * density.std() / np.sqrt(density.size)
+            ensemble, density = self._mover.step(transformed, ensemble, density)
             self.steps += 1
             self.correlation = _correlation(began, ensemble[0])
             is_enough = self.correlation < enough or (not last and step + 1 >= _BRIDGE_STEPS)
-            if step and is_enough and not rises:
+            if step and is_enough and not self._mover.rises:
                 break
         self.rise = float((density.mean() - at_first) / max(density.std(), 1e-12))
         self.shift = max(self.shift, self.rise)
@@ -262,17 +231,6 @@ class Particles:
             self.values = density[0] - log_jacobian
         else:
             self.values, self._old = self._both(self.points)
-
-    def _next_move(self) -> Any:
-        """Return the next move, by what share of the proposals of the last fitted distribution was accepted."""
-        by_differences = _DIFFERENCES if self._accepted > _HARDLY else _MOSTLY_DIFFERENCES
-        if self._random.rand() < by_differences:
-            return emcee.moves.DEMove()
-        if self._fitted is self._single and self._accepted < _POOR:
-            self._fitted = self._mixture
-        elif self._fitted is self._mixture and self._accepted > _GOOD:
-            self._fitted = self._single
-        return self._fitted
 
 
 def _model_of(state: StreamState | None) -> ContourModel | None:
