@@ -226,8 +226,8 @@ class _Follower:
             )
         if update.e_value > _SURPRISING >= self.e_value:
             self.tell(
-                f"samples are not what the shape, the rig and the noise predict (e-value {update.e_value:.2g}, which a "
-                f"right model exceeds {_SURPRISING:,.0f} with in one record of a thousand at most): do not rely on the "
+                f"samples are not what the shape, the rig and the noise predict (e-value {update.e_value:.2g}; that of "
+                f"a right model exceeds {_SURPRISING:,.0f} in one record of a thousand at most): do not rely on the "
                 "band, and try another --family, or infer more of the rig (--nuisance)"
             )
         self.e_value = max(self.e_value, update.e_value)
