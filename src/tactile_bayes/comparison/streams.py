@@ -123,8 +123,9 @@ class StreamComparison:
         -------
         xr.Dataset
             Over "family": `probability`; `log_evidence`; `effective_number`, `correlation`, `log_density_shift` and
-            `e_value`, as from `Stream.update` (NaN for a family that is lost); `contour_draws`, of which `contour_band`
-            computes a band averaged over families. `samples`, their number so far; `seconds` that the update took;
+            `e_value`, as from `Stream.update` (NaN for a family that is lost; where the shift is above 1.2, evidence
+            and probability of the family are too small); `contour_draws`, of which `contour_band` computes a band
+            averaged over families. `samples`, their number so far; `seconds` that the update took;
             with x, `height` by `level` and `x`, averaged over families; with a rule, `may_stop`. Attributes:
             `most_probable`; `lost`, messages by family (JSON).
 
