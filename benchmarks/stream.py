@@ -31,6 +31,7 @@ from tactile_bayes.calibration.ranks import uniformity_p_value
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.errors import StudyError, TactileBayesError
 from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.inference.streams.particles import LOST_ONCE
 from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
 
 OUT = Path("results/stream")
@@ -41,8 +42,6 @@ AROUND = np.linspace(-0.1, 0.1, 9)
 """Positions, relative to the vertex as the whole record shows it [L]."""
 TOLERANCES = (0.02, 0.01, 0.005)
 """Largest widths of the band [L] at which a rule stops."""
-_LOST_ONCE = 1.2
-"""Shift of the log-density of particles that had lost the posterior."""
 ALARMS = (0.2, 0.05, 0.01, 0.001)
 """Rates of false alarms that an e-value may have at most."""
 
@@ -93,8 +92,8 @@ def wrong(records: int = 20) -> None:
     for name in WORLDS:
         folder = OUT / ("without-" + "".join(c if c.isalnum() else "-" for c in name))
         with open_results_store({"world": repr(WORLDS[name]), "seed": str(SEED)}, folder, RECORDS) as store:
-            kept = keep_outcomes(store, surprised, name, records, workers=None, scheduler=None, progress=None)
-        every = [row["e_values"] for row in kept.values() if "error" not in row]
+            kept = keep_outcomes(store, wrong_one, name, records, workers=None, scheduler=None, progress=None)
+        every = [row["e_values"] for row in kept.values() if row.get("e_values")]
         values = np.array([row + [row[-1]] * (BLOCKS - len(row)) for row in every])
         told = values > 1000.0
         early = told.any(axis=1)
@@ -104,7 +103,7 @@ def wrong(records: int = 20) -> None:
         print(f"{name:<32}{early.mean():>13.0%}{after:>8}{some:>11.0%}{ended:>18}", flush=True)
 
 
-def surprised(task: tuple[str, int]) -> Row:
+def wrong_one(task: tuple[str, int]) -> Row:
     """Return the e-values of one record of a world, and whether no particle explained it."""
     name, number = task
     nuisances = tuple(each for each in STANDARD if each not in ("friction", "backlash"))
@@ -185,7 +184,7 @@ def report(rows: list[Row], errors: list[str]) -> None:
     limits = ", ".join(f"{1.0 / rate:g} in {share:.1%}" for rate, share in zip(ALARMS, surprised, strict=True))
     print(f"\nthe largest e-value of a record, whose model is right, exceeds {limits} of records")
     told = [round(row["off_median"], 2) for row in rows if row["told"]]
-    found_again = sum(row["shift"] > _LOST_ONCE and not row["told"] for row in rows)
+    found_again = sum(row["shift"] > LOST_ONCE and not row["told"] for row in rows)
     print(f"\n{len(told)} results have not converged; medians are off by {told or 'nothing'}")
     print(f"{found_again} had lost the posterior, and found it again; without the first:")
     sure = [row for row in rows if row["converged"] and not row["told"]]

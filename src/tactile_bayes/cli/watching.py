@@ -333,9 +333,12 @@ def _families(update: WatchUpdate) -> list[str]:
     if not update.probabilities:
         return []
     in_order = sorted(update.probabilities.items(), key=lambda item: -item[1])
-    less = f"; too small for {', '.join(update.underrated)}: their particles had lost the posterior for a while"
     shares = [f"{name} {'<' if p < _RARE else ''}{percent(max(round(p, 3), _RARE))}" for name, p in in_order]
-    probable = f"{', '.join(shares)}{less if update.underrated else ''}"
+    probable = ", ".join(shares)
+    if update.underrated:
+        probable += (
+            f"; too small for {', '.join(update.underrated)}: their particles had lost the posterior for a while"
+        )
     return [f"Probability of the shapes: {probable}; parameters are those of the first, the band is averaged."]
 
 

@@ -71,11 +71,11 @@ def test_the_evidence_agrees_with_bridge_sampling(streamed, whole):
 
 @pytest.mark.slow
 def test_one_block_and_many_agree(streamed, measured):
-    (once,) = fed(stream_of(seed=5), measured, 1)
+    (once,) = fed(stream_of(seed=5, particles=2000), measured, 1)
     last = streamed[1][-1]
     spread = once.parameters.sel(level=0.975) - once.parameters.sel(level=0.025)
     assert float((abs(once.parameters - last.parameters).sel(level=0.5) / spread).max()) < 0.1
-    assert abs(float(once.log_evidence - last.log_evidence)) < 2.5  # four deviations, 0.46 each
+    assert abs(float(once.log_evidence - last.log_evidence)) < 1.5
 
 
 @pytest.mark.slow
@@ -104,10 +104,11 @@ def test_particles_that_have_lost_the_posterior_find_it_again_or_tell(
     """They climb towards it as soon as they move, for as many steps as they have."""
     last = streamed[1][-1]
     assert abs(float(last.log_density_rise)) < 0.2
-    assert 0.0 <= float(last.log_density_shift) < 1.0
-    monkeypatch.setattr(particles, "_MOST_STEPS", steps)
+    assert 0.0 < float(last.log_density_shift) < 1.0
     stream = stream_of(particles=200)
     stream.update(measured.isel(sample=slice(0, 40)))
+    assert stream.posterior().attrs["converged"] == 1
+    monkeypatch.setattr(particles, "_MOST_STEPS", steps)
     state = stream._state
     lost = state.points + [4.0, 0.0, 0.0, 0.0] * state.points.std(axis=0)
     stream._state = replace(state, points=lost, values=state.experiment.model.log_probability(lost))

@@ -10,7 +10,15 @@ from functools import cached_property
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.ensembles.proposal import ANYTHING, WIDENING, Ends, Proposal, Random, normalised
+from tactile_bayes.inference.ensembles.proposal import (
+    ANYTHING,
+    WIDENING,
+    Ends,
+    Proposal,
+    Random,
+    normalised,
+    refuse_constant,
+)
 
 __all__ = ["Mixture"]
 
@@ -46,8 +54,7 @@ class Mixture:
             If the points lie in a plane.
         """
         deviation = points.std(axis=0)
-        if not np.all(deviation > 1e-12 * np.abs(points).max(axis=0)):
-            raise np.linalg.LinAlgError("a parameter is the same in all points")
+        refuse_constant(deviation, np.abs(points).max(axis=0))
         mean, standard = points.mean(axis=0), (points - points.mean(axis=0)) / deviation
         slopes = np.linalg.lstsq(standard[:, bent], standard, rcond=None)[0]  # of the columns `bent`, themselves
         rest = standard - standard[:, bent] @ slopes

@@ -17,7 +17,18 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["ANYTHING", "WIDENING", "Ends", "Proposal", "Random", "approximate", "effective", "flattened", "normalised"]
+__all__ = [
+    "ANYTHING",
+    "WIDENING",
+    "Ends",
+    "Proposal",
+    "Random",
+    "approximate",
+    "effective",
+    "flattened",
+    "normalised",
+    "refuse_constant",
+]
 
 _DEGREES_OF_FREEDOM = 10.0
 """Degrees of freedom of the t distribution: its tails are heavier than normal tails, at little cost."""
@@ -124,8 +135,7 @@ class Proposal:
         mean = weights @ points
         centred = points - mean
         deviation = np.sqrt(weights @ centred**2)
-        if not np.all(deviation > 1e-12 * np.abs(mean)):
-            raise np.linalg.LinAlgError("a parameter is the same in all points")
+        refuse_constant(deviation, np.abs(mean))
         standard = centred / deviation
         correlation = (weights[:, None] * standard).T @ standard / (1.0 - np.sum(weights**2))
         above = (mean - ends.low) / deviation
@@ -207,6 +217,12 @@ def approximate(
         except np.linalg.LinAlgError:
             break
     return best
+
+
+def refuse_constant(deviation: Floats, size: Floats) -> None:
+    """Raise numpy.linalg.LinAlgError if a deviation, shape (d,), is no more than rounding of numbers of a size."""
+    if not np.all(deviation > 1e-12 * size):
+        raise np.linalg.LinAlgError("a parameter is the same in all points")
 
 
 def flattened(surplus: Floats, least: float) -> Floats:
