@@ -9,7 +9,7 @@ from helpers import commands
 from helpers.contour_posteriors import posterior
 from helpers.report_pages import Page
 from tactile_bayes.inference.result import write_result
-from tactile_bayes.runs.contour import _OF_FORMER
+from tactile_bayes.runs.names import OF_POSTERIOR
 
 call = partial(commands.call, "trust")
 
@@ -36,7 +36,7 @@ def test_it_prints_one_object_and_writes_into_the_run(folder, written):
     assert {claim["claim"] for claim in said["claims"]} >= {"pointwise_in_gap", "contact_region"}
     assert said["files"] == {"trust": str(folder / "trust.nc"), "words": str(folder / "trust.txt")}
     assert (folder / "trust.txt").read_text(encoding="utf-8").splitlines()[0] == said["words"][0]
-    assert {name for name in _OF_FORMER if (folder / name).exists()} == {
+    assert {name for name in OF_POSTERIOR if (folder / name).exists()} == {
         "trust.nc",
         "trust.txt",
         "trust/replicates.json",

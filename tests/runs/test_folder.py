@@ -1,43 +1,75 @@
-"""The folder of a run: files are written whole, and listed by what they hold."""
+"""The folder of a run: the files of one run replace those of the former one together."""
 
 import pytest
 import xarray as xr
 
 from tactile_bayes.runs.folder import Folder, panels
 
+NAMES = ("words.txt", "data.nc", "table.csv", "figure.png")
+
+
+def contents(folder):
+    return {path.name: path.read_text(encoding="utf-8") for path in folder.iterdir()}
+
 
 def test_files_are_listed_in_the_order_in_which_they_are_written(tmp_path):
-    folder = Folder(tmp_path / "made" / "on the way")
     data = xr.Dataset({"x": ("place", [1.0, 2.0])}, coords={"place": [0, 1]})
-    folder.write_netcdf("data", "data.nc", data)
-    folder.write_table("table", "table.csv", data)
-    folder.write_lines("words", "words.txt", ["one", "two"])
-    folder.draw("figure", "figure.png", lambda height: panels(2, 1, 2.0, height), 3.0)
+    with Folder(tmp_path / "made" / "on the way", NAMES) as folder:
+        folder.write_netcdf("data", "data.nc", data)
+        folder.write_table("table", "table.csv", data)
+        folder.write_lines("words", "words.txt", ["one", "two"])
+        folder.draw("figure", "figure.png", lambda height: panels(2, 1, 2.0, height), 3.0)
     assert list(folder.files) == ["data", "table", "words", "figure"]
     assert {path.name for path in folder.path.iterdir()} == {path.name for path in folder.files.values()}
     assert folder.files["table"].read_text(encoding="utf-8") == "place,x\n0,1.0\n1,2.0\n"
     assert folder.files["words"].read_text(encoding="utf-8") == "one\ntwo\n"
-    assert folder.files["figure"].read_bytes()[16:24] == (400).to_bytes(4) + (600).to_bytes(4)  # of 200 dots an inch
+    assert folder.files["figure"].read_bytes()[16:24] == (300).to_bytes(4) + (450).to_bytes(4)  # of 150 dots an inch
 
 
-def test_a_file_that_fails_is_not_listed_and_leaves_the_former_one(tmp_path):
-    folder = Folder(tmp_path)
-    (tmp_path / "words.txt").write_text("former", encoding="utf-8")
+def test_what_a_run_does_not_write_is_removed_and_nothing_else(tmp_path):
+    for name in (*NAMES, "notes.txt", "words.txt.bak"):
+        (tmp_path / name).write_text("former", encoding="utf-8")
+    with Folder(tmp_path, NAMES) as folder:
+        folder.write_lines("words", "words.txt", ["new"])
+    assert contents(tmp_path) == {"words.txt": "new\n", "notes.txt": "former", "words.txt.bak": "former"}
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_a_run_that_fails_leaves_the_former_one(tmp_path, error):
+    for name in NAMES:
+        (tmp_path / name).write_text("former", encoding="utf-8")
 
     def lines():
         yield "one"
-        raise RuntimeError("it broke")
+        raise error("it broke")
 
-    with pytest.raises(RuntimeError, match="it broke"):
+    folder = Folder(tmp_path, NAMES)
+    with pytest.raises(error, match="it broke"), folder:
+        folder.write_lines("table", "table.csv", ["new"])
         folder.write_lines("words", "words.txt", lines())
-    assert folder.files == {}
-    assert [path.name for path in tmp_path.iterdir()] == ["words.txt"]
-    assert (tmp_path / "words.txt").read_text(encoding="utf-8") == "former"
+    assert "words" not in folder.files
+    assert contents(tmp_path) == dict.fromkeys(NAMES, "former")
+
+
+def test_a_folder_in_place_of_a_file_is_kept(tmp_path):
+    (tmp_path / "table.csv").mkdir()
+    (tmp_path / "table.csv" / "years of work").touch()
+    (tmp_path / "data.nc").write_text("former", encoding="utf-8")
+    with pytest.raises(IsADirectoryError) as refusal, Folder(tmp_path, NAMES) as folder:
+        folder.write_lines("words", "words.txt", ["new"])
+    assert refusal.value.filename == str(tmp_path / "table.csv")
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["data.nc", "table.csv", "years of work"]
+
+
+def test_a_name_that_is_not_known_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="not among the files"), Folder(tmp_path, NAMES) as folder:
+        folder.write_lines("other", "other.txt", ["new"])
 
 
 def test_a_figure_of_pyplot_is_closed(tmp_path):
     from matplotlib import pyplot as plt
 
     before = plt.get_fignums()
-    Folder(tmp_path).draw("figure", "figure.png", lambda: plt.subplots(figsize=(1.0, 1.0))[1])
+    with Folder(tmp_path, NAMES) as folder:
+        folder.draw("figure", "figure.png", lambda: plt.subplots(figsize=(1.0, 1.0))[1])
     assert plt.get_fignums() == before

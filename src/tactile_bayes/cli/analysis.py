@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
-from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.interrupts import acknowledge_interrupt
 from tactile_bayes.cli.record_options import Record, RecordOptions
 from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
 from tactile_bayes.cli.sampling_bar import sampling_bar
+from tactile_bayes.runs.names import CHECKPOINT, INFERENCE, OF_POSTERIOR, WATCH_PAGE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -41,7 +42,7 @@ def infer(
     *,
     ctx: typer.Context,
     record: Record,
-    out: Out,
+    out: Annotated[Out, Writes((*INFERENCE, *OF_POSTERIOR, WATCH_PAGE))],
     family: Family = "parabola",
     reading: RecordOptions,
     unknown: UnknownOptions,
@@ -61,6 +62,7 @@ def infer(
             help="Folder in which every block of steps is kept: the same command resumes a stopped run.",
             file_okay=False,
         ),
+        Writes(CHECKPOINT),
     ] = None,
     seed: Seed = 1,
     output: Output,

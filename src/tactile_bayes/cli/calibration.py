@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
-from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.numbers import assigned, numbers_asked
 from tactile_bayes.cli.rig_options import NoiseOptions, RigOptions, UnknownOptions
 from tactile_bayes.cli.task_bar import resumable_bar
 from tactile_bayes.cli.worker_options import WorkerOptions
+from tactile_bayes.runs.names import CALIBRATION
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -28,7 +29,7 @@ __all__ = ["calibrate"]
 def calibrate(
     *,
     ctx: typer.Context,
-    out: Out,
+    out: Annotated[Out, Writes((*CALIBRATION, "replicates.json"))],
     family: Annotated[str, typer.Option(help="Shape of the contours, as for infer, shape-free too.")] = "parabola",
     replicates: Annotated[int, typer.Option(help="Number of records.", min=1)] = 200,
     noise: NoiseOptions,

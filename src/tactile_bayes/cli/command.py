@@ -2,6 +2,9 @@
 
 A command is a function. Its parameters are options or groups of options: a group is a dataclass whose fields are
 options and whose properties interpret them. The last group is `Output`. The function returns an `Answer`.
+
+A path is read by the command unless it is marked with `Writes`. An output that is an input is refused before the
+function is called.
 """
 
 from __future__ import annotations
@@ -17,12 +20,40 @@ import typer
 from tactile_bayes.cli.answer import Answer, print_answer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
-__all__ = ["Out", "Output", "Seed", "as_command"]
+__all__ = ["Out", "Output", "Reads", "Seed", "Writes", "as_command"]
 
 Out = Annotated[Path, typer.Option(help="Folder for results; created if missing.", file_okay=False)]
 Seed = Annotated[int, typer.Option(help="Seed of random numbers; the same seed gives the same numbers.", min=0)]
+
+
+@dataclass(frozen=True)
+class Reads:
+    """Mark of a path that a command reads: a file, or a folder with files of these names, where * is any text."""
+
+    names: tuple[str, ...] = ("*",)
+
+    def files(self, path: Path) -> Iterator[Path]:
+        """Yield the files that are there."""
+        if path.is_dir():
+            yield from (file for name in self.names for file in path.glob(name) if file.is_file())
+        else:
+            yield path
+
+
+@dataclass(frozen=True)
+class Writes:
+    """Mark of a path that a command writes: a file, or a folder for files of these names, where * is any text."""
+
+    names: tuple[str, ...] = ()
+
+    def files(self, path: Path) -> Iterator[Path]:
+        """Yield the files that it may replace."""
+        if not self.names:
+            yield path
+        for name in self.names:
+            yield from path.glob(name) if "*" in name else [path / name]
 
 
 @dataclass(frozen=True)
@@ -45,6 +76,7 @@ def as_command(function: Callable[..., Answer]) -> Callable[..., None]:
 
     @wraps(function)
     def command(**given: Any) -> None:
+        _refuse_replaced_inputs(options, given)
         for name, group in groups.items():
             given[name] = group(**{option.name: given.pop(option.name) for option in fields(group)})
         print_answer(function(**given), given["output"].json)
@@ -53,6 +85,26 @@ def as_command(function: Callable[..., Answer]) -> Callable[..., None]:
     command.__annotations__ = {option.name: option.annotation for option in options}
     command.__signature__ = Signature(options)  # type: ignore[attr-defined]  # typer reads it
     return command
+
+
+def _refuse_replaced_inputs(options: Iterable[Parameter], given: Mapping[str, Any]) -> None:
+    """Refuse options by which the command would replace a file that it reads.
+
+    Raises
+    ------
+    ParameterError
+        If an output is an input.
+    """
+    from tactile_bayes.tasks import refuse_replacing
+
+    outputs, inputs = list[Path](), list[Path]()
+    for option in options:
+        value, marks = given.get(option.name), getattr(option.annotation, "__metadata__", ())
+        mark = next((mark for mark in marks if isinstance(mark, Writes | Reads)), Reads())
+        paths = [path for path in (value if isinstance(value, list) else [value]) if isinstance(path, Path)]
+        (outputs if isinstance(mark, Writes) else inputs).extend(file for path in paths for file in mark.files(path))
+    if outputs and inputs:
+        refuse_replacing(outputs, inputs)
 
 
 def _options(owner: Callable[..., Any]) -> Iterator[Parameter]:

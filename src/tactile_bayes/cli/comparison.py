@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
-from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.record_options import Record, RecordOptions
 from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
 from tactile_bayes.cli.sampling_bar import sampling_bar
+from tactile_bayes.runs.names import COMPARISON
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,7 +30,7 @@ _POOR_K = 0.7
 def compare(
     *,
     record: Record,
-    out: Out,
+    out: Annotated[Out, Writes(COMPARISON)],
     family: Annotated[
         list[str] | None,
         typer.Option(

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tactile_bayes.cli.answer import Answer
-from tactile_bayes.cli.command import Output, as_command
+from tactile_bayes.cli.command import Output, Writes, as_command
 from tactile_bayes.cli.task_bar import counted, resumable_bar, step_bar
 from tactile_bayes.cli.worker_options import WorkerOptions
+from tactile_bayes.runs.names import DATASET
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,7 +48,9 @@ def generate(
     specification: Annotated[
         Path, typer.Argument(metavar="SPEC.toml", help="Specification, .toml: see dataset example.")
     ],
-    out: Annotated[Path, typer.Option(help="Folder for the data set; created if missing.", file_okay=False)],
+    out: Annotated[
+        Path, typer.Option(help="Folder for the data set; created if missing.", file_okay=False), Writes(DATASET)
+    ],
     work: WorkerOptions,
     output: Output,
 ) -> Answer:
@@ -105,7 +108,7 @@ def record(
     *,
     source: Annotated[Path, typer.Argument(help="Folder of the data set, or its specification, .toml.")],
     index: Annotated[int, typer.Argument(help="Number of the record; the first is 0.")],
-    out: Annotated[Path, typer.Option(help="File for the record, .csv or .nc.", dir_okay=False)],
+    out: Annotated[Path, typer.Option(help="File for the record, .csv or .nc.", dir_okay=False), Writes()],
     truth: Annotated[
         bool, typer.Option("--truth/--no-truth", help="Write the columns of the truth, or leave them out.")
     ] = True,

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from tactile_bayes.cli.answer import Answer
-from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.drive_options import CarryOptions
 from tactile_bayes.cli.numbers import numbers_asked
 from tactile_bayes.cli.rig_options import NoiseOptions, RodOptions, UnknownOptions
 from tactile_bayes.cli.task_bar import counted, resumable_bar
 from tactile_bayes.cli.worker_options import WorkerOptions
+from tactile_bayes.runs.names import DESIGN
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,10 +48,11 @@ class _RodOptions(RodOptions):
 
 def design(
     *,
-    out: Out,
+    out: Annotated[Out, Writes((*DESIGN, "nested/*"))],
     run: Annotated[
         Path | None,
         typer.Argument(help="Folder of a run of infer, or its posterior.nc, as present knowledge; else the prior."),
+        Reads(("posterior.nc",)),
     ] = None,
     family: Annotated[str, typer.Option(help="Shape of the contours, if only a prior is known.")] = "parabola",
     base: Annotated[

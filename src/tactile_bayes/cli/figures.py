@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from tactile_bayes.cli.answer import Answer
-from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.drive_options import DriveOptions
 from tactile_bayes.cli.rig_options import NoiseOptions
 from tactile_bayes.cli.task_bar import resumable_bar
+from tactile_bayes.runs.names import FIGURES
 
 if TYPE_CHECKING:
     from tactile_bayes.sweep import Carried
@@ -74,7 +75,7 @@ class _NoiseOptions(NoiseOptions):
 
 def figures(
     *,
-    out: Out,
+    out: Annotated[Out, Writes(FIGURES)],
     only: Annotated[
         list[int] | None, typer.Option(help="Number of a figure, from 2 to 11; may be repeated. By default all.")
     ] = None,

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
-from tactile_bayes.cli.command import Output
+from tactile_bayes.cli.command import Output, Writes
 from tactile_bayes.cli.record_options import Record, RecordOptions
 from tactile_bayes.cli.rig_options import Friction
 from tactile_bayes.cli.task_bar import step_bar
+from tactile_bayes.runs.names import INSPECTION
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -39,6 +40,7 @@ def inspect(
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for a figure, tables and this text; created if missing.", file_okay=False),
+        Writes(INSPECTION),
     ] = None,
     reading: RecordOptions,
     friction: Friction = 0.0,

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from tactile_bayes.cli.answer import Answer
-from tactile_bayes.cli.command import Out, Output
+from tactile_bayes.cli.command import Out, Output, Writes
 from tactile_bayes.cli.record_options import Record, RecordOptions
 from tactile_bayes.cli.rig_options import Friction
 from tactile_bayes.cli.task_bar import step_bar
+from tactile_bayes.runs.names import RECONSTRUCTION
 
 if TYPE_CHECKING:
     from tactile_bayes.runs.reconstruction import ReconstructionRun
@@ -30,7 +31,7 @@ _SOURCES = {
 def reconstruct(
     *,
     record: Record,
-    out: Out,
+    out: Annotated[Out, Writes(RECONSTRUCTION)],
     method: Annotated[
         Literal["raw", "constrained"] | None,
         typer.Option(

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tactile_bayes.cli.answer import Answer
-from tactile_bayes.cli.command import Output
+from tactile_bayes.cli.command import Output, Reads, Writes
 from tactile_bayes.cli.task_bar import step_bar
 
 __all__ = ["report"]
@@ -16,13 +16,18 @@ __all__ = ["report"]
 
 def report(
     *,
-    run: Annotated[Path, typer.Argument(help="Folder of a run of infer.")],
+    run: Annotated[
+        Path, typer.Argument(help="Folder of a run of infer."), Reads(("posterior.nc", "trust.nc", "comparison.nc"))
+    ],
     out: Annotated[
-        Path | None, typer.Option(help="File for the page; report.html in that folder if left out.", dir_okay=False)
+        Path | None,
+        typer.Option(help="File for the page; report.html in that folder if left out.", dir_okay=False),
+        Writes(),
     ] = None,
     compare: Annotated[
         Path | None,
         typer.Option(help="Folder of a run of compare on the same record; the run's own if left out.", file_okay=False),
+        Reads(("comparison.nc",)),
     ] = None,
     output: Output,
 ) -> Answer:

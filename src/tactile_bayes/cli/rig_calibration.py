@@ -9,11 +9,12 @@ import typer
 
 from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.cli.answer import Answer, columns_of
-from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.contour_options import GaugeOptions
 from tactile_bayes.cli.record_options import RecordOptions
 from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
 from tactile_bayes.cli.sampling_bar import sampling_bar
+from tactile_bayes.runs.names import RIG
 
 if TYPE_CHECKING:
     from tactile_bayes.runs.rig import RigRun
@@ -27,7 +28,7 @@ def calibrate_rig(
         list[Path],
         typer.Argument(help="Records of the gauge, .csv or .nc, each with its own zeros and its pivots."),
     ],
-    out: Out,
+    out: Annotated[Out, Writes(RIG)],
     gauge: GaugeOptions,
     reading: RecordOptions,
     unknown: UnknownOptions,

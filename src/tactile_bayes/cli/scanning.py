@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from tactile_bayes.cli.answer import Answer, table_of
-from tactile_bayes.cli.command import Output
+from tactile_bayes.cli.command import Output, Writes
 from tactile_bayes.cli.contour_options import ContourOptions
 from tactile_bayes.cli.drive_options import DriveOptions
 from tactile_bayes.cli.rig_options import Friction, RigOptions
@@ -28,6 +28,7 @@ __all__ = ["RecordFile", "refuse_other_suffix", "scan"]
 RecordFile = Annotated[
     Path,
     typer.Option(help="File for the record, .csv or .nc; its folder is created if missing.", dir_okay=False),
+    Writes(),
 ]
 
 
@@ -46,6 +47,7 @@ def scan(
         typer.Option(
             help="File for a figure of rod and loads along the sweeps, .png, .pdf or .svg; likewise.", dir_okay=False
         ),
+        Writes(),
     ] = None,
     output: Output,
 ) -> Answer:
@@ -178,18 +180,19 @@ def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
 
 def _draw(made: Scan, path: Path) -> None:
     """Draw rods of every sweep from the first pivot and of sweeps in which the base is carried, and the loads below."""
-    from matplotlib.figure import Figure
-
     from tactile_bayes import plotting
+    from tactile_bayes.plotting.style import own_style, save_figure
     from tactile_bayes.record import carried_sweeps
     from tactile_bayes.tasks import write_atomically
 
     carried = carried_sweeps(made.record)
     shown = [n for n, sweep in enumerate(made.sweeps) if sweep.base == made.sweeps[0].base or n in carried]
-    figure = Figure(figsize=(7.0, 5.0 + 3.4 * len(shown)), layout="constrained")
-    parts: Any = figure.subfigures(2, 1, height_ratios=(3.4 * len(shown), 5.0))
-    for number, ax in zip(shown, parts[0].subplots(len(shown), 1, squeeze=False)[:, 0], strict=True):
-        plotting.rods(made, sweep=number, ax=ax)
-    plotting.observables(made.record, events=made.events, axes=parts[1].subplots(3, 1, sharex=True))
-    with write_atomically(path) as temporary:
-        figure.savefig(temporary, dpi=200, format=path.suffix[1:])
+    with own_style(), write_atomically(path) as temporary:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(7.0, 5.0 + 3.4 * len(shown)), layout="constrained")
+        parts: Any = figure.subfigures(2, 1, height_ratios=(3.4 * len(shown), 5.0))
+        for number, ax in zip(shown, parts[0].subplots(len(shown), 1, squeeze=False)[:, 0], strict=True):
+            plotting.rods(made, sweep=number, ax=ax)
+        plotting.observables(made.record, events=made.events, axes=parts[1].subplots(3, 1, sharex=True))
+        save_figure(figure, temporary, path.suffix[1:])

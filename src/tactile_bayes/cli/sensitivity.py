@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
-from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.rig_options import NoiseOptions, RigOptions, UnknownOptions
 from tactile_bayes.cli.task_bar import counted, resumable_bar, task_bar
 from tactile_bayes.cli.worker_options import WorkerOptions
+from tactile_bayes.runs.names import SENSITIVITY
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +60,7 @@ class StudyOptions:
 
 def sensitivity(
     *,
-    out: Out,
+    out: Annotated[Out, Writes((*SENSITIVITY, "study/*"))],
     profile: Annotated[
         Profile, typer.Option(help="Profile of Merker et al. 2018; with --length scaled to the rod.")
     ] = "II",

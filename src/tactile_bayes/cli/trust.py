@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
-from tactile_bayes.cli.command import Output, Seed
+from tactile_bayes.cli.command import Output, Reads, Seed, Writes
 from tactile_bayes.cli.interrupts import resumable
 from tactile_bayes.cli.task_bar import step_bar
 from tactile_bayes.cli.worker_options import WorkerOptions
+from tactile_bayes.runs.names import TRUST
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,10 +25,11 @@ __all__ = ["trust"]
 
 def trust(
     *,
-    run: Annotated[Path, typer.Argument(help="Folder of a run of infer.")],
+    run: Annotated[Path, typer.Argument(help="Folder of a run of infer."), Reads(("posterior.nc",))],
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for the results; the run's own if left out, for its report.", file_okay=False),
+        Writes((*TRUST, "trust/*")),
     ] = None,
     replicates: Annotated[
         int,

@@ -12,11 +12,12 @@ import typer
 
 from tactile_bayes.cli.analysis import answer_of, decimals
 from tactile_bayes.cli.answer import Answer, columns_of, print_object
-from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.interrupts import acknowledge_interrupt
 from tactile_bayes.cli.numbers import numbers_asked
 from tactile_bayes.cli.record_options import RecordOptions
 from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
+from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +47,7 @@ def watch(
     record: Annotated[
         Path, typer.Argument(help="Record, .csv, to which another program appends rows; it may not be there yet.")
     ],
-    out: Out,
+    out: Annotated[Out, Writes((*INFERENCE, *OF_POSTERIOR, *WATCH))],
     family: Annotated[
         list[str] | None,
         typer.Option(

@@ -19,7 +19,7 @@ from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_specification
 from tactile_bayes.datasets.specification_text import UNNAMED, differences, meaning
 from tactile_bayes.errors import SpecificationError
-from tactile_bayes.tasks import alone_in, run_tasks, write_atomically
+from tactile_bayes.tasks import alone_in, refuse_replacing, run_tasks, write_atomically
 
 __all__ = ["Production", "generate"]
 
@@ -85,7 +85,7 @@ def generate(
         If the specification is invalid, no contour is reached in 1000 draws, or the folder contains another data set,
         or one that was begun with other versions, whose numbers may differ, or another run uses it.
     ParameterError
-        If `workers` is not a positive number, or the scheduler does not answer.
+        If `workers` is not a positive number, the scheduler does not answer, or a file would replace the specification.
     TaskError
         If processes die repeatedly over a shard, or cannot start.
     OSError
@@ -101,8 +101,10 @@ def generate(
     ...     sorted(path.name for path in manifest.parent.iterdir())
     ['README.md', 'manifest.json', 'shard-000000.nc']
     """
-    spec = spec if isinstance(spec, Specification) else read_specification(spec)
     folder = Path(out).resolve()
+    if isinstance(spec, str | os.PathLike):
+        refuse_replacing([folder / MANIFEST, folder / CARD, *folder.glob("shard-*.nc")], [Path(spec)])
+    spec = spec if isinstance(spec, Specification) else read_specification(spec)
     with alone_in(folder, SpecificationError):
         manifest = _begun(spec, folder)
         done = {shard.file for shard in manifest.shards}

@@ -79,11 +79,8 @@ def write_shard(task: tuple[str, int, str]) -> Written:
     path = Path(folder) / shard_file(shard)
     with ThreadPoolExecutor(1) as beside:  # during the write to the disk
         digest = beside.submit(_sha256, content)
-        try:
-            with write_atomically(path) as temporary, open(temporary, "wb") as file:
-                file.writelines(content)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(path)) from error
+        with write_atomically(path) as temporary, open(temporary, "wb") as file:
+            file.writelines(content)
     redrawn = {reason: count for reason, count in sorted(records.redrawn.items()) if count}
     return Written(
         path.name,

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.paper_figures.catalogue import NUMBERS, caption, figure
-from tactile_bayes.plotting.style import Style
-from tactile_bayes.plotting.style import style as styled
+from tactile_bayes.plotting.style import Style, own_style, save_figure
 from tactile_bayes.tasks import write_atomically
 
 if TYPE_CHECKING:
@@ -79,7 +78,7 @@ def draw_all(
     kind = "" if drive is None else f"_{type(drive).__name__.lower()}"
     folder = Path(out)
     files: dict[int, dict[str, Path]] = {}
-    with styled(style):
+    with own_style(style):
         for done, (number, text) in enumerate(captions.items(), start=1):
             made = figure(number, **options)
             folder.mkdir(parents=True, exist_ok=True)
@@ -100,4 +99,4 @@ def _save(made: Figure, path: Path, name: str, number: int, text: str) -> None:
         "svg": {"Title": title, "Description": text, "Date": None},
         "png": {"Title": title, "Description": text},
     }
-    made.savefig(path, format=name, metadata=metadata[name])
+    save_figure(made, path, name, metadata=metadata[name])

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from typing import Any, Literal
+from contextlib import chdir, contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from tactile_bayes.checks import check_choice
 
-__all__ = ["COLUMN_WIDTH", "PAGE_WIDTH", "STYLES", "Style", "style"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["COLUMN_WIDTH", "PAGE_WIDTH", "STYLES", "Style", "own_style", "save_figure", "style"]
 
 Style = Literal["print", "screen"]
 
@@ -93,3 +99,36 @@ def style(name: Style = "print") -> Iterator[None]:
     settings: Any = dict(STYLES[name])
     with mpl.rc_context(settings):
         yield
+
+
+@contextmanager
+def own_style(name: Style = "screen") -> Iterator[None]:
+    """Give figures of commands one look, whatever the user's settings of Matplotlib are, even if they cannot be read.
+
+    They are restored after it.
+    """
+    _import_matplotlib()
+    import matplotlib as mpl
+
+    settings: Any = {key: value for key, value in mpl.rcParamsDefault.items() if key != "backend"}
+    with mpl.rc_context(settings), style(name):
+        yield
+
+
+def _import_matplotlib() -> None:
+    """Import Matplotlib; if it fails over a file of settings, do so where its own file of defaults is found first."""
+    try:
+        import matplotlib
+    except (OSError, ValueError):
+        spec = find_spec("matplotlib")
+        assert spec is not None
+        assert spec.origin is not None
+        with chdir(Path(spec.origin).parent / "mpl-data"):
+            import matplotlib  # noqa: F401
+
+
+def save_figure(figure: Figure, path: Path, form: str, **options: Any) -> None:
+    """Write a figure to a file of this format: in memory first, so that a full disk raises an error that says so."""
+    memory = io.BytesIO()
+    figure.savefig(memory, format=form, **options)
+    path.write_bytes(memory.getbuffer())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -10,7 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
+import h5netcdf
 import xarray as xr
+from xarray.backends import H5NetCDFStore
 
 from tactile_bayes.record.table import Source, Table, table_of
 from tactile_bayes.tasks import write_atomically
@@ -57,15 +60,23 @@ def write_netcdf(
     >>> found["q"].values.tolist()
     [0.5, 0.6]
     """
-    encodings: Any
+    image = _image_of(content, encoding or {})
+    with write_atomically(path) as temporary, open(temporary, "wb") as file:
+        file.write(image)
+        file.write(_seal(io.BytesIO(image), len(image)))
+
+
+def _image_of(content: xr.Dataset | xr.DataTree, encoding: Mapping[str, Mapping[str, Any]]) -> bytes:
+    """Return the bytes of a file; they are made in memory, since HDF5 ends the process if it cannot write to a disk."""
     if isinstance(content, xr.DataTree):
-        encodings = {group.path: _with_checksums(group.to_dataset(inherit=False), {}) for group in content.subtree}
+        groups = {group.path: group.to_dataset(inherit=False) for group in content.subtree}
     else:
-        encodings = _with_checksums(content, encoding or {})
-    with write_atomically(path) as temporary:
-        content.to_netcdf(temporary, engine="h5netcdf", encoding=encodings)
-        with open(temporary, "r+b") as file:
-            file.write(_seal(file, temporary.stat().st_size))
+        groups = {"/": content}
+    memory = io.BytesIO()
+    with h5netcdf.File(memory, "w") as file:
+        for group, dataset in groups.items():
+            dataset.dump_to_store(H5NetCDFStore(file, group=group), encoding=_with_checksums(dataset, encoding))
+    return memory.getvalue()
 
 
 def _with_checksums(dataset: xr.Dataset, encoding: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:

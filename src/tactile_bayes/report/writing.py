@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from tactile_bayes.report.findings import FINDING_STEPS, findings_of
 from tactile_bayes.report.page import page_of
-from tactile_bayes.tasks import write_atomically
+from tactile_bayes.tasks import refuse_replacing, write_atomically
 
 __all__ = ["rendered", "write_report"]
 
@@ -55,11 +55,15 @@ def write_report(
     ------
     InferenceError
         If the folder holds no posterior of a contour, or a named folder no comparison of its record.
+    ParameterError
+        If the page would replace one of these files.
     OSError
         If the page cannot be written.
     """
     folder = Path(run)
     path = folder / "report.html" if out is None else Path(out)
+    sources = [folder / "posterior.nc", folder / "trust.nc", Path(compare or folder) / "comparison.nc"]
+    refuse_replacing([path], [source for source in sources if source.exists()])
     report = progress or (lambda done, count: None)
     findings = findings_of(
         folder, None if compare is None else Path(compare), lambda done: report(done, FINDING_STEPS + 1)

@@ -12,6 +12,7 @@ from tactile_bayes import plotting
 from tactile_bayes.calibration.calibrate import calibrate
 from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.runs.folder import Folder, Run
+from tactile_bayes.runs.names import CALIBRATION
 
 __all__ = ["calibrate_into"]
 
@@ -38,11 +39,11 @@ def calibrate_into(out: str | os.PathLike[str], **options: Any) -> Run[xr.Datase
         As in `calibrate`.
     """
     found = calibrate(out=out, **options)
-    folder = Folder(out)
-    folder.files["replicates"] = folder.path / REPLICATES.file
-    folder.write_netcdf("calibration", "calibration.nc", found)
-    folder.write_lines("verdict", "verdict.txt", [found.attrs["verdict"]])
-    if np.any(found["ranks"].values >= 0):
-        folder.draw("ranks", "ranks.png", plotting.calibration_ranks, found)
-    folder.draw("coverage", "coverage.png", plotting.coverage, found)
+    with Folder(out, CALIBRATION) as folder:
+        folder.files["replicates"] = folder.path / REPLICATES.file
+        folder.write_netcdf("calibration", "calibration.nc", found)
+        folder.write_lines("verdict", "verdict.txt", [found.attrs["verdict"]])
+        if np.any(found["ranks"].values >= 0):
+            folder.draw("ranks", "ranks.png", plotting.calibration_ranks, found)
+        folder.draw("coverage", "coverage.png", plotting.coverage, found)
     return Run(found, folder.files)

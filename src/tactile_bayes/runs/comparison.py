@@ -17,6 +17,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.runs.folder import Folder, Run
+from tactile_bayes.runs.names import COMPARISON
 
 __all__ = ["compare_into", "write_comparison"]
 
@@ -73,10 +74,10 @@ def compare_into(
 
 def write_comparison(comparison: xr.Dataset, out: str | os.PathLike[str]) -> dict[str, Path]:
     """Write a comparison to a folder, and return the files by content."""
-    folder = Folder(out)
-    folder.write_netcdf("comparison", "comparison.nc", comparison)
-    folder.write_table("table", "comparison.csv", _by_family(comparison))
-    folder.draw("families", "families.png", plotting.families, comparison)
+    with Folder(out, COMPARISON) as folder:
+        folder.write_netcdf("comparison", "comparison.nc", comparison)
+        folder.write_table("table", "comparison.csv", _by_family(comparison))
+        folder.draw("families", "families.png", plotting.families, comparison)
     return folder.files
 
 

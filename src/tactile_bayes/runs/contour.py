@@ -30,22 +30,16 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod
 from tactile_bayes.runs.folder import Folder, panels
+from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH_PAGE
 from tactile_bayes.sweep import Scan, recorded_drives, scan
+from tactile_bayes.tasks import refuse_replacing, replace_together
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
 __all__ = ["ContourRun", "RunFolder", "analyse", "complete", "file_of", "origin_of"]
 
-_OF_FORMER = (
-    "report.html",
-    "trust.nc",
-    "trust.txt",
-    "assumptions.png",
-    "trust/replicates.json",
-    "trust/alternatives.json",
-)
-"""Files that belong to the former posterior of a folder."""
+_POSTERIOR = "posterior.nc"
 
 
 @dataclass(frozen=True)
@@ -85,24 +79,23 @@ class RunFolder(Folder):
     """A folder of results from which parts that fail are left out."""
 
     def __init__(self, out: str | os.PathLike[str]) -> None:
-        super().__init__(out)
+        super().__init__(out, [name for name in INFERENCE if name != _POSTERIOR])
         self.left_out: dict[str, Exception] = {}
 
     @contextmanager
     def attempt(self, what: str, name: str) -> Iterator[None]:
-        """Note an error of the block under this name, and remove the file of a former run."""
+        """Note an error of the block under this name, and drop its file."""
         try:
             yield
         except Exception as error:
             self.left_out[what] = error
-            (self.path / name).unlink(missing_ok=True)
+            (self._new / name).unlink(missing_ok=True)
 
-    def write_posterior(self, posterior: xr.DataTree) -> None:
-        """Write the posterior, and remove what belongs to a former one."""
-        for name in _OF_FORMER:  # first, so that they are never beside another posterior
-            (self.path / name).unlink(missing_ok=True)
-        self.files["posterior"] = self.path / "posterior.nc"
-        write_result(posterior, self.files["posterior"])
+    def write_posterior(self, posterior: xr.DataTree, *others: str) -> None:
+        """Write the posterior into the folder at once, and remove what belongs to a former one; others, too."""
+        with replace_together(self.path, [*INFERENCE, *OF_POSTERIOR, *others]) as temporary:
+            write_result(posterior, temporary / _POSTERIOR)
+        self.files["posterior"] = self.path / _POSTERIOR
 
     @property
     def messages(self) -> tuple[str, ...]:
@@ -139,8 +132,9 @@ def analyse(
         A record.
     out : path-like
         Folder for posterior.nc, contacts.csv, band.csv, summary.txt (which begins with the verdicts), summary.csv and
-        the figures; created if missing. Files of these names in it are replaced, and report.html, trust.nc and the
-        replicates behind it, which would belong to the former posterior, are removed.
+        the figures; created if missing. The posterior replaces all files of these names in it, and report.html,
+        watch.html, trust.nc and the replicates behind it, which would belong to the former posterior; the other files
+        come together at the end, so that a folder without summary.txt is not complete.
     load_cell, rod, seed, options
         Options of `infer_contour`.
     probability : float
@@ -159,18 +153,21 @@ def analyse(
     Raises
     ------
     RecordError, ParameterError, InferenceError
-        As in `infer_contour`; if no contour is found, with the messages of `check_units_and_signs`.
+        As in `infer_contour`; if no contour is found, with the messages of `check_units_and_signs`; if a file of the
+        run would replace `record_file`.
     """
     check_probability("probability", probability)
     measured = with_rod(validate(measured), rod)
     origin = origin_of(measured, probability, command)
     if record_file is not None:
+        written = (*INFERENCE, *OF_POSTERIOR, WATCH_PAGE)
+        refuse_replacing((Path(out) / name for name in written), [Path(record_file)])
         origin |= file_of(record_file, hashlib.sha256(Path(record_file).read_bytes()).hexdigest())
     folder, drawn = RunFolder(out), list[xr.DataTree]()
 
     def keep(posterior: xr.DataTree) -> None:
         posterior.attrs |= origin
-        folder.write_posterior(posterior)
+        folder.write_posterior(posterior, WATCH_PAGE)
         drawn.append(posterior)
 
     try:
@@ -207,6 +204,18 @@ def _completed(
     truth: Contour | None,
 ) -> ContourRun:
     """Write what follows from the posterior in a folder."""
+    with folder:
+        return _written(folder, measured, load_cell, result, probability, truth)
+
+
+def _written(
+    folder: RunFolder,
+    measured: xr.Dataset,
+    load_cell: LoadCell | None,
+    result: xr.DataTree,
+    probability: float,
+    truth: Contour | None,
+) -> ContourRun:
     contacts, band, edges, found = None, None, None, tuple[str, ...]()
     with folder.attempt("contacts", "contacts.csv"):
         contacts = contact_points(measured, load_cell, result)

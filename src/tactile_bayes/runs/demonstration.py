@@ -9,7 +9,9 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import write_record
+from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR
 from tactile_bayes.sweep import scan
+from tactile_bayes.tasks import replace_together
 
 __all__ = ["CONTOUR", "LOAD_CELL", "ROD", "TRUTH", "measure_demo"]
 
@@ -31,7 +33,7 @@ def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> Path:
     Parameters
     ----------
     out : path-like
-        Folder, created if missing.
+        Folder, created if missing; a run in it is removed.
     seed : int
         Seed of the load cell's noise.
 
@@ -43,5 +45,9 @@ def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> Path:
     measured = LOAD_CELL.measure(scan(CONTOUR, rod=ROD).record, seed=seed)
     path = Path(out) / "record.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_record(measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")]), path)
+    measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
+    with replace_together(
+        path.parent, [*INFERENCE, *OF_POSTERIOR, path.name]
+    ) as temporary:  # the run is of another record
+        write_record(measured, temporary / path.name)
     return path

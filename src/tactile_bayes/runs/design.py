@@ -12,6 +12,7 @@ import xarray as xr
 from tactile_bayes import plotting
 from tactile_bayes.planning.design import design
 from tactile_bayes.runs.folder import Folder, Run
+from tactile_bayes.runs.names import DESIGN
 from tactile_bayes.runs.outermost import outermost
 
 __all__ = ["design_into", "design_messages"]
@@ -42,17 +43,17 @@ def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, *
         As in `design`.
     """
     found = design(*args, nested=nested, out=Path(out) / "nested" if nested else None, **options)
-    folder = Folder(out)
-    folder.write_netcdf("design", "design.nc", found)
     numbers = found.drop_vars(["drive", "is_pivot"]).data_vars
     columns = [str(name) for name, values in numbers.items() if values.dims == ("candidate",)]
     rows = np.stack([found[name].values for name in columns], axis=1)
     lines = [",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
     if not found.is_pivot.values.all():
         lines = [f'{line},"{drive}"' for line, drive in zip(lines, ["drive", *found.drive.values], strict=True)]
-    folder.write_lines("candidates", "candidates.csv", lines)
-    folder.write_lines("words", "words.txt", design_messages(found))
-    folder.draw("figure", "design.png", plotting.design, found)
+    with Folder(out, DESIGN) as folder:
+        folder.write_netcdf("design", "design.nc", found)
+        folder.write_lines("candidates", "candidates.csv", lines)
+        folder.write_lines("words", "words.txt", design_messages(found))
+        folder.draw("figure", "design.png", plotting.design, found)
     return Run(found, folder.files)
 
 

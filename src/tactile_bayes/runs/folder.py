@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.plotting.style import own_style, save_figure
 from tactile_bayes.record.netcdf import write_netcdf
-from tactile_bayes.tasks import write_atomically
+from tactile_bayes.tasks import replace_together
 
 __all__ = ["Folder", "Run", "panels", "posterior_in"]
 
@@ -41,7 +42,18 @@ class Run(Generic[Result]):
 
 
 class Folder:
-    """A folder of results, created if missing; each file is written whole, and replaces one of its name.
+    """A folder of results, created if missing, in which the files of one run replace those of the former one together.
+
+    Files are written inside a `with` block, at whose end they are moved into the folder (`replace_together`); if it
+    raises, the folder stays as it was.
+
+    Parameters
+    ----------
+    out : path-like
+        The folder.
+    names : sequence of str
+        All files that such a run can write; those it does not write are removed. A folder that lacks the first one is
+        not complete.
 
     Attributes
     ----------
@@ -50,16 +62,26 @@ class Folder:
         Files written so far, by content.
     """
 
-    def __init__(self, out: str | os.PathLike[str]) -> None:
+    def __init__(self, out: str | os.PathLike[str], names: Sequence[str]) -> None:
         self.path = Path(out)
         self.path.mkdir(parents=True, exist_ok=True)
+        self.names = tuple(names)
         self.files: dict[str, Path] = {}
+
+    def __enter__(self) -> Self:
+        self._replacing = replace_together(self.path, self.names)
+        self._new = self._replacing.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._replacing.__exit__(*error)
 
     @contextmanager
     def file(self, what: str, name: str) -> Iterator[Path]:
-        """Yield a temporary path to write to; the file exists, and is listed, once the block has succeeded."""
-        with write_atomically(self.path / name) as temporary:
-            yield temporary
+        """Yield a temporary path to write to; the file is listed once the block has succeeded."""
+        if name not in self.names:
+            raise ValueError(f"{name} is not among the files of this folder: {', '.join(self.names)}")
+        yield self._new / name
         self.files[what] = self.path / name
 
     def write_lines(self, what: str, name: str, lines: Iterable[str]) -> None:
@@ -74,18 +96,19 @@ class Folder:
 
     def write_netcdf(self, what: str, name: str, content: xr.Dataset | xr.DataTree) -> None:
         """Write a dataset or a tree as NetCDF, with checksums."""
-        write_netcdf(content, self.path / name)
-        self.files[what] = self.path / name
+        with self.file(what, name) as temporary:
+            write_netcdf(content, temporary)
 
     def draw(self, what: str, name: str, plot: Callable[..., Any], *arguments: Any, **options: Any) -> None:
         """Write the figure of the Axes that a function returns, as PNG."""
-        from matplotlib import pyplot as plt
+        with own_style():
+            from matplotlib import pyplot as plt
 
-        with plt.ioff():
-            figure = np.ravel(plot(*arguments, **options))[0].figure
-            with self.file(what, name) as temporary:
-                figure.savefig(temporary, dpi=200, format="png")
-            plt.close(figure)
+            with plt.ioff():
+                figure = np.ravel(plot(*arguments, **options))[0].figure
+                with self.file(what, name) as temporary:
+                    save_figure(figure, temporary, "png")
+                plt.close(figure)
 
 
 def panels(rows: int, columns: int, width: float, height: float, **options: Any) -> Any:

@@ -20,6 +20,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
 from tactile_bayes.record import bases_of, carried_sweeps, validate
 from tactile_bayes.runs.folder import Folder, Run, panels
+from tactile_bayes.runs.names import RECONSTRUCTION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,12 +97,11 @@ def reconstruct_into(
     if method is None:
         method = "constrained" if cell is not None and cell.has_variances else "raw"
     contacts = reconstruct(measured, method=method, load_cell=cell, friction=friction)
-    folder = Folder(out)
-    (folder.path / "contacts.png").unlink(missing_ok=True)  # it shows other contacts
-    folder.write_table("contacts", "contacts.csv", contacts)
-    shown = contacts.contact_x.values[contacts.status.values == "ok"]
-    if shown.size > 1 and np.ptp(shown) > 0.0:
-        folder.draw("map", "contacts.png", _map, measured, contacts, shown)
+    with Folder(out, RECONSTRUCTION) as folder:
+        folder.write_table("contacts", "contacts.csv", contacts)
+        shown = contacts.contact_x.values[contacts.status.values == "ok"]
+        if shown.size > 1 and np.ptp(shown) > 0.0:
+            folder.draw("map", "contacts.png", _map, measured, contacts, shown)
     return ReconstructionRun(contacts, folder.files, cell, source)
 
 

@@ -15,9 +15,9 @@ from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import infer_rig
 from tactile_bayes.inference.parameters.rig_prior import rig_prior
-from tactile_bayes.inference.result import write_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.runs.folder import Folder, Run
+from tactile_bayes.runs.names import RIG
 from tactile_bayes.uncertainty.summary import summary
 
 __all__ = ["RigRun", "calibrate_rig_into"]
@@ -79,13 +79,13 @@ def calibrate_rig_into(
         which = f"Record {number}: " if len(records) > 1 else ""
         messages += [f"{which}{verdict}" for verdict in verdicts(found)]
         rig = found
-    folder, numbers = Folder(out), summary(found, probability)
+    numbers = summary(found, probability)
     messages.append(_taken_over(found))
-    write_result(found, folder.path / "rig.nc")
-    folder.files["rig"] = folder.path / "rig.nc"
-    table = numbers.to_dataframe().to_string()
-    folder.write_lines("verdicts", "summary.txt", (*messages, "", table, "", found.attrs["message"]))
-    folder.write_table("summary", "summary.csv", numbers)
+    with Folder(out, RIG) as folder:
+        folder.write_netcdf("rig", "rig.nc", found)
+        table = numbers.to_dataframe().to_string()
+        folder.write_lines("verdicts", "summary.txt", (*messages, "", table, "", found.attrs["message"]))
+        folder.write_table("summary", "summary.csv", numbers)
     return RigRun(found, folder.files, numbers, tuple(messages))
 
 

@@ -18,6 +18,7 @@ from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import PARTS, sensitivity
 from tactile_bayes.runs.folder import Folder, Run, panels
+from tactile_bayes.runs.names import SENSITIVITY, STUDY
 from tactile_bayes.runs.outermost import outermost
 from tactile_bayes.tasks import TaskProgress
 
@@ -112,26 +113,28 @@ def sensitivity_into(
         raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
     report = progress or (lambda done: None)
     found = sensitivity(**options, progress=lambda part: report(part.done))
-    folder = Folder(out)
-    folder.write_netcdf("sensitivity", "sensitivity.nc", found)
-    folder.write_lines("words", "words.txt", [found.attrs["words"]])
-    for part in found.children:
-        draw = _draw_noise_shares if part == "noise_shares" else getattr(plotting, part)
-        folder.draw(part, f"{part}.png", draw, found)
     rods, studied = None, None
-    if material is not None:
-        rods = _rods(material, options, lambda rod: report(len(PARTS) + rod.done))
-        folder.write_netcdf("rods", "rods.nc", rods)
-        folder.draw("required_rod", "required_rod.png", plotting.required_rod, rods)
-        folder.write_lines("words", "words.txt", [found.attrs["words"], rod_message(rods)])
+    with Folder(out, SENSITIVITY) as folder:
+        folder.write_netcdf("sensitivity", "sensitivity.nc", found)
+        for part in found.children:
+            draw = _draw_noise_shares if part == "noise_shares" else getattr(plotting, part)
+            folder.draw(part, f"{part}.png", draw, found)
+        words = [found.attrs["words"]]
+        if material is not None:
+            rods = _rods(material, options, lambda rod: report(len(PARTS) + rod.done))
+            folder.write_netcdf("rods", "rods.nc", rods)
+            folder.draw("required_rod", "required_rod.png", plotting.required_rod, rods)
+            words.append(rod_message(rods))
+        folder.write_lines("words", "words.txt", words)
+    files = folder.files
     if study is not None:
         studied = error_map(out=folder.path / "study", **study)
-        inside = Folder(folder.path / "study")
-        inside.files["cells"] = inside.path / CELLS.file
-        inside.write_netcdf("study", "study.nc", studied)
-        inside.draw("errors", "study.png", _draw_study, studied)
-        folder.files |= inside.files
-    return SensitivityRun(found, folder.files, rods, studied)
+        with Folder(folder.path / "study", STUDY) as inside:
+            inside.files["cells"] = inside.path / CELLS.file
+            inside.write_netcdf("study", "study.nc", studied)
+            inside.draw("errors", "study.png", _draw_study, studied)
+        files |= inside.files
+    return SensitivityRun(found, files, rods, studied)
 
 
 def rod_message(rods: xr.Dataset) -> str:

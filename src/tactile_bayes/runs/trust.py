@@ -11,6 +11,8 @@ import xarray as xr
 from tactile_bayes import plotting
 from tactile_bayes.assessment.trust import trust
 from tactile_bayes.runs.folder import Folder, Run, posterior_in
+from tactile_bayes.runs.names import TRUST
+from tactile_bayes.tasks import refuse_replacing
 
 __all__ = ["REPLICATES_FOLDER", "trust_into"]
 
@@ -44,10 +46,12 @@ def trust_into(
         As in `trust`.
     """
     path = posterior_in(Path(run))
-    folder = Folder(path.parent if out is None else out)
-    found = trust(path, out=folder.path / REPLICATES_FOLDER, **options)
-    folder.write_netcdf("trust", "trust.nc", found)
-    folder.write_lines("words", "trust.txt", (found.attrs["summary"], "", *found.attrs["words"].splitlines()))
-    if "assumption" in found.dims:
-        folder.draw("figure", "assumptions.png", plotting.assumptions, found)
+    place = path.parent if out is None else Path(out)
+    refuse_replacing((place / name for name in TRUST), [path])
+    found = trust(path, out=place / REPLICATES_FOLDER, **options)
+    with Folder(place, TRUST) as folder:
+        folder.write_netcdf("trust", "trust.nc", found)
+        folder.write_lines("words", "trust.txt", (found.attrs["summary"], "", *found.attrs["words"].splitlines()))
+        if "assumption" in found.dims:
+            folder.draw("figure", "assumptions.png", plotting.assumptions, found)
     return Run(found, folder.files)

@@ -22,7 +22,8 @@ from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import record_hash
 from tactile_bayes.runs.contour import ContourRun, RunFolder, complete, file_of, origin_of
-from tactile_bayes.tasks import alone_in
+from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
+from tactile_bayes.tasks import alone_in, refuse_replacing
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.summary import reach, summary
 
@@ -116,7 +117,8 @@ class Watch:
     Raises
     ------
     ParameterError
-        If an argument is not valid, a width is given without ends, or the probability of a family for a single one.
+        If an argument is not valid, a width is given without ends, or the probability of a family for a single one, or
+        a file of the folder would replace the record.
     """
 
     def __init__(
@@ -150,6 +152,8 @@ class Watch:
                 raise ParameterError("until_probability is for several families: give two or more")
         self._most = check_whole_number("most_samples", most_samples, 100, "give a whole number of at least 100")
         self._until_width, self._until_probability = until_width, until_probability
+        written = (*INFERENCE, *OF_POSTERIOR, *WATCH)
+        refuse_replacing((Path(out) / name for name in written), [Path(record_file)])
         self._file, self._command = record_file, command
         if len(families) == 1:
             self._kind: type[Stream | StreamComparison] = Stream

@@ -1,4 +1,4 @@
-"""Atomic writes, so that a reader sees the old or the new file and never a part; folders for a single run."""
+"""Atomic writes, so that a reader sees old or new files and never a part; folders for a single run; inputs kept."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import re
 import secrets
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["alone_in", "is_temporary", "write_atomically"]
+from tactile_bayes.errors import ParameterError
+
+__all__ = ["alone_in", "is_temporary", "refuse_replacing", "replace_together", "write_atomically"]
 
 _HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 _TEMPORARY = re.compile(r"\.tactile-bayes-(?P<host>[0-9a-f]{8})-[0-9a-f]{16}\.tmp")
@@ -59,21 +61,88 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
     '42'
     """
     target = Path(path).resolve()
-    if not target.parent.is_dir():  # else the refusal would name the temporary file
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(target.parent))
-    _remove_leftovers(target.parent)
-    with _hidden_folder(target.parent) as folder:
+    with _beside(target.parent, target) as folder:
         temporary = folder / target.name
         yield temporary
-        with open(temporary, "r+b") as written:
-            os.fsync(written.fileno())
+        _flush(temporary)
         os.replace(temporary, target)
-    if os.name != "nt":  # Windows cannot open a directory, and its rename is journalled anyway
-        directory = os.open(target.parent, os.O_RDONLY)
-        try:
-            os.fsync(directory)
-        finally:
-            os.close(directory)
+        _flush_folder(target.parent)
+
+
+@contextmanager
+def replace_together(folder: Path, names: Sequence[str]) -> Iterator[Path]:
+    """Yield a temporary folder for files that replace those of these names in `folder`, when the block has succeeded.
+
+    Names of which the block writes no file are removed from `folder`. If the block raises, or a file cannot be
+    replaced, `folder` stays as it was. While the files are moved there are never old ones beside new ones: the old ones
+    go first, and the first name is the first to go and the last to come. A single new file replaces the old one at
+    once. So a folder in which a process was killed holds the old files, or the new ones, or lacks the first name.
+
+    Parameters
+    ----------
+    folder : Path
+        An existing folder.
+    names : sequence of str
+        Names in the folder, also in subfolders of it. Other files stay as they are.
+
+    Raises
+    ------
+    IsADirectoryError
+        If there is a folder of one of the names.
+    """
+    with _beside(folder, folder) as temporary:
+        yield temporary
+        new = [name for name in names if (temporary / name).is_file()]
+        for name in new:
+            _flush(temporary / name)
+        _exchange(folder, temporary, names, new)
+        _flush_folder(folder)
+
+
+def _exchange(folder: Path, temporary: Path, names: Sequence[str], new: Sequence[str]) -> None:
+    """Move the files of these names away, then the new ones to their places; undo all of it if a step fails."""
+    former = temporary / secrets.token_hex(8)
+    former.mkdir()
+    away = [
+        (folder / name, former / str(number))
+        for number, name in enumerate(names)
+        if os.path.lexists(folder / name) and [name] != new
+    ]
+    if folders := [path for path in (folder / name for name in names) if path.is_dir()]:
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folders[0]))
+    moved = list[tuple[Path, Path]]()
+    try:
+        for source, target in [*away, *((temporary / name, folder / name) for name in reversed(new))]:
+            os.replace(source, target)
+            moved.append((source, target))
+    except BaseException:
+        for source, target in reversed(moved):
+            os.replace(target, source)
+        raise
+
+
+def refuse_replacing(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Refuse to write a file from which the same call reads, under whatever name.
+
+    Raises
+    ------
+    ParameterError
+        If an output is the same file as an input; it names both.
+    """
+    sources = list(inputs)
+    for output in outputs:
+        for source in sources:
+            if _is_same(output, source):
+                raise ParameterError(
+                    f"{output} would replace {source}, which is read: give another place or name for the results"
+                )
+
+
+def _is_same(path: Path, other: Path) -> bool:
+    try:
+        return path.samefile(other)
+    except OSError:  # one of them is not there yet
+        return path.resolve() == other.resolve()
 
 
 def is_temporary(path: Path) -> bool:
@@ -82,21 +151,76 @@ def is_temporary(path: Path) -> bool:
 
 
 @contextmanager
+def _beside(parent: Path, target: Path) -> Iterator[Path]:
+    """Yield a hidden folder in a folder; errors of the system name the target instead of what is in it."""
+    if not parent.is_dir():  # else the refusal would name the temporary file
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(parent))
+    _remove_leftovers(parent)
+    try:
+        with _hidden_folder(parent) as folder:
+            yield folder
+    except OSError as error:
+        if error.errno is None or not (error.filename is None or _in_hidden_folder(error.filename)):
+            raise
+        raise type(error)(error.errno, error.strerror, str(target)) from error
+
+
+def _in_hidden_folder(name: object) -> bool:
+    """Return whether an error names a file in a hidden folder, or such a folder."""
+    return isinstance(name, str | bytes | os.PathLike) and any(
+        _TEMPORARY.fullmatch(part) for part in Path(os.fsdecode(name)).parts
+    )
+
+
+@contextmanager
 def _hidden_folder(parent: Path) -> Iterator[Path]:
     """Create a locked folder, and remove it at the end."""
-    while True:
-        folder = parent / f".tactile-bayes-{_HOST}-{secrets.token_hex(8)}.tmp"
-        folder.mkdir()
-        with suppress(FileNotFoundError, BlockingIOError):  # another process took it for a leftover at once
-            handle = _lock(folder)
-            if handle is None or folder.exists():
-                break
-            os.close(handle)
+    folder, handle = _locked_folder(parent)
     try:
         yield folder
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        _remove(folder)
         if handle is not None:
+            os.close(handle)
+
+
+def _locked_folder(parent: Path) -> tuple[Path, int | None]:
+    """Create a folder, and return it with its lock."""
+    while True:
+        folder = parent / f".tactile-bayes-{_HOST}-{secrets.token_hex(8)}.tmp"
+        folder.mkdir()
+        try:
+            handle = _lock(folder)
+            if handle is None or folder.exists():
+                return folder, handle
+            os.close(handle)
+        except (FileNotFoundError, BlockingIOError):  # another process took it for a leftover at once
+            pass
+        except BaseException:
+            _remove(folder)
+            raise
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder with its content; a second try if the first one fails."""
+    for _ in range(2):
+        if folder.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _flush(path: Path) -> None:
+    """Flush a file to the disk."""
+    with open(path, "r+b") as written:
+        os.fsync(written.fileno())
+
+
+def _flush_folder(folder: Path) -> None:
+    """Flush the names in a folder to the disk, except on Windows, which cannot, and whose renames are journalled."""
+    if os.name != "nt":
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
             os.close(handle)
 
 

@@ -1,0 +1,64 @@
+"""The files that each command can write into its folder; without the first of them the folder is not complete."""
+
+from __future__ import annotations
+
+__all__ = [
+    "CALIBRATION",
+    "CHECKPOINT",
+    "COMPARISON",
+    "DATASET",
+    "DESIGN",
+    "FIGURES",
+    "INFERENCE",
+    "INSPECTION",
+    "OF_POSTERIOR",
+    "RECONSTRUCTION",
+    "RIG",
+    "SENSITIVITY",
+    "STUDY",
+    "TRUST",
+    "WATCH",
+    "WATCH_PAGE",
+]
+
+INFERENCE = (
+    "summary.txt",
+    "posterior.nc",
+    "contacts.csv",
+    "band.csv",
+    "summary.csv",
+    "observables.png",
+    "predictive.png",
+    "rods.png",
+    "contour.png",
+    "gap.png",
+    "trace.png",
+    "pairs.png",
+)
+TRUST = ("trust.nc", "trust.txt", "assumptions.png")
+OF_POSTERIOR = ("report.html", *TRUST, "trust/replicates.json", "trust/alternatives.json")
+"""Files of other commands that belong to the posterior of a folder."""
+
+WATCH_PAGE = "watch.html"
+WATCH = ("stream.nc", WATCH_PAGE)
+INSPECTION = ("inspection.txt", "sweeps.csv", "channels.csv", "samples.csv", "inspection.png")
+RECONSTRUCTION = ("contacts.csv", "contacts.png")
+COMPARISON = ("comparison.nc", "comparison.csv", "families.png")
+RIG = ("summary.txt", "rig.nc", "summary.csv")
+CALIBRATION = ("verdict.txt", "calibration.nc", "ranks.png", "coverage.png")
+DESIGN = ("words.txt", "design.nc", "candidates.csv", "design.png")
+STUDY = ("study.nc", "study.png")
+SENSITIVITY = (
+    "words.txt",
+    "sensitivity.nc",
+    "amplification.png",
+    "information.png",
+    "noise_shares.png",
+    "required_noise.png",
+    "rods.nc",
+    "required_rod.png",
+    *(f"study/{name}" for name in STUDY),
+)
+CHECKPOINT = ("checkpoint.json", "block-*.npz")
+DATASET = ("manifest.json", "README.md", "shard-*.nc")
+FIGURES = ("figure_*.pdf", "figure_*.svg", "figure_*.png")
