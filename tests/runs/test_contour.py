@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from helpers.contour_posteriors import QUICK
+from helpers.contour_posteriors import QUICK, without
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError
@@ -14,8 +14,9 @@ from tactile_bayes.inference.result import read_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import to_dimensionless
 from tactile_bayes.runs import contour as module
-from tactile_bayes.runs.contour import analyse
+from tactile_bayes.runs.contour import RunFolder, analyse, complete
 from tactile_bayes.runs.demonstration import CONTOUR, ROD, TRUTH
+from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR
 from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.summary import summary
 
@@ -143,6 +144,28 @@ def test_a_second_run_replaces_the_files_of_the_first(measured, tmp_path):
     assert not (tmp_path / "report.html").exists()
     assert (tmp_path / "band.csv").read_text(encoding="utf-8") != "old"
     assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_run_that_writes_less_leaves_nothing_of_the_former_one(analysed, measured, tmp_path, monkeypatch):
+    """Neither contacts, if a channel is missing, nor figures, nor what belongs to the former posterior."""
+    run, _ = analysed
+    former = [*INFERENCE, *OF_POSTERIOR]
+    (tmp_path / "trust").mkdir()
+    for name in (*former, "notes.txt", "comparison.nc"):
+        (tmp_path / name).write_text("former", encoding="utf-8")
+    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
+    complete(run.posterior, without(measured, "force_x"), tmp_path)
+    left = {path.name for path in tmp_path.rglob("*")} - {"notes.txt", "comparison.nc", "trust"}
+    assert left == {"summary.txt", "posterior.nc", "band.csv", "summary.csv"}
+    assert all((tmp_path / name).read_bytes() != b"former" for name in left)
+
+
+def test_the_posterior_removes_what_belongs_to_a_former_one_at_once(analysed, tmp_path):
+    run, _ = analysed
+    for name in INFERENCE:
+        (tmp_path / name).write_text("former", encoding="utf-8")
+    RunFolder(tmp_path).write_posterior(run.posterior)
+    assert [path.name for path in tmp_path.iterdir()] == ["posterior.nc"]
 
 
 @pytest.mark.slow

@@ -43,10 +43,14 @@ def test_a_run_that_fails_leaves_the_former_one(tmp_path, error):
         yield "one"
         raise error("it broke")
 
+    def run(folder):
+        with folder:
+            folder.write_lines("table", "table.csv", ["new"])
+            folder.write_lines("words", "words.txt", lines())
+
     folder = Folder(tmp_path, NAMES)
-    with pytest.raises(error, match="it broke"), folder:
-        folder.write_lines("table", "table.csv", ["new"])
-        folder.write_lines("words", "words.txt", lines())
+    with pytest.raises(error, match="it broke"):
+        run(folder)
     assert "words" not in folder.files
     assert contents(tmp_path) == dict.fromkeys(NAMES, "former")
 

@@ -1,0 +1,148 @@
+"""No command replaces a file that it reads, under whatever name, and it refuses before anything is written."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from helpers import commands
+from helpers.refusals import refused
+from tactile_bayes import datasets
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.report import write_report
+from tactile_bayes.runs.contour import analyse
+from tactile_bayes.runs.trust import trust_into
+from tactile_bayes.runs.watch import Watch
+
+TEXT = "the only copy of a day's work"
+
+GAUGE = "--family circle --parameter r=0.01 --parameter q=0.05"
+
+CALLS = [
+    "inspect {samples.csv} --out .",
+    "inspect record.csv --rod-shape {sweeps.csv} --flexural-rigidity 1 --out .",
+    "reconstruct {contacts.csv} --out .",
+    "infer {contacts.csv} --out .",
+    "infer {trust.nc} --out .",
+    "infer record.csv --rig {posterior.nc} --out .",
+    "infer record.csv --rod-shape {band.csv} --flexural-rigidity 1 --out .",
+    "infer {block-00000000-00000100.npz} --out run --checkpoint .",
+    "compare {comparison.nc} --out .",
+    "compare record.csv --rig {comparison.csv} --out .",
+    "watch {band.csv} --out . --idle 0",
+    "watch record.csv --rig {stream.nc} --out . --idle 0",
+    "measure {record.csv} --out record.csv --force-noise 1 --moment-noise 1",
+    "scan --points {points.csv} --out points.csv",
+    "scan --rod-shape {shape.csv} --flexural-rigidity 1 --out shape.csv",
+    "scan --poses {poses.csv} --out poses.csv",
+    "scan --points {points.svg} --figure points.svg --out scan.csv",
+    "calibrate --rod-shape {verdict.txt} --flexural-rigidity 1 --out .",
+    "calibrate --rod-shape {replicates.json} --flexural-rigidity 1 --out .",
+    f"calibrate-rig {{summary.csv}} {GAUGE} --out .",
+    f"calibrate-rig record.csv {{rig.nc}} {GAUGE} --out .",
+    f"calibrate-rig record.csv --rig {{rig.nc}} {GAUGE} --out .",
+    "sensitivity --rod-shape {words.txt} --flexural-rigidity 1 --out .",
+    "sensitivity --rod-shape {study/study.nc} --flexural-rigidity 1 --study --out .",
+    "design --poses {candidates.csv} --out .",
+    "design {design.nc} --out .",
+    "figures --poses {figure_03_motion.pdf} --out .",
+    "trust run --out {posterior.nc=trust.nc}",
+    "report run --out {run/posterior.nc}",
+    "report run --out {run/trust.nc}",
+    "report run --compare other --out {other/comparison.nc}",
+    "dataset generate {README.md} --out .",
+    "dataset generate {manifest.json} --out .",
+    "dataset record set 0 --out {set/shard-000000.nc}",
+    "dataset record {set.csv} 0 --out set.csv",
+]
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("words", CALLS)
+def test_an_output_that_is_an_input_is_refused(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    start, end = words.index("{"), words.index("}")
+    name = words[start + 1 : end]
+    if "=" in name:  # a folder with a second name of the file in another folder
+        first, second = name.split("=")
+        (tmp_path / "run").mkdir()
+        (tmp_path / "run" / first).write_text(TEXT)
+        (tmp_path / "out").mkdir()
+        os.link(tmp_path / "run" / first, tmp_path / "out" / second)
+        name = "out"
+    else:
+        for folder in (Path(name).parent, Path("run")):
+            folder.mkdir(exist_ok=True)
+        Path(name).write_text(TEXT)
+    before = contents(tmp_path)
+    result = commands.call(*(words[:start] + name + words[end + 1 :]).split())
+    commands.assert_refused(result, "would replace")
+    assert contents(tmp_path) == before
+    assert not [path for path in tmp_path.rglob("*") if path.suffix == ".tmp"]
+
+
+ALIASES = {
+    "relative": lambda folder: folder / "sub" / ".." / "samples.csv",
+    "symbolic link": lambda folder: linked(folder, os.symlink),
+    "hard link": lambda folder: linked(folder, os.link),
+    "link to the folder": lambda folder: folder_link(folder) / "samples.csv",
+}
+
+
+def linked(folder, link):
+    link(folder / "samples.csv", folder / "record.csv")
+    return folder / "record.csv"
+
+
+def folder_link(folder):
+    (folder / "link").symlink_to(folder)
+    return folder / "link"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links take rights there")
+@pytest.mark.parametrize("alias", ALIASES)
+def test_the_same_file_under_another_name_is_refused(alias, tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "samples.csv").write_text(TEXT)
+    path = ALIASES[alias](tmp_path)
+    result = commands.call("inspect", path, "--out", tmp_path)
+    commands.assert_refused(result, f"{tmp_path / 'samples.csv'} would replace {path}")
+    assert (tmp_path / "samples.csv").read_text() == TEXT
+
+
+def test_a_record_that_is_not_there_yet_is_not_replaced_either(tmp_path):
+    result = commands.call("watch", tmp_path / "contacts.csv", "--out", tmp_path, "--idle", 0)
+    commands.assert_refused(result, "would replace")
+
+
+def test_a_folder_beside_the_inputs_is_taken(record, tmp_path):
+    path = tmp_path / "samples.csv"
+    path.write_bytes(record.read_bytes())
+    result = commands.call("inspect", path, "--out", tmp_path / "inspection", "--quiet")
+    assert result.exit_code == 0, result.output
+    assert path.read_bytes() == record.read_bytes()
+    assert (tmp_path / "inspection" / "samples.csv").exists()
+
+
+def test_functions_that_know_both_refuse_as_well(tmp_path, measured):
+    run, spec = tmp_path / "run", tmp_path / "README.md"
+    run.mkdir()
+    for path in (run / "posterior.nc", run / "contacts.csv", spec):
+        path.write_text(TEXT)
+    os.link(run / "posterior.nc", tmp_path / "trust.nc")
+    before = contents(tmp_path)
+    with refused(ParameterError, "would replace"):
+        write_report(run, run / "posterior.nc")
+    with refused(ParameterError, "would replace"):
+        trust_into(run, tmp_path)
+    with refused(ParameterError, "would replace"):
+        datasets.generate(spec, tmp_path)
+    with refused(ParameterError, "would replace"):
+        Watch(run, record_file=run / "contacts.csv")
+    with refused(ParameterError, "would replace"):
+        analyse(measured, run, record_file=run / "contacts.csv")
+    assert contents(tmp_path) == before
