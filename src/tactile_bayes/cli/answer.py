@@ -52,10 +52,10 @@ def print_answer(answer: Answer, as_json: bool) -> None:
 
 
 def print_object(numbers: Mapping[str, Any], *, in_a_line: bool = False) -> None:
-    """Print an object for programs, in which null stands for numbers that are not finite."""
+    """Print an object for programs, in ASCII; null stands for numbers that are not finite."""
     import json
 
-    typer.echo(json.dumps(_plain(numbers), ensure_ascii=False, indent=None if in_a_line else 2, allow_nan=False))
+    typer.echo(json.dumps(_plain(numbers), indent=None if in_a_line else 2, allow_nan=False))
 
 
 def _print_part(part: str | Table | Mapping[str, Path]) -> None:

@@ -23,6 +23,7 @@ from tactile_bayes.cli.report import report
 from tactile_bayes.cli.rig_calibration import calibrate_rig
 from tactile_bayes.cli.scanning import scan
 from tactile_bayes.cli.sensitivity import sensitivity
+from tactile_bayes.cli.streams import accept_every_text
 from tactile_bayes.cli.trust import trust
 from tactile_bayes.cli.watching import watch
 
@@ -141,6 +142,7 @@ app.add_typer(dataset, name="dataset")
 def main() -> None:
     """Run the command line."""
     os.environ["MPLBACKEND"] = "agg"  # figures go to files, also without a screen
+    accept_every_text()
     app()
 
 

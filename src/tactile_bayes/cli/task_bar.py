@@ -87,7 +87,7 @@ def moving_bar(quiet: bool, at_first: str, *columns: ProgressColumn) -> Iterator
         yield None
         return
     left = TextColumn("{task.fields[left]}")
-    with Progress(SpinnerColumn(), *columns, left, console=console, transient=True) as bar:
+    with Progress(SpinnerColumn("line"), *columns, left, console=console, transient=True) as bar:
         yield partial(bar.update, bar.add_task(at_first, total=None, left=""))
 
 

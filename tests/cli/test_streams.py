@@ -1,0 +1,120 @@
+"""Results arrive on every stream: what its encoding lacks has a readable stand-in, and JSON is ASCII."""
+
+import io
+import json
+import os
+import subprocess
+import sys
+import tomllib
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tactile_bayes.cli import app
+from tactile_bayes.cli.streams import accept_every_text
+
+ENCODINGS = ["ascii", "cp1252", "cp437", "latin-1", "koi8-r", "shift_jis", "utf-8"]
+
+COMMAND = [sys.executable, "-m", "tactile_bayes.cli"]
+
+
+@contextmanager
+def streams(encoding):
+    """Streams of this encoding in place of stdout and stderr; yields what has been written to each at the end."""
+    before, written = (sys.stdout, sys.stderr), []
+    sys.stdout, sys.stderr = (io.TextIOWrapper(io.BytesIO(), encoding=encoding) for _ in before)
+    try:
+        accept_every_text()
+        yield written
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+            written.append(stream.buffer.getvalue())
+    finally:
+        sys.stdout, sys.stderr = before
+
+
+def called(encoding, *words):
+    with streams(encoding) as written:
+        app([str(word) for word in words], standalone_mode=False)
+    return written
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_a_table_arrives(encoding, record):
+    written, errors = called(encoding, "inspect", record)
+    assert errors == b""
+    assert "lets go" in written.decode(encoding)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_every_sign_arrives(encoding):
+    """Of all planes that the package may ever use, and bytes of file names that are no text."""
+    signs = "".join(map(chr, [*range(32, 0x3000), *range(0xDC80, 0xDD00)]))
+    with streams(encoding) as written:
+        print(signs)
+        print(signs, file=sys.stderr)
+    assert written[0] == written[1]
+    assert "R" in written[0].decode(encoding)
+
+
+def test_stand_ins_can_be_read():
+    with streams("ascii") as written:
+        print("R̂ 28.0° −3 ± 2 µN, Δκ₀ ≥ ½ N m², “é” ⁻¹ 日 \udcff")
+    assert written[0] == b'R^ 28.0deg -3 +/- 2 uN, Deltakappa0 >= 1/2 N m^2, "e" ^-^1 ? \\xff\n'
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-8"])
+def test_what_an_encoding_has_stays_as_it_is(encoding):
+    with streams(encoding) as written:
+        print("28.0° ± 2 µN m²")
+    assert written[0] == "28.0° ± 2 µN m²\n".encode(encoding)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
+def test_json_is_ascii_on_every_stream(encoding, record, tmp_path):
+    path = tmp_path / "°.csv"
+    path.write_bytes(record.read_bytes())
+    written, _ = called(encoding, "inspect", path, "--json")
+    assert written.isascii()
+    assert str(path) in json.loads(written)["next"]
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
+@pytest.mark.parametrize("words", [["--help"], *([name, "--help"] for name in ("infer", "measure", "sensitivity"))])
+def test_help_arrives(encoding, words):
+    written, errors = called(encoding, *words)
+    assert "Usage: " in written.decode(encoding)
+    assert errors == b""
+
+
+def test_an_example_is_text_of_toml_on_every_stream():
+    written, _ = called("cp1252", "dataset", "example")
+    assert written.isascii()
+    assert tomllib.loads(written.decode("ascii"))
+
+
+@pytest.mark.parametrize("json_asked", [[], ["--json"]])
+def test_a_process_with_the_locale_of_c(record, json_asked):
+    variables = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    command = [*COMMAND, "inspect", str(record), *json_asked]
+    done = subprocess.run(command, capture_output=True, env=os.environ | variables, check=True)
+    assert done.stdout.isascii()
+    assert done.stderr == b""
+    assert b"drive" in done.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes end otherwise there")
+def test_a_reader_that_goes_away_ends_the_command_quietly(record, tmp_path):
+    with (tmp_path / "errors").open("wb") as errors:
+        command = [*COMMAND, "inspect", str(record)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors) as process:
+            process.stdout.close()
+    assert (tmp_path / "errors").read_bytes() == b""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+def test_a_full_disk_behind_the_stream_is_named(record):
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run([*COMMAND, "inspect", str(record)], stdout=full, stderr=subprocess.PIPE, check=False)
+    assert (done.returncode, done.stderr) == (2, b"tactile-bayes: No space left on device\n")
