@@ -20,7 +20,7 @@ from tactile_bayes.record.storable import not_storable
 from tactile_bayes.record.table import Source
 
 _QUANTITY = re.compile(
-    r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?\s*"
+    r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?\s*"
     r"(?:(?P<brackets>\[[^\[\]]*\])|(?P<unit>[^\W\d].*|°))?"
 )
 

@@ -28,10 +28,10 @@ _NAME = r"[\w.\-]+"
 _QUOTED = r'"(?:[^"\\]|\\.)*"'
 _UNIT = r'(?!\s)[^\]"]*(?<!\s)'
 _FORMAT_LINE = re.compile(r"tactile_bayes record, format (?P<format>[0-9]+)")
-_HEADER_LINE = re.compile(rf"(?P<key>{_NAME}|{_QUOTED})\s*:\s*(?P<value>.*)")
+_HEADER_LINE = re.compile(rf"(?P<key>{_NAME}|{_QUOTED})\s*:\s*+(?P<value>.*)")
 _COLUMN_LINE = re.compile(
-    rf"column\s+(?P<name>{_NAME}|{_QUOTED})\s*:\s*(?P<kind>\w+)\s*"
-    rf"(?:\[\s*(?P<units>{_QUOTED}|{_UNIT})\s*\])?\s*(?P<long_name>.*)"
+    rf"column\s+(?P<name>{_NAME}|{_QUOTED})\s*:\s*+(?P<kind>\w++)\s*+"
+    rf"(?:\[\s*(?P<units>{_QUOTED}|{_UNIT})\s*\])?\s*+(?P<long_name>.*)"
 )
 _QUANTITY = re.compile(r"(?P<number>[^\[\]]+)(?:\[(?P<unit>[^\]]*)\])?")
 
