@@ -29,7 +29,7 @@ CLASSES = {
     codes.CATEGORY_NOT_WORD: " -",
 }
 REPEATS = (codes.MAX_REPEAT, codes.MIN_REPEAT, codes.POSSESSIVE_REPEAT)
-USUAL = "a1 .,-/:[(\"\\\n"
+USUAL = 'a1 .,-/:[("\\\n'
 
 
 class _Blanks(dict):
@@ -56,7 +56,9 @@ def patterns():
             if node.value.id in compiled and node.attr in METHODS:
                 found.setdefault(compiled[node.value.id], set()).add(node.attr)
         for node in ast.walk(ast.parse(text)):
-            if isinstance(node, ast.Call) and ast.unparse(node.func) in {f"re.{name}" for name in METHODS | {"compile"}}:
+            if isinstance(node, ast.Call) and ast.unparse(node.func) in {
+                f"re.{name}" for name in METHODS | {"compile"}
+            }:
                 first = eval(compile(ast.Expression(node.args[0]), path, "eval"), _Blanks(names))
                 found.setdefault(getattr(first, "pattern", first), set()).add(node.func.attr)
     return found
