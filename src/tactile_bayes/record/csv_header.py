@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, BinaryIO
 
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
 from tactile_bayes.record.encoding import WITH_NUL, not_utf8
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
 from tactile_bayes.record.table import Source
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["FORMAT", "KINDS", "Header", "cells_in", "column_line", "header_line", "lines_below", "read_header"]
 
@@ -209,8 +211,8 @@ def _unpadded(text: str) -> str:
 
 def _unquoted(text: str) -> str:
     try:
-        return str(json.loads(text)) if re.fullmatch(_QUOTED, text) else text
-    except json.JSONDecodeError:
+        return str(read_json(text, "the text")) if re.fullmatch(_QUOTED, text) else text
+    except ParameterError:
         return text
 
 

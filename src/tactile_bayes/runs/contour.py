@@ -31,6 +31,7 @@ from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod
 from tactile_bayes.runs.folder import Folder, panels
 from tactile_bayes.sweep import Scan, recorded_drives, scan
+from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
@@ -295,7 +296,7 @@ class _Figures:
         """A scan of the most probable contour."""
         best = self.result["sample_stats"]["lp"].argmax(("chain", "draw"))  # the medians may be out of reach
         draw, attrs = self.draws.isel(best), self.result.attrs
-        found = {name: float(draw[name]) for name in json.loads(attrs["nuisances"]) if name in draw}
+        found = {name: float(draw[name]) for name in read_json(attrs["nuisances"], "nuisances") if name in draw}
         if self.measured.attrs["units"] == "dimensionless":
             found.pop("length", None)  # a scan would be in lengths of that rod
         contour = contours_of(draw, attrs["family"]).take(np.array(0))
