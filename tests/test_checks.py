@@ -1,6 +1,8 @@
 """Wrong arguments of the names that are used first: each is refused, in words, before anything is computed."""
 
+import contextlib
 import functools
+import inspect
 import math
 import pathlib
 import re
@@ -613,3 +615,81 @@ def test_checks_return_what_they_checked_as_it_is_used():
 def test_what_is_long_is_shown_by_its_kind():
     assert shown(xr.Dataset()) == "a Dataset"
     assert shown(np.zeros((50, 50))) == "a ndarray of shape (50, 50)"
+
+
+# --- Switches -----------------------------------------------------------------------------------------------------
+
+
+def switches():
+    """(name of a public function, its boolean parameter), by annotation or default."""
+    for module in (tb, tb.contours, tb.datasets, tb.elastica, tb.paper_figures, tb.plotting):
+        for name in module.__all__:
+            value = getattr(module, name)
+            methods = [f"{name}.{own}" for own in dir(value) if inspect.isclass(value) and not own.startswith("_")]
+            for label in [name, *methods]:
+                function = functools.reduce(getattr, label.split("."), module)
+                if not callable(function) or inspect.ismodule(function):
+                    continue
+                with contextlib.suppress(ValueError, TypeError):  # of some builtins
+                    for parameter in inspect.signature(function).parameters.values():
+                        if parameter.annotation in (bool, "bool") or isinstance(parameter.default, bool):
+                            yield module, label, parameter.name
+
+
+def required():
+    """Values of required parameters, by name."""
+    contours = [{"family": "parabola", "a": 0.6, "q": 0.5}]
+    return {
+        "axial": np.linspace(0.1, 0.2, 12),
+        "contour": tb.contours.Circle(0.5, 0.5),
+        "families": ["parabola", "circle"],
+        "gauge": {"r": 0.5, "q": 0.5},
+        "index": 0,
+        "known": "parabola",
+        "lateral": np.linspace(0.01, 0.02, 12),
+        "measured": measured(),
+        "number": 0,
+        "parameters": {"r": 0.5, "q": 0.5},
+        "path": pathlib.Path(__file__).parents[1] / "data" / "synthetic" / "rig.csv",
+        "posterior": posterior_with_prior(),
+        "predicted": [[[0.1, 0.1, 0.1]]],
+        "reading": np.linspace(1.0, 2.0, 12),
+        "record": measured(),
+        "records": measured(),
+        "run_or_posterior": posterior_with_prior(),
+        "seed": 0,
+        "self": CELL,
+        "source": {"records": 1, "seed": 1, "contours": contours},
+        "x": [0.0, 0.1],
+    }
+
+
+def posterior_with_prior():
+    tree = posterior().copy()
+    tree["prior"] = tree["posterior"].copy()
+    tree["constant_data"] = xr.DataTree(xr.Dataset())
+    return tree
+
+
+@pytest.mark.parametrize("value", ["no", 0, None], ids=repr)
+@pytest.mark.parametrize(
+    ("module", "label", "name"), list(switches()), ids=lambda part: getattr(part, "__name__", part)
+)
+def test_a_switch_takes_true_and_false_alone(module, label, name, value):
+    if label == "Specification":
+        given = vars(tb.datasets.read_specification(required()["source"])) | {name: value}
+    else:
+        function = functools.reduce(getattr, label.split("."), module)
+        needed = inspect.signature(function).parameters.values()
+        kinds = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
+        table = required()
+        given = {one.name: table[one.name] for one in needed if one.default is one.empty and one.kind not in kinds}
+        given[name] = value
+    with refused(ParameterError, f"{name} is {value!r}: give True or False"):
+        functools.reduce(getattr, label.split("."), module)(**given)
+
+
+def test_the_switches_are_found():
+    assert {("record", "truth"), ("design", "nested"), ("read_record", "split_sweeps")} <= {
+        (label, name) for _, label, name in switches()
+    }

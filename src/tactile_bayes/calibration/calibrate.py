@@ -23,6 +23,7 @@ from tactile_bayes.checks import (
     check_optional,
     check_path,
     check_seed,
+    check_switch,
     check_whole_number,
     refused,
 )
@@ -234,6 +235,7 @@ def calibration_replicate(
     (['a', 'q', 'x_c', 'noise_scale'], True)
     """
     number = check_whole_number("number of the replicate", number, 0)
+    check_switch("throw", throw)
     experiment = experiment_of(**options)
     folder = None if out is None else check_path("out", out)
     ResultsStore(experiment.identity, folder, REPLICATES)  # refuses that of another experiment

@@ -24,6 +24,7 @@ from tactile_bayes.inference.streams.stream import LEVELS, Stream
 from tactile_bayes.inference.streams.stream_state import read_tree
 from tactile_bayes.record import rod_of, validate
 from tactile_bayes.record.netcdf import write_netcdf
+from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.uncertainty.averaged_contours import averaged_heights
 
 __all__ = ["StreamComparison"]
@@ -279,13 +280,13 @@ class StreamComparison:
         tree = read_tree(path)
         if tree.attrs.get("kind") != _KIND:
             raise InferenceError(f"{path} holds no streams of families: give a file that save has written")
-        families = json.loads(tree.attrs["families"])
+        families = read_json(tree.attrs["families"], "families")
         if families != own._families:
             raise InferenceError(
                 f"{path} is of the families {', '.join(families)}, not {', '.join(own._families)}: give another file, "
                 "or the families of then"
             )
-        own._lost = json.loads(tree.attrs["lost"])
+        own._lost = read_json(tree.attrs["lost"], "lost")
         parts = [tree[f"family_{k}"] for k in range(len(own._left()))]
         own._streams = own._first(cast(xr.DataTree, parts[0]["record"]).to_dataset() if record is None else record)
         for name, part in zip(own._left(), parts, strict=True):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.inference.misfit import what_to_try
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["NONE_FITS", "verdict_on"]
 
@@ -24,7 +23,7 @@ def verdict_on(result: xr.Dataset) -> str:
     fits = result.fits.values
     if not fits.any():
         return f"{NONE_FITS} ({', '.join(names)}). Probabilities say which of them is the least wrong. " + what_to_try(
-            names, json.loads(result.attrs["nuisances"]), friction=result.attrs["friction"]
+            names, read_json(result.attrs["nuisances"], "nuisances"), friction=result.attrs["friction"]
         )
     parts = []
     probability = result.probability.values

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.checks import as_number
+from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import SpecificationError
 
 __all__ = ["Distribution", "distribution_of"]
@@ -138,18 +138,20 @@ def distribution_of(value: Any, key: str) -> Distribution:
         value = dict(value)
         axis = value.pop("axis")
         if not isinstance(axis, str) or not axis:
-            raise SpecificationError(f"{key}.axis is {axis!r}: give a name, the same for lists that advance in step")
+            raise SpecificationError(
+                f"{key}.axis is {shown(axis)}: give a name, the same for lists that advance in step"
+            )
     if not isinstance(value, dict) or len(value) != 1:
-        raise SpecificationError(f"{key} is {value!r}: {hint}")
+        raise SpecificationError(f"{key} is {value!r:.1000}: {hint}")
     ((kind, numbers),) = value.items()
     if kind not in kinds:
-        raise SpecificationError(f"{key} has the distribution {kind!r}, which is unknown: {hint}")
+        raise SpecificationError(f"{key} has the distribution {shown(kind)}, which is unknown: {hint}")
     if not isinstance(numbers, list) or not numbers or not all(map(_is_number, numbers)):
-        raise SpecificationError(f"{key}.{kind} is {numbers!r}: give a list of finite numbers")
+        raise SpecificationError(f"{key}.{kind} is {shown(numbers)}: give a list of finite numbers")
     if kind in _KINDS and len(numbers) != 2:
         raise SpecificationError(f"{key}.{kind} has {len(numbers)} numbers: give two")
     if kind in _KINDS and not _KINDS[kind].is_possible(*numbers):
-        raise SpecificationError(f"{key}.{kind} is {numbers!r}: {_KINDS[kind].rule}")
+        raise SpecificationError(f"{key}.{kind} is {shown(numbers)}: {_KINDS[kind].rule}")
     return Distribution(kind, tuple(float(number) for number in numbers), axis)
 
 

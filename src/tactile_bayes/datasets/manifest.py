@@ -16,6 +16,7 @@ from tactile_bayes.datasets.shard import Written
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.tasks import write_atomically
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["MANIFEST", "Manifest", "read_manifest", "versions_here", "write_manifest"]
 
@@ -115,7 +116,7 @@ def read_manifest(folder: Path) -> Manifest:
     path = folder / MANIFEST
     try:
         content = path.read_bytes()
-        table = json.loads(content)
+        table = read_json(content, "it")
         table.pop("sha256")
         if content != _content(table):
             raise SpecificationError(f"{path} is not as it was written, its own checksum differs: {_CORRECTION}")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.checks import check_switch
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.datasets.collection import opened
@@ -63,6 +64,7 @@ def record(
     >>> one.sizes["sample"], one.attrs["truth_family"], one.attrs["load_cell_moment_noise"]
     (360, 'parabola', 0.02)
     """
+    check_switch("truth", truth)
     folder = None if isinstance(source, Mapping | Specification) or not Path(source).is_dir() else Path(source)
     if folder is not None:
         manifest = read_manifest(folder)

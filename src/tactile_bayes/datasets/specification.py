@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactile_bayes.arrays import Index
+from tactile_bayes.checks import check_switch
 from tactile_bayes.datasets.distributions import Distribution
 from tactile_bayes.datasets.specification_text import meaning
 from tactile_bayes.errors import SpecificationError
@@ -108,6 +109,10 @@ class Specification:
     load_cell: Mapping[str, Distribution]
     frame: Frame
     single: bool
+
+    def __post_init__(self) -> None:
+        check_switch("each_group", self.each_group)
+        check_switch("single", self.single)
 
     @property
     def units(self) -> str:

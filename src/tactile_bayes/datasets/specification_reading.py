@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -24,6 +22,7 @@ from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
+from tactile_bayes.tasks.documents import LARGEST, read_toml
 
 __all__ = ["read_specification", "read_text", "rule_of"]
 
@@ -82,7 +81,8 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
     else:
         where = str(source)
         try:
-            text = Path(source).read_text(encoding="utf-8")
+            with open(source, encoding="utf-8-sig") as file:
+                text = file.read(LARGEST + 1)
         except UnicodeDecodeError as error:
             raise SpecificationError(f"{where}: not a text in UTF-8: {error.reason} at byte {error.start}") from error
     try:
@@ -94,12 +94,9 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
 def read_text(text: str) -> Specification:
     """Read the specification in a TOML text; see `read_specification`."""
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SpecificationError(f"not TOML: {error}") from error
-    if not table:
-        raise SpecificationError("it is empty: `tactile-bayes dataset example` prints one to start from")
-    try:
+        table = read_toml(text)
+        if not table:
+            raise SpecificationError("it is empty: `tactile-bayes dataset example` prints one to start from")
         return _specification(table, text)
     except ParameterError as error:
         raise SpecificationError(str(error)) from error

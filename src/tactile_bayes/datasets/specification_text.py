@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from itertools import zip_longest
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import SpecificationError
+from tactile_bayes.tasks.documents import read_toml
 
 __all__ = ["DEFAULTS", "SCAN", "UNNAMED", "differences", "left_out", "meaning", "toml_of", "without"]
 
@@ -36,7 +36,7 @@ def meaning(text: str) -> dict[str, Any]:
     """Return the meaning of the text of a specification.
 
     It does not depend on comments, layout, the notation of numbers (1 or 1.0), or explicit default values."""
-    said = without(DEFAULTS, tomllib.loads(text))
+    said = without(DEFAULTS, read_toml(text))
     said["contours"] = [
         without({"weight": 1.0, **left_out(FAMILIES[group["family"]])}, group) for group in said["contours"]
     ]

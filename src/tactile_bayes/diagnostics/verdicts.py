@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
 from collections.abc import Container, Mapping
@@ -22,6 +21,7 @@ from tactile_bayes.inference.result import is_streamed, posterior_draws, record_
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["CONTRADICTION", "NOISE_FACTOR", "OFF_ZERO", "doubtful_sides", "verdicts"]
 
@@ -135,7 +135,7 @@ def verdicts(
 
 def _inferred(posterior: xr.DataTree) -> list[str]:
     """Return the nuisance parameters of a run."""
-    names: list[str] = json.loads(posterior.attrs.get("nuisances", "[]"))
+    names: list[str] = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
     return names
 
 
@@ -143,7 +143,7 @@ def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
     """Return a message on sweeps whose side of contact is in doubt, from attributes of a posterior or of contacts."""
     if "doubtful_sides" not in attrs:
         return []
-    sides = json.loads(attrs["doubtful_sides"])
+    sides = read_json(attrs["doubtful_sides"], "doubtful_sides")
     taken = ", ".join(f"sweep {sweep} as a {side} one" for sweep, side in sides.items())
     probability = attrs.get("sides_probability")
     sure = "" if probability is None else f", with probability {probability:.2g}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -16,6 +15,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of, to_si, with_rod
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["FoundRig", "contact_points", "found_rig", "rig_with", "rod_with"]
 
@@ -74,7 +74,7 @@ def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.Da
     draws = posterior_draws(posterior)
     found = {str(name): float(values.median()) for name, values in draws.data_vars.items()}
     stated = load_cell or LoadCell.from_record(measured) or LoadCell()
-    names = json.loads(posterior.attrs.get("nuisances", "[]"))
+    names = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
     noise: dict[str, Any] = {name: found[name] for name in ("moment_noise", "force_noise") if name in found}
     rig = {name: value for name, value in found.items() if name in names}
     return rig_with(measured, replace(stated, **noise), rig, float(posterior.attrs["friction"]))

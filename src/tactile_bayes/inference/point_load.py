@@ -33,6 +33,7 @@ from tactile_bayes.checks import (
     check_number,
     check_optional,
     check_positive,
+    check_switch,
     refused,
 )
 from tactile_bayes.errors import InferenceError, ParameterError
@@ -408,6 +409,7 @@ def infer_point_load(
     (('chain', 'draw'), ['reading', 'expected_reading'])
     """
     axial, lateral, reading = _checked(axial, lateral, reading)
+    check_switch("small_deflection", small_deflection)
     if full_scale is None:
         full_scale = 10.0 ** math.ceil(math.log10(np.abs(reading).max()))
     check_positive("full_scale", full_scale, "give a positive reading")

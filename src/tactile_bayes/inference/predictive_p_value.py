@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["predictive_p_value"]
 
@@ -55,7 +55,7 @@ def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats
     if "noise_sd" in posterior:
         noise = posterior["noise_sd"].values[..., None]
     else:
-        noise = np.asarray(json.loads(tree.attrs["known"])["noise_sd"])
+        noise = np.asarray(read_json(tree.attrs["known"], "known")["noise_sd"])
     predictive = tree["posterior_predictive"].to_dataset()
     expected = predictive["expected_reading"].values
     observed = tree["observed_data"].to_dataset()["reading"].values

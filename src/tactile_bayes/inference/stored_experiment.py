@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -17,6 +16,7 @@ from tactile_bayes.inference.experiment import Experiment, prior_in_words
 from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.inference.parameters.rig_prior import RigPrior
 from tactile_bayes.inference.result import contour_draws, record_of
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["experiment_of", "joint_of", "points_of", "predicted_points"]
 
@@ -59,13 +59,13 @@ def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = N
         str(attrs["family"]),
         priors={},
         friction=float(attrs["friction"]),
-        nuisances=json.loads(attrs["nuisances"]),
+        nuisances=read_json(attrs["nuisances"], "nuisances"),
         events=bool(attrs.get("events", 1)),
         joint=joint_of(attrs),
     )
     default, given = experiment.default_priors, {} if priors is None else dict(priors)
     own: dict[str, Prior] = {}
-    for name, words in json.loads(attrs["priors"]).items():
+    for name, words in read_json(attrs["priors"], "priors").items():
         if experiment.joint is not None and name in experiment.joint.priors:
             continue
         if name in given or name not in default or prior_in_words(default[name]) != words:
@@ -87,8 +87,8 @@ def joint_of(attrs: Mapping[Any, Any]) -> RigPrior | None:
     """Return the joint prior of the rig that the attributes of a posterior state; None without."""
     if "rig_parameters" not in attrs:
         return None
-    words = json.loads(attrs["priors"])
-    own = {name: _distribution(name, words[name]) for name in json.loads(attrs["rig_parameters"])}
+    words = read_json(attrs["priors"], "priors")
+    own = {name: _distribution(name, words[name]) for name in read_json(attrs["rig_parameters"], "rig_parameters")}
     return RigPrior.from_entries(attrs, own)
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_seed
+from tactile_bayes.checks import check_seed, check_switch
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_loads
 from tactile_bayes.load_cell.covariance import covariance, squared_mahalanobis_distance
@@ -440,6 +440,7 @@ class LoadCell(DataSheet):
         >>> cell.log_likelihood(moment_only, [[[0.5, 0.0, 0.0]], [[0.51, 0.0, 0.0]]]).round(4)
         array([2.8681, 2.9931])
         """
+        check_switch("pointwise", pointwise)
         return log_likelihood(self, measured, predicted, noise_scale, pointwise, discrepancy)
 
     def log_density_left_out(

@@ -18,7 +18,7 @@ from tactile_bayes.load_cell.curve import curved, slope_of, straightened
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
-from tactile_bayes.record.attributes import no_entry
+from tactile_bayes.record.attribute_names import no_entry
 
 __all__ = ["CERTAIN", "DataSheet"]
 

@@ -21,6 +21,7 @@ from tactile_bayes.checks import (
     check_numbers,
     check_probability,
     check_seed,
+    check_switch,
     check_whole_number,
     refused,
 )
@@ -179,6 +180,7 @@ def design(
     """
     check_choice("criterion", criterion, _CRITERIA)
     check_whole_number("draws", draws, 2)
+    check_switch("nested", nested)
     check_seed(seed)
     check_probability("probability", probability)
     rng = np.random.default_rng([int(seed), 1])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +21,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import carried_sweeps, rod_of
 from tactile_bayes.sweep import Drive, Rotation, record_template, recorded_drives
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["COARSE", "Base", "Knowledge", "empty_record", "known_from_posterior", "known_from_prior"]
 
@@ -147,7 +147,7 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
     columns = {name: samples[name].values.ravel() for name in names}
     if unknown:
         columns["noise_scale"] = np.ones(samples[next(iter(unknown))].size)
-    nuisances = [name for name in json.loads(attrs.get("nuisances", "[]")) if not name.startswith("base_")]
+    nuisances = [name for name in read_json(attrs.get("nuisances", "[]"), "nuisances") if not name.startswith("base_")]
     drives = tuple(recorded_drives(record))
     empty, friction = empty_record(drives, COARSE, rod, cell), float(attrs["friction"])
     experiment = Experiment(empty, attrs["family"], cell, rod=rod, friction=friction, nuisances=nuisances)

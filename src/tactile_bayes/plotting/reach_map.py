@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_whole_number
+from tactile_bayes.checks import check_switch, check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.plotting.axes import single_axes
@@ -92,6 +92,7 @@ def prior_contours(
     if not {"prior", "constant_data"} <= set(getattr(posterior, "children", ())):
         raise ParameterError("there are no draws from a prior here: give the tree that infer_contour returned")
     check_whole_number("contours", contours, 1, _COUNT)
+    check_switch("median", median)
     prior, family = posterior["prior"].to_dataset(), posterior.attrs["family"]
     share = prior.attrs.get("share_within_reach")
     words = "" if share is None else f"\n({100.0 * share:.2g} % of it is within reach)"

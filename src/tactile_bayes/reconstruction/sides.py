@@ -15,6 +15,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.contact_bounds import FEWEST, contact_bounds
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import CHANNELS, present_channels, rod_of, rows_of_sweeps
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = [
     "CONTACT_SIDES",
@@ -141,7 +142,7 @@ def with_sides(record: xr.Dataset, sides: Mapping[int, str]) -> xr.Dataset:
 
 
 def _stated(record: xr.Dataset) -> dict[int, str]:
-    return {int(sweep): side for sweep, side in json.loads(record.attrs.get(CONTACT_SIDES, "{}")).items()}
+    return {int(sweep): side for sweep, side in read_json(record.attrs.get(CONTACT_SIDES, "{}"), CONTACT_SIDES).items()}
 
 
 class _Judged(NamedTuple):

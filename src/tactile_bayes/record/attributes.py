@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,17 +11,11 @@ import numpy as np
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.rods.along import Along
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.record.attribute_names import misspelt
 from tactile_bayes.record.cell import number_in
-from tactile_bayes.record.quantity import unit_of
-from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, LOAD_CELL_UNITS, UNITS, Frame
-from tactile_bayes.record.spelling import nearest
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, UNITS, Frame
 from tactile_bayes.record.storable import not_storable
 from tactile_bayes.record.table import Source
-
-_QUANTITY = re.compile(
-    r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?\s*"
-    r"(?:(?P<brackets>\[[^\[\]]*\])|(?P<unit>[^\W\d].*|°))?"
-)
 
 _SHAPE = ("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviation", "stem")
 """Properties by which a rod differs from a straight, uniform one."""
@@ -35,7 +28,6 @@ _SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_lever_", "
 __all__ = [
     "checked_attributes",
     "completed_attributes",
-    "no_entry",
     "rod_attributes",
     "rod_shape_attributes",
     "same_rod",
@@ -174,8 +166,8 @@ def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, An
             if not (math.isfinite(plain) and (signed or plain >= 0)):
                 what = "a finite number" if signed else "zero or a positive number"
                 raise source.attribute_error(name, f"is {plain!r}: give {what}")
-        elif name.startswith("load_cell_") and _is_quantity(plain):
-            raise source.attribute_error(name, f"is {plain!r}, but {no_entry(name.removeprefix('load_cell_'))}")
+        elif why := misspelt(name, plain):
+            raise source.attribute_error(name, f"is {plain!r}, but {why}")
         if isinstance(plain, str) and (reason := not_storable(plain)):
             raise source.attribute_error(name, f"{reason}, which no file can store: remove it")
         is_storable = isinstance(plain, str | float) or (
@@ -187,28 +179,8 @@ def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, An
     return checked
 
 
-def no_entry(name: str) -> str:
-    """Message that the data sheet has no entry of this name, with the most similar one."""
-    near = nearest(name, [*LOAD_CELL_UNITS, "frame"])
-    hint = f"did you mean {near!r}?" if near else f"there are frame, {', '.join(LOAD_CELL_UNITS)}."
-    return (
-        f"a load cell has no entry {name!r}: {hint} An attribute of a record that is something else needs a name that "
-        "does not begin with 'load_cell_'"
-    )
-
-
 def _quantity(name: str, value: Any, source: Source) -> float:
     number = None if value is None or isinstance(value, bool | np.bool_) else number_in(value)
     if number is None:
         raise source.attribute_error(name, f"is {value!r}: give a number [{ATTRIBUTE_UNITS[name]}]")
     return number
-
-
-def _is_quantity(value: Any) -> bool:
-    """Return whether a value is a number, or the text of a number with a unit or a decimal comma."""
-    if not isinstance(value, str):
-        return isinstance(value, int | float)
-    match = _QUANTITY.fullmatch(value.strip())
-    if match is None:
-        return False
-    return match["brackets"] is not None or (unit_of(match["unit"]) is not None if match["unit"] else "," in value)

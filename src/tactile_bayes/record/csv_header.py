@@ -10,11 +10,14 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, BinaryIO
 
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.record.attribute_names import stray_attribute
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
 from tactile_bayes.record.encoding import WITH_NUL, not_utf8
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
 from tactile_bayes.record.table import Source
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["FORMAT", "KINDS", "Header", "cells_in", "column_line", "header_line", "lines_below", "read_header"]
 
@@ -28,11 +31,12 @@ _NAME = r"[\w.\-]+"
 _QUOTED = r'"(?:[^"\\]|\\.)*"'
 _UNIT = r'(?!\s)[^\]"]*(?<!\s)'
 _FORMAT_LINE = re.compile(r"tactile_bayes record, format (?P<format>[0-9]+)")
-_HEADER_LINE = re.compile(rf"(?P<key>{_NAME}|{_QUOTED})\s*:\s*(?P<value>.*)")
+_HEADER_LINE = re.compile(rf"(?P<key>{_NAME}|{_QUOTED})\s*:\s*+(?P<value>.*)")
 _COLUMN_LINE = re.compile(
-    rf"column\s+(?P<name>{_NAME}|{_QUOTED})\s*:\s*(?P<kind>\w+)\s*"
-    rf"(?:\[\s*(?P<units>{_QUOTED}|{_UNIT})\s*\])?\s*(?P<long_name>.*)"
+    rf"column\s+(?P<name>{_NAME}|{_QUOTED})\s*:\s*+(?P<kind>\w++)\s*+"
+    rf"(?:\[\s*(?P<units>{_QUOTED}|{_UNIT})\s*\])?\s*+(?P<long_name>.*)"
 )
+_STRAY_COLUMN = re.compile(rf"column\s+(?:{_NAME}|{_QUOTED})\s*[:=]")
 _QUANTITY = re.compile(r"(?P<number>[^\[\]]+)(?:\[(?P<unit>[^\]]*)\])?")
 
 
@@ -56,6 +60,8 @@ class Header:
         Separator of the columns.
     line : int
         Line of the names.
+    remarks : tuple of str
+        Commented lines without a meaning, with their numbers.
     """
 
     attrs: Mapping[str, Any]
@@ -65,6 +71,7 @@ class Header:
     names: list[str]
     delimiter: str
     line: int
+    remarks: tuple[str, ...]
 
 
 # --- Writing ----------------------------------------------------------------------------------------------------
@@ -109,6 +116,7 @@ def read_header(file: BinaryIO, source: Source) -> Header:
     descriptions: dict[str, dict[str, str]] = {}
     heads: dict[str, int] = {}
     delimiter = None
+    remarks: dict[int, str] = {}
     for number, line in enumerate(_lines(file, source), start=1):
         if number == 1 and (match := re.fullmatch(rf"sep=([{_DELIMITERS}])\s*", line)):  # written by spreadsheets
             delimiter = match[1]
@@ -120,7 +128,10 @@ def read_header(file: BinaryIO, source: Source) -> Header:
                 _refuse_equal(names, number, source)
                 heads = dict.fromkeys(names, number) | heads
                 lines = {name: line for name, (line, _) in stated.items()}
-                return Header(_stated_attributes(stated, source), descriptions, heads, lines, names, delimiter, number)
+                _refuse_stray(remarks, lines, source)
+                attrs = _stated_attributes(stated, source)
+                texts = tuple(f"line {at}: {text}" for at, text in remarks.items() if text)
+                return Header(attrs, descriptions, heads, lines, names, delimiter, number, texts)
             continue
         content = _unpadded(line[1:])
         if match := _FORMAT_LINE.fullmatch(content):
@@ -148,7 +159,23 @@ def read_header(file: BinaryIO, source: Source) -> Header:
             if key in stated:
                 raise source.line_error(number, f"{key!r} is stated a second time: keep one of the lines")
             stated[key] = (number, match["value"])
+        else:
+            remarks[number] = content
     raise source.error(f"there is no line of column names: add one, {','.join(MEASURED)}")
+
+
+def _refuse_stray(remarks: Mapping[int, str], stated: Mapping[str, int], source: Source) -> None:
+    """Refuse a commented line that states an attribute or a column in a form that is not read."""
+    for line, text in remarks.items():
+        if _STRAY_COLUMN.match(text):
+            raise source.line_error(
+                line,
+                f"{text!r} describes a column in a form that is not read: write '# column NAME: KIND [UNIT] TEXT', "
+                "the kind being integer, number or text",
+            )
+        found = stray_attribute(text)
+        if found is not None and found[0] not in stated:
+            raise source.line_error(line, f"{text!r} looks like the attribute {found[0]!r}, but {found[1]}")
 
 
 def _lines(file: BinaryIO, source: Source) -> Iterator[str]:
@@ -209,8 +236,8 @@ def _unpadded(text: str) -> str:
 
 def _unquoted(text: str) -> str:
     try:
-        return str(json.loads(text)) if re.fullmatch(_QUOTED, text) else text
-    except json.JSONDecodeError:
+        return str(read_json(text, "the text")) if re.fullmatch(_QUOTED, text) else text
+    except ParameterError:
         return text
 
 

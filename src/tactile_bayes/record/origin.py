@@ -22,13 +22,13 @@ __all__ = ["Origin", "any_meant", "meant_kinds", "origins_of", "renamed"]
 CONSTANTS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 """Columns for which a single value can be given."""
 
-_NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-_LEAD = re.compile(rf"(?:(?P<offset>[+-]?{_NUMBER})\s*)?(?P<sign>[+-])\s*(?P<rest>.+)")
+_NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_LEAD = re.compile(rf"(?:(?P<offset>[+-]?{_NUMBER})\s*)?(?P<sign>[+-])\s*+(?P<rest>.+)")
 _TRAIL = re.compile(rf"(?P<rest>.*?\S)\s*(?P<sign>[+-])\s*(?P<offset>{_NUMBER})")
 _BRACKETS = re.compile(r"(?P<rest>.*\S)\s*\[(?P<unit>[^\[\]]*)\]")
 _VALUE = re.compile(rf"(?P<number>[+-]?{_NUMBER})\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 _UNIT_IN_NAME = re.compile(
-    r"(?P<stem>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)|/\s*(?P<slash>[^/]*\S))\s*"
+    r"(?P<stem>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)|/\s*+(?P<slash>[^/]*\S))\s*"
 )
 
 

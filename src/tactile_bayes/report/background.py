@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from importlib.metadata import version
 from typing import Any
 
@@ -12,6 +11,7 @@ from tactile_bayes.record import MEASURED, carried_sweeps, travels_of
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.meanings import is_direction, meaning_of
 from tactile_bayes.report.wording import Shown, Table, fixed, percent, shown_as
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["background_of"]
 
@@ -74,7 +74,7 @@ def _between(angles: Any) -> str:
 def _priors(findings: Findings) -> Table:
     """Return the priors as text."""
     family = str(findings.posterior.attrs["family"])
-    stated = json.loads(findings.posterior.attrs["priors"])
+    stated = read_json(findings.posterior.attrs["priors"], "priors")
     rows = [[name, meaning_of(name, family), words] for name, words in stated.items() if not is_direction(name)]
     share = findings.posterior["prior"].attrs.get("share_within_reach")
     reach = "" if share is None else f"; {percent(round(float(share), 3))} of its draws are within the rod's reach"
@@ -85,7 +85,8 @@ def _settings(findings: Findings) -> Table:
     """Return the settings of the sampler."""
     attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].attrs
     rows = [["seed", str(attrs["seed"])], ["sampler", str(attrs.get("sampler", ""))]]
-    rows += [[name, "none" if value is None else f"{value}"] for name, value in json.loads(attrs["settings"]).items()]
+    settings = read_json(attrs["settings"], "settings")
+    rows += [[name, "none" if value is None else f"{value}"] for name, value in settings.items()]
     rows += [[name, str(int(stats[name]))] for name in ("steps_run", "steps_kept", "evaluations", "stuck")]
     rows.append(["seconds", f"{float(stats['seconds']):.3g}"])
     return Table("Sampler", ["setting", "value"], rows, 2)
@@ -96,7 +97,7 @@ def _rig(findings: Findings) -> Table:
     attrs = findings.posterior.attrs
     names = [name for name in attrs if str(name).startswith(("rod_", "load_cell_"))]
     rows = [[str(name), _plain(attrs[name])] for name in (*names, "units", "friction")]
-    nuisances = json.loads(attrs["nuisances"])
+    nuisances = read_json(attrs["nuisances"], "nuisances")
     rows.append(["inferred beside the contour", ", ".join(nuisances) or "nothing: the rig is taken as stated"])
     return Table("Rig, as assumed; numbers in the units of the record", ["entry", "value"], rows, 2)
 
@@ -113,7 +114,7 @@ def _columns(findings: Findings) -> Table | None:
 
 def _statements(findings: Findings) -> Table | None:
     """Return attributes of the record that concern neither rod nor load cell."""
-    said = json.loads(findings.posterior.attrs.get("record_attributes", "{}"))
+    said = read_json(findings.posterior.attrs.get("record_attributes", "{}"), "record_attributes")
     rows = [[name, _plain(value)] for name, value in said.items()]
     return Table("Attributes of the record", ["entry", "value"], rows, 2) if rows else None
 
@@ -125,7 +126,7 @@ def _plain(value: Any) -> str:
 def _versions(findings: Findings) -> Table:
     """Return the software of the inference and of this report."""
     attrs = findings.posterior.attrs
-    stated = json.loads(attrs.get("versions", "{}"))
+    stated = read_json(attrs.get("versions", "{}"), "versions")
     rows = [[name, of_name] for name, of_name in stated.items()]
     if not rows:
         rows = [["tactile-bayes", str(attrs.get("inference_library_version", "not stated"))]]

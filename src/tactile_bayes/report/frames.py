@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +21,7 @@ from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.record import rod_of, rows_of_sweeps
 from tactile_bayes.sweep import ManyUnits, to_lab_frame
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["Motion", "motion_of"]
 
@@ -98,7 +98,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     cell = LoadCell.from_record(record) or LoadCell()
     friction = float(posterior.attrs["friction"])
     nuisances = nuisances_of(
-        record, json.loads(posterior.attrs["nuisances"]), {}, cell, friction, joint_of(posterior.attrs)
+        record, read_json(posterior.attrs["nuisances"], "nuisances"), {}, cell, friction, joint_of(posterior.attrs)
     )
     rig = nuisances.rig({name: np.atleast_1d(draw[name].values) for name in nuisances.names})
     likelihood = RecordLikelihood(record, cell, friction)

@@ -12,6 +12,7 @@ import xarray as xr
 from tactile_bayes.inference.experiment import default_priors, prior_in_words
 from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["command_of", "hindrances", "python_lines"]
 
@@ -21,7 +22,7 @@ _RIG = "rig_parameters"
 
 def command_of(attrs: Mapping[Any, Any]) -> str:
     """Return the shell command that made the run; "" if the posterior does not state it."""
-    return shlex.join(json.loads(attrs["command"])) if "command" in attrs else ""
+    return shlex.join(read_json(attrs["command"], "command")) if "command" in attrs else ""
 
 
 def python_lines(attrs: Mapping[Any, Any]) -> str:
@@ -49,12 +50,12 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
     )
     print(again["posterior"].equals(stored["posterior"]))
     """
-    seed, settings = str(attrs["seed"]), json.loads(attrs["settings"])
+    seed, settings = str(attrs["seed"]), read_json(attrs["settings"], "settings")
     streamed = is_streamed(attrs)
     options = [
         f"family={json.dumps(str(attrs['family']))}",
         f"friction={float(attrs['friction'])!r}",
-        f"nuisances={json.dumps(json.loads(attrs['nuisances']))}",
+        f"nuisances={json.dumps(read_json(attrs['nuisances'], 'nuisances'))}",
         *(["events=False"] if not attrs.get("events", 1) else []),
         *(['rig=tb.read_result("rig.nc")'] if _RIG in attrs else []),
         f"seed={_seed(seed)}",
@@ -82,7 +83,7 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
 def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
     """Return reasons why the lines of Python may not give the same draws."""
     attrs = posterior.attrs
-    settings = json.loads(attrs["settings"])
+    settings = read_json(attrs["settings"], "settings")
     found = []
     if is_streamed(attrs):
         found.append("The samples came in blocks: taken at once, they give other draws of the same posterior.")
@@ -90,10 +91,12 @@ def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
         found.append("The run could end by the clock, after max_seconds: then the number of its steps is not repeated.")
     if "interrupted" in attrs["message"]:
         found.append("The run was interrupted: without an interrupt it makes more steps.")
-    usual = default_priors(record, attrs["family"], LoadCell.from_record(record), json.loads(attrs["nuisances"]))
+    nuisances = read_json(attrs["nuisances"], "nuisances")
+    usual = default_priors(record, attrs["family"], LoadCell.from_record(record), nuisances)
     words = {name: prior_in_words(prior) for name, prior in usual.items()}
-    of_rig = json.loads(attrs.get(_RIG, "[]"))
-    own = [name for name, said in json.loads(attrs["priors"]).items() if words.get(name) != said and name not in of_rig]
+    of_rig = read_json(attrs.get(_RIG, "[]"), _RIG)
+    priors = read_json(attrs["priors"], "priors")
+    own = [name for name, said in priors.items() if words.get(name) != said and name not in of_rig]
     if of_rig:
         found.append("The rig is read from the file that calibrate-rig wrote, here rig.nc: give its path.")
     if own:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 
 import numpy as np
@@ -15,6 +14,7 @@ from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.readings_figure import channel_names
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["check_messages", "check_table", "contacts_messages", "convergence", "trust_tables"]
 
@@ -159,7 +159,7 @@ def contacts_messages(findings: Findings) -> list[str]:
             f"{chance(probability)}{but}."
         )
     if np.isfinite(score):
-        known = "inferred" if "friction" in json.loads(findings.posterior.attrs["nuisances"]) else "stated"
+        known = "inferred" if "friction" in read_json(findings.posterior.attrs["nuisances"], "nuisances") else "stated"
         said.append(
             "In tangential contact the force along the rod at the pivot follows from the moment, and from the friction "
             f"that was {known}: the mean deviates by {fixed(score, '+.2f')} standard errors, {_agreement(score)}."

@@ -33,6 +33,7 @@ from tactile_bayes.runs.folder import Folder, panels
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH_PAGE
 from tactile_bayes.sweep import Scan, recorded_drives, scan
 from tactile_bayes.tasks import refuse_replacing, replace_together
+from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
@@ -304,7 +305,7 @@ class _Figures:
         """A scan of the most probable contour."""
         best = self.result["sample_stats"]["lp"].argmax(("chain", "draw"))  # the medians may be out of reach
         draw, attrs = self.draws.isel(best), self.result.attrs
-        found = {name: float(draw[name]) for name in json.loads(attrs["nuisances"]) if name in draw}
+        found = {name: float(draw[name]) for name in read_json(attrs["nuisances"], "nuisances") if name in draw}
         if self.measured.attrs["units"] == "dimensionless":
             found.pop("length", None)  # a scan would be in lengths of that rod
         contour = contours_of(draw, attrs["family"]).take(np.array(0))

@@ -13,6 +13,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from tactile_bayes.checks import check_path
 from tactile_bayes.errors import TactileBayesError
+from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.tasks.files import alone_in, write_atomically
 from tactile_bayes.tasks.workers import run_tasks
 
@@ -146,12 +147,12 @@ def keep_outcomes(
 def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]:
     correction = f"give another folder, or remove {file.name} from it to start again"
     try:
-        table = json.loads(file.read_text(encoding="utf-8"))
+        table = read_json(file.read_bytes(), "it")
         if table["format"] != _FORMAT:
             raise kind.error(f"{file} has format {table['format']}, this version reads {_FORMAT}: {correction}")
         there = dict(table["experiment"])
         outcomes = {int(row["number"]): kind.decode(row) for row in table[kind.what]}
-    except TactileBayesError:
+    except kind.error:
         raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise kind.error(f"{file} holds no {kind.what} that can be read ({error}): {correction}") from error

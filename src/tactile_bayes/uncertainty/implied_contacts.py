@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
@@ -26,6 +25,7 @@ from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS, record_hash, rod_of, validate
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.sweep import to_lab_frame
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["contacts_of", "implied_contacts"]
 
@@ -155,7 +155,7 @@ def _checked_record(posterior: xr.DataTree) -> xr.Dataset:
 def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> dict[str, Floats]:
     """Return the variables of the contacts by name, each of shape (chains, draws, samples)."""
     friction, rod = posterior.attrs["friction"], rod_of(record)
-    inferred = json.loads(posterior.attrs.get("nuisances", "[]"))
+    inferred = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
     nuisances = Nuisances(tuple(inferred), {}, rod, friction)
     # `infer_contour` gives a cell whose noise it infers a noise of 1.
     unknown: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in picked}

@@ -19,6 +19,7 @@ from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.identity import changes
 from tactile_bayes.inference.ensembles.walkers import RandomState
 from tactile_bayes.tasks import alone_in, is_temporary, write_atomically
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["Checkpoint", "open_checkpoint"]
 
@@ -125,7 +126,7 @@ class Checkpoint:
         """Return the number of steps at which the run last ended; refuse the description of another run."""
         path = self._folder / _DESCRIPTION
         try:
-            table = json.loads(path.read_text(encoding="utf-8"))
+            table = read_json(path.read_bytes(), "it")
             if table["kind"] != _KIND:
                 raise ValueError(f"it is of kind {table['kind']!r}")
             number = int(table["format"])

@@ -15,6 +15,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.parameters.priors import MAY_VANISH, Prior
 from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["RigPrior", "refuse_other_rig", "rig_prior"]
 
@@ -79,8 +80,8 @@ class RigPrior:
     @classmethod
     def from_entries(cls, attrs: Mapping[Any, Any], priors: Mapping[str, Prior]) -> RigPrior:
         """Return the prior of a posterior's attributes, with given marginals."""
-        own = {name: priors[name] for name in json.loads(attrs["rig_parameters"])}
-        correlation = np.array(json.loads(attrs["rig_correlation"]))
+        own = {name: priors[name] for name in read_json(attrs["rig_parameters"], "rig_parameters")}
+        correlation = np.array(read_json(attrs["rig_correlation"], "rig_correlation"))
         return cls(own, correlation, float(attrs["rig_density_error"]), str(attrs["rig_data_sha256"]))
 
     def without(self, names: Collection[str]) -> RigPrior:
@@ -132,7 +133,7 @@ def rig_prior(rig: xr.DataTree) -> RigPrior:
     if not rig.attrs.get("converged"):
         raise InferenceError(f"the posterior of the rig has not converged ({rig.attrs.get('message')}): infer it again")
     draws = posterior_draws(rig)
-    names = _lasting(json.loads(rig.attrs["nuisances"]))
+    names = _lasting(read_json(rig.attrs["nuisances"], "nuisances"))
     names = tuple(name for name in names if name in draws and "discrepancy" not in name)
     if not names:
         raise InferenceError("no parameter of the rig lasts beyond its record: infer it with nuisances=['standard']")

@@ -16,6 +16,7 @@ from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import read_netcdf
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["StoredState", "StreamState", "read_tree", "state_in", "tree_of"]
 
@@ -126,7 +127,7 @@ def state_in(tree: xr.DataTree, path: Path) -> StoredState:
         )
     try:
         record = validate(tree["record"].to_dataset())
-        identity = {name: str(value) for name, value in json.loads(tree.attrs["identity"]).items()}
+        identity = {name: str(value) for name, value in read_json(tree.attrs["identity"], "identity").items()}
         particles = tree["particles"].to_dataset()
         if any(particles[name].dims != dims for name, dims in _ARRAYS.items()) or not set(_NUMBERS) <= set(particles):
             raise ValueError("its particles have other columns")

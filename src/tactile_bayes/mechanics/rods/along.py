@@ -16,6 +16,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number, as_numbers, check_number, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics import chebyshev
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["MISS", "Along", "GivenAlong", "along"]
 
@@ -144,10 +145,10 @@ def along(name: str, given: Any, length: float, positive: bool = False, miss: fl
 def _read(name: str, text: str) -> Along:
     """Return polynomials from their text."""
     try:
-        found = json.loads(text)
+        found = read_json(text, name)
         edges = tuple(float(edge) for edge in found["edges"])
         rows = tuple(tuple(float(c) for c in row) for row in found["coefficients"])
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
         raise ParameterError(f"{name} is {text[:40]!r}: give a number, or polynomials as JSON") from error
     whole = np.array([*edges, *(c for row in rows for c in row)])
     sizes = {len(row) for row in rows}

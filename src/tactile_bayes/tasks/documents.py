@@ -1,0 +1,95 @@
+"""JSON and TOML texts, which may be hostile: depth and size are limited before anything is parsed."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from typing import Any
+
+from tactile_bayes.checks import shown
+from tactile_bayes.errors import ParameterError
+
+__all__ = ["LARGEST", "read_json", "read_toml"]
+
+_DEEPEST = 64
+"""Largest depth of lists and tables in one another, and largest number of parts of a dotted key."""
+
+LARGEST = 1 << 23
+"""Largest number of characters of a TOML text, which takes seconds to parse."""
+
+_BRACKET = re.compile(r"[\[\]{}]")
+_JSON_STRING = re.compile(r'"(?:[^"\\]++|\\.)*+"?', re.DOTALL)
+_TOML_STRING = re.compile(
+    r'"""(?:[^"\\]++|\\.|"(?!""))*+(?:""")?|'
+    r"'''(?:[^']++|'(?!''))*+(?:''')?|"
+    r'"(?:[^"\\\n]++|\\.)*+"?|'
+    r"'[^'\n]*+'?|"
+    r"#[^\n]*",
+    re.DOTALL,
+)
+_DOTTED = re.compile(r"[\w\-. \t]+")
+
+
+def read_json(text: Any, name: str) -> Any:
+    """Return the value of a JSON text, which messages call by `name`.
+
+    Raises
+    ------
+    ParameterError
+        If it is no JSON text, or is nested too deep.
+
+    Examples
+    --------
+    >>> read_json('{"bias": [1, 2.5]}', "priors")
+    {'bias': [1, 2.5]}
+    >>> read_json("[" * 2000, "priors")
+    Traceback (most recent call last):
+    ...
+    tactile_bayes.errors.ParameterError: priors is nested deeper than 64 levels: write it as this package does
+    """
+    try:
+        whole = text.decode("utf-8") if isinstance(text, bytes) else text
+        if isinstance(whole, str):
+            _refuse_deep(whole, _JSON_STRING, name)
+        return json.loads(whole)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError(f"{name} is {shown(text)}, no JSON text that can be read: {error}") from error
+
+
+def read_toml(text: str) -> dict[str, Any]:
+    """Return the tables of a TOML text.
+
+    Raises
+    ------
+    ParameterError
+        If it is no TOML text, is too long, or is nested too deep.
+
+    Examples
+    --------
+    >>> read_toml("scan.samples = 180")
+    {'scan': {'samples': 180}}
+    """
+    if len(text) > LARGEST:
+        raise ParameterError(f"the text has {len(text):,} characters: give at most {LARGEST:,}")
+    _refuse_deep(text, _TOML_STRING, "the text")
+    longest = max((run[0].count(".") for run in _DOTTED.finditer(_TOML_STRING.sub("s", text))), default=0)
+    if longest >= _DEEPEST:
+        raise ParameterError(f"a key has {longest + 1} parts, more than {_DEEPEST}: remove dots")
+    try:
+        return tomllib.loads(text)
+    except ValueError as error:
+        raise ParameterError(f"not TOML: {error}") from error
+
+
+def _refuse_deep(text: str, strings: re.Pattern[str], name: str) -> None:
+    """Refuse brackets in one another, apart from those in strings."""
+    if text.count("[") + text.count("{") <= _DEEPEST:
+        return
+    depth = 0
+    for bracket in _BRACKET.finditer(strings.sub("", text)):
+        depth += 1 if bracket[0] in "[{" else -1
+        if depth > _DEEPEST:
+            raise ParameterError(f"{name} is nested deeper than {_DEEPEST} levels: write it as this package does")
