@@ -20,7 +20,17 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Group", "UnsafeError", "content_of", "largest_content", "received", "refuse_unsafe", "send", "time_limit"]
+__all__ = [
+    "Group",
+    "UnsafeError",
+    "content_of",
+    "largest_content",
+    "received",
+    "refuse_unsafe",
+    "refuse_unsafe_variable",
+    "send",
+    "time_limit",
+]
 
 _DEPTH, _OBJECTS = 32, 10_000
 """Largest depth of groups, and number of groups and variables."""
@@ -93,10 +103,7 @@ def refuse_unsafe(hdf5: h5py.File, size: int) -> None:
         if depth > _DEPTH:
             raise UnsafeError(f"it has groups in groups, more than {_DEPTH} deep")
         for name in group:
-            path = f"{group.name.rstrip('/')}/{name}"
-            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-                raise UnsafeError(f"{path} is a link, which may lead to another file")
-            part = group[name]
+            path, part = f"{group.name.rstrip('/')}/{name}", _part_of(group, name)
             if (address := _address(part)) in known:
                 raise UnsafeError(f"{path} is in the file a second time")
             known.add(address)
@@ -106,9 +113,29 @@ def refuse_unsafe(hdf5: h5py.File, size: int) -> None:
             if isinstance(part, h5py.Group):
                 waiting.append((part, depth + 1))
             elif isinstance(part, h5py.Dataset):
-                total += _size_of(part, path, size)
+                total += _size_of(part, size)
                 if total > largest_content(size):
                     raise UnsafeError(f"it states more than {largest_content(size):,} bytes of content")
+
+
+def refuse_unsafe_variable(hdf5: h5py.File, name: str, size: int) -> None:
+    """Refuse a variable of the root as `refuse_unsafe` does, whatever else is in the file.
+
+    Raises
+    ------
+    UnsafeError
+        If it is not numbers or text in this file.
+    """
+    if not isinstance(part := _part_of(hdf5, name), h5py.Dataset):
+        raise UnsafeError(f"/{name} is no variable")
+    _size_of(part, size)
+
+
+def _part_of(group: h5py.Group, name: str) -> h5py.HLObject:
+    """Return a group or variable, and refuse a link."""
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise UnsafeError(f"{group.name.rstrip('/')}/{name} is a link, which may lead to another file")
+    return group[name]
 
 
 def largest_content(size: int) -> int:
@@ -121,8 +148,9 @@ def _address(part: h5py.HLObject) -> tuple[int, int]:
     return info.fileno, info.addr
 
 
-def _size_of(variable: h5py.Dataset, path: str, size: int) -> int:
+def _size_of(variable: h5py.Dataset, size: int) -> int:
     """Return the size of a variable [bytes], and refuse one that is not in the file, and in it alone."""
+    path = variable.name
     made = variable.id.get_create_plist()
     if made.get_layout() == h5py.h5d.VIRTUAL:
         raise UnsafeError(f"{path} is made of other variables, which may be in other files")
