@@ -1,7 +1,10 @@
 """Data sets opened without reading them."""
 
-import contextlib
+import dataclasses
+import hashlib
+import json
 import shutil
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -11,7 +14,9 @@ import xarray as xr
 import tactile_bayes as tb
 from helpers.data_sets import PLAIN, RICH, changed
 from helpers.refusals import refused
-from tactile_bayes.datasets.collection import opened_shard
+from tactile_bayes.datasets import collection
+from tactile_bayes.datasets import manifest as manifest_module
+from tactile_bayes.datasets.collection import read_shard
 from tactile_bayes.datasets.manifest import read_manifest, write_manifest
 from tactile_bayes.datasets.netcdf import netcdf_of
 from tactile_bayes.errors import SpecificationError
@@ -33,14 +38,14 @@ def whole(folder):
 
 @pytest.fixture
 def files_read(monkeypatch):
-    """Names of the files from which numbers were read."""
-    names, real = [], h5py.File
+    """Names of the files that were compared with the manifest, from which numbers are then read."""
+    names, real = [], collection._unchanged
 
-    def noted(path, *arguments, **options):
-        names.append(str(path).rpartition("/")[2])
-        return real(path, *arguments, **options)
+    def noted(folder, shard):
+        names.append(shard.file)
+        return real(folder, shard)
 
-    monkeypatch.setattr("tactile_bayes.datasets.collection.h5py.File", noted)
+    monkeypatch.setattr(collection, "_unchanged", noted)
     return names
 
 
@@ -159,9 +164,127 @@ def test_files_that_are_lost_or_damaged_are_named(folder, tmp_path):
     with refused(SpecificationError, "shard-000001.nc", "missing"):
         data.isel(record=9).load()
     (some / "shard-000002.nc").write_bytes(b"no NetCDF")
-    with refused(SpecificationError, "shard-000002.nc", "read"):
+    with refused(SpecificationError, "shard-000002.nc", "SHA-256"):
         data.isel(record=20).load()
     data.isel(record=3).load()
+
+
+def test_a_changed_number_is_refused_and_a_file_put_back_is_read(folder, tmp_path):
+    some = tmp_path / "some"
+    shutil.copytree(folder, some)
+    path, data = some / "shard-000001.nc", tb.datasets.open(some)
+    content, before = path.read_bytes(), data.isel(record=9).load()
+    damaged = bytearray(content)
+    damaged[content.index(before.force_x.values.tobytes())] ^= 1
+    path.write_bytes(damaged)
+    with refused(SpecificationError, "shard-000001.nc", "dataset verify"):
+        data.isel(record=9).load()
+    path.write_bytes(content)
+    assert data.isel(record=9).load().identical(before)
+
+
+def forged(folder, change):
+    """Write a manifest with other entries of its first shard, and with a checksum of its own that is right."""
+    table = json.loads((folder / "manifest.json").read_text())
+    table.pop("sha256")
+    table["shards"][0] |= change
+    (folder / "manifest.json").write_bytes(manifest_module._content(table))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"file": "../outside.nc"},
+        {"file": "/etc/hostname"},
+        {"file": "README.md"},
+        {"file": "shard-000001.nc"},
+        {"file": "shard-000000.nc/../shard-000001.nc"},
+        {"file": 3},
+        {"first": 8},
+        {"first": 0.0},
+        {"records": 10**12},
+        {"sha256": None},
+        {"redrawn": ["out of reach"]},
+        {"redrawn": {"out of reach": "often"}},
+        {"untouched": "none"},
+    ],
+    ids=str,
+)
+def test_a_manifest_lists_nothing_but_the_shards_of_its_data_set(folder, tmp_path, change):
+    some = tmp_path / "some"
+    shutil.copytree(folder, some)
+    shutil.copy(some / "shard-000000.nc", tmp_path / "outside.nc")
+    forged(some, change)
+    acts = (tb.datasets.open, tb.datasets.verify, lambda path: tb.datasets.generate(PLAIN, path, workers=1))
+    for act in (*acts, lambda path: tb.datasets.record(path, 0)):
+        with pytest.raises(SpecificationError, match=r"manifest\.json is no manifest") as error:
+            act(some)
+        assert "delete" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["shard-000000.nc", "README.md", "manifest.json"])
+def test_links_out_of_the_folder_are_neither_read_nor_written(folder, tmp_path, name):
+    some, outside = tmp_path / "some", tmp_path / "outside"
+    shutil.copytree(folder, some)
+    (some / name).rename(outside)
+    before = outside.read_bytes()
+    (some / name).symlink_to(outside)
+    for act in (tb.datasets.verify, lambda path: tb.datasets.generate(PLAIN, path, workers=1)):
+        with refused(SpecificationError, name, "link"):
+            act(some)
+    if name != "README.md":
+        with refused(SpecificationError, name, "link"):
+            tb.datasets.open(some)
+    assert outside.read_bytes() == before
+
+
+def test_no_file_is_written_through_a_link(folder, tmp_path):
+    """Of a shard that is still missing, and of a manifest."""
+    some, outside = tmp_path / "some", tmp_path / "outside"
+    shutil.copytree(folder, some)
+    manifest = read_manifest(some)
+    write_manifest(dataclasses.replace(manifest, shards=manifest.shards[:2], card_sha256=""), some)
+    for name in ("shard-000002.nc", "manifest.json"):
+        (some / name).unlink()
+        (some / name).symlink_to(outside)
+        with refused(SpecificationError, name, "link"):
+            tb.datasets.generate(PLAIN, some, workers=1)
+        assert not outside.exists()
+        for path in some.glob("shard-*.nc"):
+            path.unlink()
+        (some / "README.md").unlink(missing_ok=True)
+
+
+def test_a_link_within_the_folder_is_read(folder, tmp_path):
+    some = tmp_path / "some"
+    shutil.copytree(folder, some)
+    (some / "large").mkdir()
+    (some / "shard-000000.nc").rename(some / "large" / "first.nc")
+    (some / "shard-000000.nc").symlink_to(Path("large") / "first.nc")
+    assert tb.datasets.open(some).load().identical(tb.datasets.open(folder).load())
+
+
+def test_variables_in_other_files_are_refused_though_the_checksum_is_right(folder, tmp_path):
+    some, number = tmp_path / "some", 1
+    shutil.copytree(folder, some)
+    path = some / f"shard-{number:06d}.nc"
+    with h5py.File(path, "r+") as file:
+        shape, size = file["force_x"].shape, 8 * file["force_x"].size
+        del file["force_x"], file["force_y"]
+        (tmp_path / "other").write_bytes(bytes(size))
+        file.create_dataset("force_x", shape, "f8", external=[(str(tmp_path / "other"), 0, size)])
+        file["force_y"] = h5py.ExternalLink(str(folder / path.name), "/force_y")
+    data = tb.datasets.open(folder)
+    content = path.read_bytes()
+    shard = read_manifest(some).shards[number]
+    mine = shard._replace(sha256=hashlib.sha256(content).hexdigest(), bytes=len(content))
+    shards = tuple(mine if other == shard else other for other in read_manifest(some).shards)
+    write_manifest(dataclasses.replace(read_manifest(some), shards=shards), some)
+    data = tb.datasets.open(some)
+    data.drive_angle.load()
+    for name, words in (("force_x", "another file"), ("force_y", "link")):
+        with refused(SpecificationError, path.name, words):
+            data[name].load()
 
 
 @pytest.mark.slow
@@ -170,11 +293,11 @@ def test_files_that_are_lost_or_damaged_are_named(folder, tmp_path):
 def test_files_are_as_xarray_would_write_them(spec, tmp_path):
     """Up to the order in which HDF5 lists them: read back, both are the same, in every name, number and attribute."""
     tb.datasets.generate(changed(spec, records=3, shard_records=3), tmp_path, workers=1)
-    with contextlib.closing(opened_shard(tmp_path / "shard-000000.nc")) as file:
-        mine = file.load()
+    (shard,) = read_manifest(tmp_path).shards
+    mine = read_shard(tmp_path, shard)
     encoding = {name: {"_FillValue": None} for name in mine.variables}
     mine.to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf", encoding=encoding)
-    with contextlib.closing(opened_shard(tmp_path / "theirs.nc")) as theirs:
-        xr.testing.assert_identical(mine, theirs.load())
-        assert {n: v.dtype for n, v in mine.variables.items()} == {n: v.dtype for n, v in theirs.variables.items()}
+    theirs = xr.load_dataset(tmp_path / "theirs.nc", engine="h5netcdf", decode_times=False, decode_timedelta=False)
+    xr.testing.assert_identical(mine, theirs)
+    assert {n: v.dtype for n, v in mine.variables.items()} == {n: v.dtype for n, v in theirs.variables.items()}
     assert netcdf_of(mine) == netcdf_of(mine.copy(deep=True))

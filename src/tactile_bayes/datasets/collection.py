@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +19,19 @@ from xarray.core import indexing
 
 from tactile_bayes.arrays import Index
 from tactile_bayes.datasets.manifest import Manifest, read_manifest
+from tactile_bayes.datasets.shard import Written, file_in
 from tactile_bayes.errors import SpecificationError
-from tactile_bayes.record.netcdf import reading
+from tactile_bayes.record.netcdf import read_netcdf, reading, refuse_unless
+from tactile_bayes.record.netcdf_content import refuse_unsafe_variable
 
-__all__ = ["open_dataset", "opened", "opened_shard"]
+__all__ = ["open_dataset", "opened", "read_shard"]
 
 
 def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a data set as one xarray Dataset with dimensions record, sweep and sample; values are read when used.
+
+    The SHA-256 of a file is compared with that in the manifest before anything is read from it. The first file is read
+    at once.
 
     Parameters
     ----------
@@ -64,19 +70,19 @@ def opened(folder: Path, manifest: Manifest) -> xr.Dataset:
     """Open the existing shards of a data set; see `open_dataset`."""
     if not manifest.shards:
         raise SpecificationError(f"{folder} holds no shard yet: run dataset generate again")
-    with opened_shard(folder / manifest.shards[0].file) as first:
-        numbers = np.concatenate([np.arange(s.first, s.first + s.records) for s in manifest.shards])
-        count = numbers.size
-        variables: dict[Any, Any] = {}
-        for name, variable in first.variables.items():
-            if name == "record":
-                variables[name] = ("record", numbers, variable.attrs)
-            elif variable.dims[:1] == ("record",):
-                array = _Shards(folder, manifest, str(name), (count, *variable.shape[1:]), variable.dtype)
-                variables[name] = xr.Variable(variable.dims, indexing.LazilyIndexedArray(array), variable.attrs)
-            else:
-                variables[name] = variable.copy(deep=True).load()
-        return xr.Dataset(variables, attrs=first.attrs).set_coords(list(first.coords))
+    first = read_shard(folder, manifest.shards[0])
+    numbers = np.concatenate([np.arange(s.first, s.first + s.records) for s in manifest.shards])
+    count = numbers.size
+    variables: dict[Any, Any] = {}
+    for name, variable in first.variables.items():
+        if name == "record":
+            variables[name] = ("record", numbers, variable.attrs)
+        elif variable.dims[:1] == ("record",):
+            array = _Shards(folder, manifest, str(name), (count, *variable.shape[1:]), variable.dtype)
+            variables[name] = xr.Variable(variable.dims, indexing.LazilyIndexedArray(array), variable.attrs)
+        else:
+            variables[name] = variable
+    return xr.Dataset(variables, attrs=first.attrs).set_coords(list(first.coords))
 
 
 class _Shards(BackendArray):
@@ -86,7 +92,7 @@ class _Shards(BackendArray):
         self, folder: Path, manifest: Manifest, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]
     ) -> None:
         self.folder, self.name, self.shape, self.dtype = folder, name, shape, dtype
-        self.files = [shard.file for shard in manifest.shards]
+        self.shards = manifest.shards
         self.starts = np.cumsum([0, *(shard.records for shard in manifest.shards)])
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
@@ -107,28 +113,51 @@ class _Shards(BackendArray):
 
     def _of_shard(self, number: int, places: list[Index]) -> NDArray[Any]:
         """Read values at the outer product of indices, from one contiguous piece."""
-        path = self.folder / self.files[number]
-        with _reading(path), h5py.File(path, "r") as file:
-            span = file[self.name][tuple(slice(int(p.min()), int(p.max()) + 1) for p in places)]
+        path = _unchanged(self.folder, self.shards[number])
+        with reading(_refusal(path)), h5py.File(path, "r") as file:
+            refuse_unsafe_variable(file, self.name, path.stat().st_size)
+            stored = file[self.name]
+            if (stored.shape, stored.dtype) != ((self.shards[number].records, *self.shape[1:]), self.dtype):
+                raise ValueError(f"its {self.name} has another shape or type than that of the first file")
+            span = stored[tuple(slice(int(p.min()), int(p.max()) + 1) for p in places)]
         return np.asarray(span[np.ix_(*(p - p.min() for p in places))])
 
 
-def opened_shard(path: Path) -> xr.Dataset:
-    """Open a shard's file as a Dataset, which the caller closes, with numbers as they are stored.
+def read_shard(folder: Path, shard: Written) -> xr.Dataset:
+    """Read a shard, with numbers as they are stored.
 
     Raises
     ------
     SpecificationError
-        If it cannot be read.
+        If it is missing, or not as it was written.
     """
-    with _reading(path):
-        return xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False, cache=False)
+    path = _unchanged(folder, shard)
+    found = read_netcdf(
+        path, xr.open_dataset, _refusal(path), sha256=shard.sha256, decode_times=False, decode_timedelta=False
+    )
+    if found.sizes.get("record") != shard.records:
+        raise _refusal(path)(f"has {found.sizes.get('record')} records in place of {shard.records}")
+    return found
 
 
-@contextmanager
-def _reading(path: Path) -> Iterator[None]:
+def _unchanged(folder: Path, shard: Written) -> Path:
+    """Return the path of a shard that is as it was written."""
+    path = file_in(folder, shard.file)
     try:
-        with reading(path, lambda what: SpecificationError(f"{path} {what}: run dataset verify")):
-            yield
+        stat = path.stat()
+        sha256 = _sha256(path, stat.st_ino, stat.st_size, stat.st_mtime_ns)
     except FileNotFoundError:
         raise SpecificationError(f"{path} is missing: dataset generate makes it again") from None
+    refuse_unless(sha256 == shard.sha256, _refusal(path))
+    return path
+
+
+@lru_cache(maxsize=100_000)
+def _sha256(path: Path, *stamp: int) -> str:
+    """Return the SHA-256 of a file, computed once as long as inode, size and time of change are the same."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _refusal(path: Path) -> Callable[[str], SpecificationError]:
+    return lambda what: SpecificationError(f"{path} {what}: run dataset verify")

@@ -5,14 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from tactile_bayes.datasets.shard import Written
+from tactile_bayes.datasets.shard import Written, file_in, shard_file
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.tasks import write_atomically
@@ -68,6 +69,11 @@ class Manifest:
         """Return the manifest of a data set without files."""
         return cls(spec.name, spec.text, spec.sha256, spec.seed, spec.records, spec.shard_records, versions_here())
 
+    def is_of(self, spec: Specification) -> bool:
+        """Return whether the manifest states what follows from a specification, which may have another text."""
+        stated = (self.specification_sha256, self.seed, self.records, self.shard_records)
+        return stated == (spec.sha256, spec.seed, spec.records, spec.shard_records)
+
     def having(self, written: Iterable[Written]) -> Manifest:
         """Return the manifest with further files."""
         return replace(self, shards=tuple(sorted([*self.shards, *written], key=lambda shard: shard.first)))
@@ -101,7 +107,7 @@ def write_manifest(manifest: Manifest, folder: Path) -> None:
     table = {"format": _FORMAT, "complete": manifest.is_complete, "redrawn": dict(sorted(manifest.redrawn.items()))}
     table |= {"strained": manifest.strained, "untouched": manifest.untouched}
     table |= {**asdict(manifest), "shards": [shard._asdict() for shard in manifest.shards]}
-    with write_atomically(folder / MANIFEST) as temporary:
+    with write_atomically(file_in(folder, MANIFEST)) as temporary:
         temporary.write_bytes(_content(table))
 
 
@@ -111,9 +117,9 @@ def read_manifest(folder: Path) -> Manifest:
     Raises
     ------
     SpecificationError
-        If there is none, or it has changed since it was written.
+        If there is none, it has changed since it was written, or it lists other files than shards.
     """
-    path = folder / MANIFEST
+    path = file_in(folder, MANIFEST)
     try:
         content = path.read_bytes()
         table = read_json(content, "it")
@@ -127,7 +133,7 @@ def read_manifest(folder: Path) -> Manifest:
             )
         shards = tuple(Written(**shard) for shard in table["shards"])
         rest = {name: table[name] for name in Manifest.__dataclass_fields__ if name != "shards"}
-        return Manifest(**rest, shards=shards)
+        return _checked(Manifest(**rest, shards=shards))
     except (FileNotFoundError, NotADirectoryError):
         lost = f", but shards: {_CORRECTION}" if any(folder.glob("shard-*.nc")) else ""
         raise SpecificationError(f"{folder} holds no data set: there is no {MANIFEST}{lost}") from None
@@ -135,6 +141,39 @@ def read_manifest(folder: Path) -> Manifest:
         if isinstance(error, SpecificationError):
             raise
         raise SpecificationError(f"{path} is no manifest of a data set ({error}): {_CORRECTION}") from error
+
+
+def _checked(manifest: Manifest) -> Manifest:
+    """Return a manifest if its entries have the types of such, and its shards are those of its records, in order.
+
+    Raises
+    ------
+    ValueError
+        If not.
+    """
+    _refuse_unless_typed(manifest, texts=("name", "specification", "specification_sha256", "card_sha256"))
+    _refuse_unless_typed(manifest, counts=("seed", "records", "shard_records"))
+    if not all(isinstance(text, str) for text in [*manifest.versions.keys(), *manifest.versions.values()]):
+        raise ValueError("its versions are not texts")
+    before = -1
+    for shard in manifest.shards:
+        _refuse_unless_typed(shard, texts=("file", "sha256"))
+        _refuse_unless_typed(shard, counts=("first", "records", "bytes", "strained", "untouched", *shard.redrawn))
+        number, offset = divmod(shard.first, manifest.shard_records or 1)
+        records = min(manifest.shard_records, manifest.records - shard.first)
+        if offset or number <= before or shard.records != records or shard.file != shard_file(number):
+            raise ValueError(f"{shard.file!r} from record {shard.first} on is no file of this data set")
+        if not re.fullmatch("[0-9a-f]{64}", shard.sha256):
+            raise ValueError(f"{shard.file} has no SHA-256")
+        before = number
+    return manifest
+
+
+def _refuse_unless_typed(of: Manifest | Written, texts: Sequence[str] = (), counts: Sequence[str] = ()) -> None:
+    entries = of._asdict() | of.redrawn if isinstance(of, Written) else vars(of)
+    for names, kind in ((texts, str), (counts, int)):
+        if wrong := [name for name in names if type(entries[name]) is not kind]:
+            raise ValueError(f"its {wrong[0]} is {entries[wrong[0]]!r}")
 
 
 def _content(table: Mapping[str, Any]) -> bytes:

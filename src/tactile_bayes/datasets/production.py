@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from tactile_bayes.datasets.card import CARD, card
 from tactile_bayes.datasets.manifest import MANIFEST, Manifest, read_manifest, versions_here, write_manifest
-from tactile_bayes.datasets.shard import Written, shard_file, write_shard
+from tactile_bayes.datasets.shard import Written, file_in, shard_file, write_shard
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_specification
 from tactile_bayes.datasets.specification_text import UNNAMED, differences, meaning
@@ -137,7 +137,7 @@ def _noted(manifest: Manifest, written: list[Written], folder: Path) -> Manifest
 def _finish(spec: Specification, manifest: Manifest, folder: Path) -> None:
     """Write the data card, and the manifest with its checksum."""
     content = card(spec, manifest).encode()
-    with write_atomically(folder / CARD) as temporary:
+    with write_atomically(file_in(folder, CARD)) as temporary:
         temporary.write_bytes(content)
     write_manifest(replace(manifest, card_sha256=hashlib.sha256(content).hexdigest()), folder)
 
@@ -157,10 +157,7 @@ def _begun(spec: Specification, folder: Path) -> Manifest:
         return _first(spec, folder)
     if manifest.specification_sha256 != spec.sha256:
         raise _other(manifest, spec, folder)
-    whole = tuple(
-        s for s in manifest.shards if (folder / s.file).is_file() and (folder / s.file).stat().st_size == s.bytes
-    )
-    manifest = replace(manifest, shards=whole)
+    manifest = replace(manifest, shards=tuple(shard for shard in manifest.shards if _is_there(folder, shard)))
     here = versions_here()
     other = [f"{name} {was} (now {here.get(name)})" for name, was in manifest.versions.items() if here.get(name) != was]
     if other and not manifest.is_complete:
@@ -169,6 +166,11 @@ def _begun(spec: Specification, folder: Path) -> Manifest:
             "versions, or start again in another folder"
         )
     return manifest
+
+
+def _is_there(folder: Path, shard: Written) -> bool:
+    path = file_in(folder, shard.file)
+    return path.is_file() and path.stat().st_size == shard.bytes
 
 
 def _first(spec: Specification, folder: Path) -> Manifest:

@@ -20,13 +20,14 @@ from tactile_bayes.datasets.generation import Records, directions_of, generate_r
 from tactile_bayes.datasets.netcdf import netcdf_of
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_text
+from tactile_bayes.errors import SpecificationError
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS
 from tactile_bayes.tasks import write_atomically
 
-__all__ = ["Written", "records_as_dataset", "shard_file", "write_shard"]
+__all__ = ["Written", "file_in", "records_as_dataset", "shard_file", "write_shard"]
 
 _LONGEST = 9
 """Largest number of phases in a sweep."""
@@ -56,6 +57,14 @@ def shard_file(shard: int) -> str:
     return f"shard-{shard:06d}.nc"
 
 
+def file_in(folder: Path, name: str) -> Path:
+    """Return the path of a file of a data set, and refuse a link that leads out of its folder."""
+    path = folder / name
+    if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+        raise SpecificationError(f"{path} is a link to another folder: put the file itself there, or remove the link")
+    return path
+
+
 def write_shard(task: tuple[str, int, str]) -> Written:
     """Generate a shard of a specification, and write it atomically to a folder.
 
@@ -67,7 +76,7 @@ def write_shard(task: tuple[str, int, str]) -> Written:
     Raises
     ------
     SpecificationError
-        If no contour is reached in 1000 draws of a record.
+        If no contour is reached in 1000 draws of a record, or a link to another folder is in its place.
     OSError
         If the file cannot be written; it does not exist then.
     """
@@ -76,7 +85,7 @@ def write_shard(task: tuple[str, int, str]) -> Written:
     begin = shard * spec.shard_records
     records = generate_records(spec, begin, min(begin + spec.shard_records, spec.records))
     content = netcdf_of(records_as_dataset(spec, records))
-    path = Path(folder) / shard_file(shard)
+    path = file_in(Path(folder), shard_file(shard))
     with ThreadPoolExecutor(1) as beside:  # during the write to the disk
         digest = beside.submit(_sha256, content)
         with write_atomically(path) as temporary, open(temporary, "wb") as file:

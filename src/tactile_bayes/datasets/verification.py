@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.datasets.card import CARD
-from tactile_bayes.datasets.collection import opened_shard
+from tactile_bayes.datasets.collection import read_shard
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.manifest import Manifest, read_manifest
-from tactile_bayes.datasets.shard import records_as_dataset
+from tactile_bayes.datasets.shard import file_in, records_as_dataset
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_text
 from tactile_bayes.errors import ParameterError, SpecificationError
@@ -64,7 +64,7 @@ def verify(
     folder = Path(path)
     manifest = read_manifest(folder)
     spec = read_text(manifest.specification)
-    if spec.sha256 != manifest.specification_sha256:
+    if not manifest.is_of(spec):
         raise SpecificationError(
             f"{folder}: the manifest's specification is not the one that its checksum states: put a copy of the "
             "manifest back, or make the data set again in another folder"
@@ -79,10 +79,10 @@ def verify(
             progress(Verification(done, wanted))
 
     for shard in manifest.shards:
-        _check(folder / shard.file, shard.sha256)
+        _check(file_in(folder, shard.file), shard.sha256)
         note()
     if manifest.card_sha256:
-        _check(folder / CARD, manifest.card_sha256)
+        _check(file_in(folder, CARD), manifest.card_sha256)
     listed = {shard.file for shard in manifest.shards}
     strangers = sorted(file.name for file in folder.glob("shard-*.nc") if file.name not in listed)
     if strangers:
@@ -110,10 +110,10 @@ def _check(file: Path, sha256: str) -> None:
 def _compare(spec: Specification, manifest: Manifest, folder: Path, number: int) -> None:
     shard = manifest.shards[number]
     again = records_as_dataset(spec, generate_records(spec, shard.first, shard.first + shard.records))
-    with opened_shard(folder / shard.file) as stored:
-        for name, variable in again.variables.items():
-            if not np.array_equal(stored[name].values, variable.values, equal_nan=variable.dtype.kind == "f"):
-                raise SpecificationError(
-                    f"{folder / shard.file}: {name} differs when it is made again (it was made with "
-                    f"{', '.join(f'{k} {v}' for k, v in manifest.versions.items())})"
-                )
+    stored = read_shard(folder, shard)
+    for name, variable in again.variables.items():
+        if not (name in stored and np.array_equal(stored[name], variable, equal_nan=variable.dtype.kind == "f")):
+            raise SpecificationError(
+                f"{folder / shard.file}: {name} differs when it is made again (it was made with "
+                f"{', '.join(f'{k} {v}' for k, v in manifest.versions.items())})"
+            )

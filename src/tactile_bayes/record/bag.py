@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Flags, Index
-from tactile_bayes.errors import RecordError
-from tactile_bayes.record.schema import CHANNELS
+from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.record.bag_messages import Field, Topic, example, messages_of, opened_bag
+from tactile_bayes.record.origin import origins_of
+from tactile_bayes.record.quantity import converted, unit_of
+from tactile_bayes.record.schema import CHANNELS, MEASURED
 from tactile_bayes.record.table import Cells, Source, Table
-
-if TYPE_CHECKING:
-    from rosbags.highlevel import AnyReader
 
 __all__ = ["is_bag", "read_bag_table"]
 
@@ -26,14 +25,17 @@ _BAGS = (".mcap", ".bag", ".db3")
 _SMOOTH = ("drive_angle", "base_x", "base_y")
 """Columns that are interpolated in time: a drive moves smoothly, and its encoder hardly scatters."""
 
-_LONGEST = 64
-"""Largest number of elements of an array that are columns."""
-
 _INTERVALS = 5.0
-"""Largest time from a message to the next one of its topic, over the usual one, within which samples are kept."""
+"""Largest time from a message to the next one of its field, over the usual one, within which samples are kept."""
 
-Messages = dict[str, tuple[list[int], dict[str, list[Any]]]]
-"""Times of messages [ns], and values of their fields, by topic."""
+_ROUNDING = 1e-6
+"""Relative excess of the range of an angle over a turn, in which it stays all the same."""
+
+_MOST_NAMED = 5
+"""Largest number of names of joints in a message."""
+
+_DELAY = 10 * 10**9
+"""Largest difference between the delays of two topics, from header to reception, if their clocks are the same [ns]."""
 
 
 def is_bag(path: Path) -> bool:
@@ -45,11 +47,16 @@ def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
     """Read the fields of messages that a record needs, one sample for each message with a load.
 
     Fields are named as topic, point, and the field's own path, like "/wrench.wrench.force.x"; elements of arrays have
-    numbers, like "/joint_states.position.0". The time of a message is that of its header, if it has one, else that of
-    its reception. Each message of the topic with the first load is a sample. Drive angle and base are interpolated
-    linearly to its time; other loads are those of the nearest message, and everything else is that of the last one. A
-    sample is left out if another topic has no messages around it, or pauses there for more than five times its usual
-    interval.
+    numbers, like "/motor.data.0", or the names that are in the same message, like "/joint_states.position.wrist". A
+    message without that name is none of that column. Each message with the first load is a sample. Drive angle and
+    base are interpolated linearly to its time, an angle after its jumps by a turn are undone; other loads are those of
+    the nearest message, and everything else is that of the last one. A sample is left out if the field of another
+    column has no values around it, or pauses there for more than five times its usual interval; NaN of what is
+    interpolated is no value.
+
+    The time of a message is that of its header, if its topic has any, and a message without is none. All times are
+    those of reception if the headers of a topic go back, state one time for different values, or have another clock
+    than other topics. A message that is in the bag again counts once.
 
     Parameters
     ----------
@@ -61,117 +68,218 @@ def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
     Raises
     ------
     RecordError
-        If the package rosbags is missing, the bag cannot be read, or no column is of one of its topics.
+        If the package rosbags is missing, the bag cannot be read, or no column is of one of its topics; if an element
+        has a number, and messages have different names for it; if the messages of a column are of several frames, or of
+        several publishers at a time; if there is no clock.
     """
     source = Source(str(path))
-    with _opened(path, source) as reader:
-        topics = sorted({connection.topic for connection in reader.connections}, key=len, reverse=True)
-        asked = {target: next((t for t in topics if f"{t}." in text), None) for target, text in columns.items()}
-        wanted = {topic for topic in asked.values() if topic is not None}
+    with opened_bag(path, source) as reader:
+        names = sorted({connection.topic for connection in reader.connections}, key=len, reverse=True)
+        wanted = {topic for text in columns.values() if (topic := next((t for t in names if f"{t}." in text), None))}
         if not wanted:
             raise source.error(
-                f"no column is of one of its topics: write columns like drive_angle={_example(reader)}; the bag has "
-                + (", ".join(sorted(topics)) or "no topics")
+                f"no column is of one of its topics: write columns like drive_angle={example(reader)}; the bag has "
+                + (", ".join(sorted(names)) or "no topics")
             )
-        messages = _messages(reader, wanted)
-    loads = [topic for target in CHANNELS if (topic := asked.get(target)) is not None]
-    main = (loads or sorted(wanted))[0]
-    at = np.sort(messages[main][0])
-    cells, known = {}, np.ones(at.size, dtype=bool)
-    for topic, (received, fields) in messages.items():
-        order = np.argsort(received, kind="stable")
-        times = np.array(received, dtype=np.int64)[order]
-        if topic != main:
-            known &= _surrounded(times, at)
-        for name, values in fields.items():
-            column = np.array(values)[order]
-            cells[f"{topic}.{name}"] = column if topic == main else _at(times, column, at, f"{topic}.{name}", columns)
-    table: dict[str, Cells] = {name: (values[known], {}) for name, values in cells.items()}
-    return Table(table, {}, Source(str(path), names=list(table)))
+        topics = messages_of(reader, wanted)
+    asked = _asked(topics, columns, source)
+    faults = []
+    for by_header in (True, False):
+        try:
+            times = _times(topics, by_header)
+            return _table(topics, times, asked, source)
+        except _ClockError as fault:
+            faults.append(fault)
+    raise source.error(f"{faults[0]}; by the times of reception, {faults[1]}: record it again, or take another topic")
 
 
-@contextmanager
-def _opened(path: Path, source: Source) -> Iterator[AnyReader]:
-    """Open a bag; any failure is raised as an error of the source."""
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise source.error(
-            "bags are read by the package rosbags, which is not installed: pip install 'tactile-bayes[ros]'"
-        ) from error
-    try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
-            yield reader
-    except RecordError:
-        raise
-    except Exception as error:  # a damaged bag causes many kinds of errors
-        what = " ".join(str(error).split()) or type(error).__name__
-        raise source.error(f"the bag cannot be read, it is damaged, or no bag of ROS ({what})") from error
+class _ClockError(Exception):
+    """The times of messages cannot be those of their values."""
 
 
-def _messages(reader: AnyReader, wanted: set[str]) -> Messages:
-    """Read the messages of some topics."""
-    found: Messages = {topic: ([], {}) for topic in wanted}
-    connections = [connection for connection in reader.connections if connection.topic in wanted]
-    for connection, received, raw in reader.messages(connections):
-        message = reader.deserialize(raw, connection.msgtype)
-        times, fields = found[connection.topic]
-        times.append(_time_of(message, received))
-        for name, value in _fields(message):
-            fields.setdefault(name, []).append(value)
-    for times, fields in found.values():  # elements that not every message has are no columns
-        for name in [name for name, values in fields.items() if len(values) < len(times)]:
-            del fields[name]
+class _Column(NamedTuple):
+    """A field of a topic from which columns of the record come."""
+
+    topic: str
+    inner: str
+    """Name within a message."""
+    field: Field
+    targets: tuple[str, ...]
+    turn: float | None
+    """A turn in the unit of the field, if it is an angle."""
+
+    def series(self, times: Index) -> tuple[Index, NDArray[Any]]:
+        """Return times and values in ascending order, each once.
+
+        Raises
+        ------
+        _ClockError
+            If times go back, or there are different values at one time.
+        """
+        at, values = times[self.field.messages], np.array(self.field.values)
+        known = at > 0
+        if self.is_smooth and values.dtype.kind == "f":
+            known &= np.isfinite(values)
+        at, values = at[known], values[known]
+        if at.size and self.targets:
+            steps = np.diff(at)
+            usual = float(np.median(np.abs(steps))) if steps.size else 0.0
+            if (back := float(-steps.min(initial=0))) > _INTERVALS * max(usual, 1.0):
+                raise _ClockError(f"the times of {self.topic} go back by {back / 1e9:.3g} s")
+        order = np.argsort(at, kind="stable")
+        at, values = at[order], values[order]
+        is_again = np.append(np.diff(at) == 0, False)[: at.size]
+        one, other = values[:-1], values[1:]
+        differ = is_again[:-1] & (one != other) & ((one == one) | (other == other))  # NaN is as NaN
+        if self.targets and np.any(differ):
+            raise _ClockError(f"{self.name} has different values at one time, {at[:-1][differ][0] / 1e9:.9f} s")
+        at, values = at[~is_again], values[~is_again]
+        return at, values if self.turn is None else _unwrapped(at, values.astype(float), self.turn)
+
+    @property
+    def name(self) -> str:
+        return f"{self.topic}.{self.inner}"
+
+    @property
+    def is_smooth(self) -> bool:
+        return not set(self.targets).isdisjoint(_SMOOTH)
+
+
+def _asked(topics: Mapping[str, Topic], columns: Mapping[str, str], source: Source) -> list[_Column]:
+    """Return the fields of the columns that were asked for, the one that gives the samples first."""
+    homes = {f"{topic}.{name}": (topic, name) for topic, found in topics.items() for name in found.fields}
+    origins = {target: origin for target, origin in origins_of(columns, homes, source).items() if origin.column}
+    found = []
+    for name in dict.fromkeys(str(origins[t].column) for t in (*CHANNELS, *MEASURED, *origins) if t in origins):
+        topic, inner = homes[name]
+        targets = tuple(target for target, origin in origins.items() if origin.column == name)
+        turn = _turn_in(origins["drive_angle"].unit) if "drive_angle" in targets else None
+        column = _Column(topic, inner, topics[topic].fields[inner], targets, turn)
+        _refuse_mixed(column, topics[topic], source)
+        found.append(column)
     return found
 
 
-def _time_of(message: Any, received: int) -> int:
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    stated = 0 if stamp is None else stamp.sec * 10**9 + stamp.nanosec
-    return stated or received
+def _refuse_mixed(column: _Column, topic: Topic, source: Source) -> None:
+    """Refuse a field whose messages are of different joints, frames or publishers."""
+    field = column.field
+    if not field.is_named:
+        like = re.compile(re.sub(r"\\\.[0-9]+(?=\\\.|$)", r"\\..+", re.escape(column.inner)))
+        named = [name for name, other in topic.fields.items() if other.is_named and like.fullmatch(name)]
+        ways = " or ".join(f"{column.topic}.{name}" for name in named[:_MOST_NAMED])
+        way = f"name it, as {ways}" if named else "take a field that all have"
+        if len(field.labels) > 1:
+            raise source.error(f"{column.name} stands for {len(field.labels)} names that its messages state: {way}")
+        if len(field.messages) < len(topic.received):
+            raise source.error(f"{column.name} is not in every message of {column.topic}: {way}")
+        frames = topic.fields.get("header.frame_id")
+        if frames is not None and len(several := sorted(set(frames.values))) > 1:
+            raise source.error(
+                f"the messages of {column.topic} are of several frames, {', '.join(map(repr, several))}: record one "
+                "sensor on a topic"
+            )
+    publishers = np.array(topic.publishers)[field.messages]
+    if np.count_nonzero(np.diff(publishers)) >= np.unique(publishers).size > 1:
+        raise source.error(f"{column.name} comes from several publishers at a time: record one on a topic")
 
 
-def _fields(message: Any, lead: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield numbers and texts of a message with their names."""
-    if isinstance(message, bool | int | float | str | np.generic):
-        yield lead.rstrip("."), message
-    elif isinstance(message, np.ndarray | list | tuple):
-        for index, element in enumerate(message[:_LONGEST]):
-            yield from _fields(element, f"{lead}{index}.")
-    elif hasattr(message, "__dataclass_fields__"):
-        for name in message.__dataclass_fields__:
-            if not name.startswith("__"):
-                yield from _fields(getattr(message, name), f"{lead}{name}.")
+def _turn_in(unit: str | None) -> float:
+    """Return a turn in a unit; by default, and in what is no unit, in radians."""
+    radian, known = unit_of("rad"), None if unit is None else unit_of(unit)
+    assert radian is not None
+    return 2.0 * np.pi if known is None else float(converted(2.0 * np.pi, radian, known))
+
+
+def _times(topics: Mapping[str, Topic], by_header: bool) -> dict[str, Index]:
+    """Return the times of all messages [ns], 0 if unknown, of their headers or of reception.
+
+    Raises
+    ------
+    _ClockError
+        If topics have different clocks.
+    """
+    times, delays = {}, {}
+    for name, topic in topics.items():
+        received, stamps = np.array(topic.received, dtype=np.int64), np.array(topic.stamps, dtype=np.int64)
+        times[name] = stamps if by_header and np.any(stamps) else received
+        known = times[name] > 0
+        late = (received - times[name])[known]
+        low, middle, high = np.percentile(late, (10, 50, 90)) if late.size else (0.0, 0.0, 0.0)
+        if high - low < _DELAY:
+            delays[name] = middle
+    if delays:
+        first, last = min(delays, key=delays.__getitem__), max(delays, key=delays.__getitem__)
+        if (apart := delays[last] - delays[first]) > _DELAY:
+            raise _ClockError(f"the clocks of {first} and {last} are {apart / 1e9:.3g} s apart")
+    return times
+
+
+def _table(topics: Mapping[str, Topic], times: Mapping[str, Index], asked: list[_Column], source: Source) -> Table:
+    """Return the table of the columns that were asked for, and of all other fields of their topics.
+
+    Raises
+    ------
+    _ClockError
+        If messages have no times.
+    """
+    main = asked[0]
+    at, _ = main.series(times[main.topic])
+    cells, known = {}, np.ones(at.size, dtype=bool)
+    for column in (*asked, *_further(topics, asked)):
+        own, values = column.series(times[column.topic])
+        if column.topic == main.topic and np.array_equal(own, at):
+            cells[column.name] = values
+            continue
+        if column.targets:
+            known &= _surrounded(own, at)
+            if not np.any(known):
+                raise _ClockError(f"no message of {main.topic} is between two of {column.name} that follow as usual")
+        cells[column.name] = _at(own, values, at, column) if own.size else np.full(at.size, "")
+    table: dict[str, Cells] = {name: (values[known], {}) for name, values in cells.items()}
+    return Table(table, {}, Source(source.name, names=list(table)))
+
+
+def _further(topics: Mapping[str, Topic], asked: Iterable[_Column]) -> list[_Column]:
+    """Return all other fields that every message has, elements by their numbers if these stand for the same."""
+    taken = {column.name for column in asked}
+    return [
+        _Column(topic, name, field, (), None)
+        for topic, found in topics.items()
+        for name, field in found.fields.items()
+        if f"{topic}.{name}" not in taken and not field.is_named and len(field.labels) == 1 and found.is_in_all(name)
+    ]
+
+
+def _usual(times: Index) -> Flags:
+    """Return True for the steps between messages that follow one another as usual."""
+    steps = np.diff(times)
+    return np.asarray(steps <= _INTERVALS * max(float(np.median(steps)), 1.0)) if steps.size else steps > 0
 
 
 def _surrounded(times: Index, at: Index) -> Flags:
-    """Return True for times between two messages that follow one another as usual."""
+    """Return True for times of a message, or between two that follow one another as usual."""
     if times.size < 2:
         return np.zeros(at.size, dtype=bool)
-    steps = np.diff(times)
     after = np.clip(np.searchsorted(times, at, side="right"), 1, times.size - 1)
     inside = (times[0] <= at) & (at <= times[-1])
-    return np.asarray(inside & (steps[after - 1] <= _INTERVALS * max(float(np.median(steps)), 1.0)))
+    return np.asarray(inside & (_usual(times)[after - 1] | np.isin(at, times)))
 
 
-def _at(times: Index, values: Any, at: Index, name: str, columns: Mapping[str, str]) -> Any:
+def _unwrapped(times: Index, angles: Floats, turn: float) -> Floats:
+    """Undo jumps by a turn of an angle that stays within one; in a pause it may have gone any way."""
+    if angles.size < 2 or np.ptp(angles) > turn * (1.0 + _ROUNDING):
+        return angles
+    steps = np.diff(angles)
+    turns = np.where(_usual(times), np.round(steps / turn), 0.0)
+    return np.asarray(angles - turn * np.append(0.0, np.cumsum(turns)))
+
+
+def _at(times: Index, values: NDArray[Any], at: Index, column: _Column) -> NDArray[Any]:
     """Return the values of a field at other times, as the columns demand that come from it."""
-    field = re.compile(rf"{re.escape(name)}(?![\w.])")
-    targets = {target for target, text in columns.items() if field.search(text)}
-    if values.dtype.kind == "f" and not targets.isdisjoint(_SMOOTH):
+    if values.dtype.kind == "f" and column.is_smooth:
         return np.interp(at - times[0], times - times[0], values)  # differences, as floats have no nanoseconds of today
     last = np.clip(np.searchsorted(times, at, side="right") - 1, 0, times.size - 1)
     following = np.minimum(last + 1, times.size - 1)
-    if not targets.isdisjoint(CHANNELS):
-        return values[np.where(at - times[last] <= times[following] - at, last, following)]
-    return values[last]
-
-
-def _example(reader: AnyReader) -> str:
-    """Return the name of a number in the bag."""
-    for connection, _, raw in reader.messages():
-        for name, value in _fields(reader.deserialize(raw, connection.msgtype)):
-            if isinstance(value, float | np.floating):
-                return f"{connection.topic}.{name}"
-    return "/joint_states.position.0"
+    if not set(column.targets).isdisjoint(CHANNELS):
+        return np.asarray(values[np.where(at - times[last] <= times[following] - at, last, following)])
+    return np.asarray(values[last])

@@ -9,12 +9,14 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, TypeVar
 
 import h5netcdf
 import xarray as xr
-from xarray.backends import H5NetCDFStore
+from xarray.backends import H5NetCDFStore, InMemoryDataStore
 
+from tactile_bayes.record.netcdf_content import Group, UnsafeError, content_of
+from tactile_bayes.record.netcdf_process import content_elsewhere
 from tactile_bayes.record.table import Source, Table, table_of
 from tactile_bayes.tasks import write_atomically
 
@@ -27,8 +29,6 @@ _SEAL_BYTES = len(_SEAL) + 64 + 1
 
 _SUPERBLOCK = 48
 """Number of first bytes of an HDF5 file that contain the number of all its bytes."""
-
-_CHUNK = 1 << 22
 
 
 def write_netcdf(
@@ -63,7 +63,7 @@ def write_netcdf(
     image = _image_of(content, encoding or {})
     with write_atomically(path) as temporary, open(temporary, "wb") as file:
         file.write(image)
-        file.write(_seal(io.BytesIO(image), len(image)))
+        file.write(_seal(hashlib.sha256(image).hexdigest()))
 
 
 def _image_of(content: xr.Dataset | xr.DataTree, encoding: Mapping[str, Mapping[str, Any]]) -> bytes:
@@ -91,9 +91,17 @@ def _with_checksums(dataset: xr.Dataset, encoding: Mapping[str, Mapping[str, Any
 
 
 def read_netcdf(
-    path: Path, opened: Callable[..., Content], refused: Callable[[str], Exception], **options: Any
+    path: Path,
+    opened: Callable[..., Content],
+    refused: Callable[[str], Exception],
+    sha256: str | None = None,
+    **options: Any,
 ) -> Content:
     """Read a NetCDF 4 file of this or another program into memory.
+
+    A file that ends with its SHA-256 is verified first, since damage may cause HDF5 to crash, to hang, or to take all
+    memory. A file of another program, or an earlier version, is read by a process of its own, with a limit of time
+    and memory, which takes half a second longer. Neither is read if it leads to other files.
 
     Parameters
     ----------
@@ -102,50 +110,69 @@ def read_netcdf(
         `xarray.open_dataset` or `xarray.open_datatree`.
     refused : callable
         Makes the error from a description of the fault; the error names the file and says what to do.
+    sha256 : str, optional
+        SHA-256 of the file if it is stated elsewhere.
     **options
-        Options of `opened`.
+        Options of `xarray.open_dataset`.
 
     Raises
     ------
     Exception
-        The error from `refused`, if the file is damaged or not a NetCDF 4 file.
+        The error from `refused`, if the file is damaged, not a NetCDF 4 file, or leads to other files.
     OSError
         If it cannot be opened.
     """
-    with reading(path, refused), opened(path, engine="h5netcdf", **options) as found:
-        return found.load()
+    content = path.read_bytes()
+    if sha256 is not None:
+        refuse_unless(hashlib.sha256(content).hexdigest() == sha256, refused)
+    is_known = sha256 is not None or _is_sealed(content, refused)
+    with_groups: bool = opened is xr.open_datatree
+    with reading(refused):
+        groups = content_of(content, with_groups) if is_known else content_elsewhere(content, with_groups)
+        found = {name: _dataset(group, options) for name, group in groups.items()}
+        result: Any = xr.DataTree.from_dict(found) if with_groups else found["/"]
+    return result
+
+
+def _dataset(group: Group, options: Mapping[str, Any]) -> xr.Dataset:
+    variables = {
+        name: xr.Variable(dims, values, attrs, {"dtype": str if values.dtype.kind == "O" else values.dtype})
+        for name, (dims, values, attrs) in group.variables.items()
+    }
+    return xr.open_dataset(InMemoryDataStore(variables, dict(group.attrs)), **options).load()
 
 
 @contextmanager
-def reading(path: Path, refused: Callable[[str], Exception]) -> Iterator[None]:
-    """Context in which a NetCDF 4 file is read; any failure is raised as an error from `refused`.
-
-    A file that ends with its SHA-256 is verified first, since a damaged file may cause HDF5 to crash or hang. Files of
-    other programs or earlier versions are read without this check.
-    """
-    with open(path, "rb") as file:
-        size = os.fstat(file.fileno()).st_size
-        known = size - _SEAL_BYTES
-        is_sealed = known > 0 and known.to_bytes(8, "little") in file.read(_SUPERBLOCK)
-        file.seek(max(known, 0))
-        last = file.read()
-        if (is_sealed or last.startswith(_SEAL)) and last != _seal(file, known):
-            raise refused("is damaged, it is not as it was written (its SHA-256 differs)")
+def reading(refused: Callable[[str], Exception]) -> Iterator[None]:
+    """Context in which a NetCDF 4 file is read; any failure is raised as an error from `refused`."""
     try:
         yield
+    except UnsafeError as error:
+        raise refused(f"is not read, {error}") from None
     except Exception as error:  # a damaged file causes many kinds of errors in HDF5
         what = " ".join(str(error).split()) or type(error).__name__
         raise refused(f"cannot be read, it is damaged or cut short, or no NetCDF 4 file ({what})") from error
 
 
-def _seal(file: BinaryIO, size: int) -> bytes:
-    """Compute the last line of a file from its first `size` bytes; the file is then positioned after them."""
-    file.seek(0)
-    digest = hashlib.sha256()
-    while size > 0 and (block := file.read(min(size, _CHUNK))):
-        digest.update(block)
-        size -= len(block)
-    return _SEAL + digest.hexdigest().encode() + b"\n"
+def _is_sealed(content: bytes, refused: Callable[[str], Exception]) -> bool:
+    """Return whether a file ends with its SHA-256; raise the error from `refused` if it ends with another one."""
+    known = max(len(content) - _SEAL_BYTES, 0)
+    last = content[known:]
+    if not (known and known.to_bytes(8, "little") in content[:_SUPERBLOCK]) and not last.startswith(_SEAL):
+        return False
+    refuse_unless(last == _seal(hashlib.sha256(memoryview(content)[:known]).hexdigest()), refused)
+    return True
+
+
+def refuse_unless(is_as_written: bool, refused: Callable[[str], Exception]) -> None:
+    """Raise the error from `refused` if a file is not as it was written."""
+    if not is_as_written:
+        raise refused("is damaged, it is not as it was written (its SHA-256 differs)")
+
+
+def _seal(sha256: str) -> bytes:
+    """Return the last line of a file, from the SHA-256 of all before it."""
+    return _SEAL + sha256.encode() + b"\n"
 
 
 def read_netcdf_table(path: Path, columns: Mapping[str, str]) -> Table:

@@ -1,0 +1,346 @@
+"""The content of a NetCDF 4 file; run as a script, that of one whose origin is unknown, within limits.
+
+It imports nothing of this package, so that the script starts in a quarter of a second.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from types import SimpleNamespace
+from typing import Any, BinaryIO, NamedTuple
+
+import h5netcdf
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "Group",
+    "UnsafeError",
+    "content_of",
+    "largest_content",
+    "received",
+    "refuse_unsafe",
+    "refuse_unsafe_variable",
+    "send",
+    "time_limit",
+]
+
+_DEPTH, _OBJECTS = 32, 10_000
+"""Largest depth of groups, and number of groups and variables."""
+
+_RATIO, _SLACK = 1032, 1 << 20
+"""Largest ratio of a variable to its bytes in the file, which is that of deflate, beyond a size that is always read."""
+
+_LARGEST = 1 << 30
+"""Content [bytes] that is always allowed."""
+
+_FILTERS = (1, 2, 3, 4, 5, 6, 32000)
+"""Filters that come with HDF5 and h5py; others are in plugins, which are programs."""
+
+_PLAIN = (h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING, h5py.h5t.ENUM)
+
+_OF_DIMENSIONS = ("DIMENSION_LIST", "REFERENCE_LIST")
+"""Attributes of references, by which variables have their dimensions."""
+
+_NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"
+"""Beginning of the attribute NAME of a dimension that is no variable."""
+
+_SECONDS, _RATE, _PATIENCE = 10, 10_000_000, 12
+"""Time of the processor [s], bytes that are read in each second more, and the whole time over that of the processor."""
+
+_WORKSPACE = 1 << 28
+"""Memory for reading, besides file and content [bytes]."""
+
+
+class UnsafeError(ValueError):
+    """A file is whole, as far as is known, and is not to be read all the same."""
+
+
+class Group(NamedTuple):
+    """A group of a file."""
+
+    variables: Mapping[str, tuple[tuple[str, ...], NDArray[Any], Mapping[str, Any]]]
+    """Dimensions, values as stored, and attributes, by name."""
+    attrs: Mapping[str, Any]
+
+
+def content_of(content: bytes, with_groups: bool) -> dict[str, Group]:
+    """Return the content of a NetCDF 4 file by the path of its groups, or of the root alone.
+
+    Raises
+    ------
+    UnsafeError
+        If the file refers to other files, or states more than its bytes can hold.
+    Exception
+        Any other, if it is damaged or not NetCDF 4.
+    """
+    with h5py.File(io.BytesIO(content), "r") as hdf5:
+        refuse_unsafe(hdf5, len(content))
+    with h5netcdf.File(io.BytesIO(content), "r", decode_vlen_strings=True, phony_dims="access") as file:
+        return dict(_groups("/", file)) if with_groups else {"/": _group(file)}
+
+
+def refuse_unsafe(hdf5: h5py.File, size: int) -> None:
+    """Refuse a file that leads to other files or to programs, or states more than its bytes can hold.
+
+    Raises
+    ------
+    UnsafeError
+        If it has links other than that of each object to its group, variables outside of it or made of others, types
+        other than numbers and text, filters of plugins, or sizes that do not fit the file.
+    """
+    known, total, waiting = {_address(hdf5)}, 0, [(hdf5, 0)]
+    _refuse_attributes(hdf5, size)
+    while waiting:
+        group, depth = waiting.pop()
+        if depth > _DEPTH:
+            raise UnsafeError(f"it has groups in groups, more than {_DEPTH} deep")
+        for name in group:
+            path, part = f"{group.name.rstrip('/')}/{name}", _part_of(group, name)
+            if (address := _address(part)) in known:
+                raise UnsafeError(f"{path} is in the file a second time")
+            known.add(address)
+            if len(known) > _OBJECTS:
+                raise UnsafeError(f"it has more than {_OBJECTS:,} groups and variables")
+            _refuse_attributes(part, size)
+            if isinstance(part, h5py.Group):
+                waiting.append((part, depth + 1))
+            elif isinstance(part, h5py.Dataset):
+                total += _size_of(part, size)
+                if total > largest_content(size):
+                    raise UnsafeError(f"it states more than {largest_content(size):,} bytes of content")
+
+
+def refuse_unsafe_variable(hdf5: h5py.File, name: str, size: int) -> None:
+    """Refuse a variable of the root as `refuse_unsafe` does, whatever else is in the file.
+
+    Raises
+    ------
+    UnsafeError
+        If it is not numbers or text in this file.
+    """
+    if not isinstance(part := _part_of(hdf5, name), h5py.Dataset):
+        raise UnsafeError(f"/{name} is no variable")
+    _size_of(part, size)
+
+
+def _part_of(group: h5py.Group, name: str) -> h5py.HLObject:
+    """Return a group or variable, and refuse a link."""
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise UnsafeError(f"{group.name.rstrip('/')}/{name} is a link, which may lead to another file")
+    return group[name]
+
+
+def largest_content(size: int) -> int:
+    """Return the largest content of a file of this size that is read [bytes]."""
+    return max(_LARGEST, 4 * size)
+
+
+def _address(part: h5py.HLObject) -> tuple[int, int]:
+    info = h5py.h5o.get_info(part.id)
+    return info.fileno, info.addr
+
+
+def _size_of(variable: h5py.Dataset, size: int) -> int:
+    """Return the size of a variable [bytes], and refuse one that is not in the file, and in it alone."""
+    path = variable.name
+    made = variable.id.get_create_plist()
+    if made.get_layout() == h5py.h5d.VIRTUAL:
+        raise UnsafeError(f"{path} is made of other variables, which may be in other files")
+    if made.get_external_count():
+        raise UnsafeError(f"{path} is in another file, {os.fsdecode(made.get_external(0)[0])!r}")
+    for number in range(made.get_nfilters()):
+        if (code := made.get_filter(number)[0]) not in _FILTERS:
+            raise UnsafeError(f"{path} is compressed by the plugin number {code}")
+    kind = variable.id.get_type()
+    if kind.get_class() not in _PLAIN:
+        raise UnsafeError(f"{path} is neither of numbers nor of text")
+    if bytes(variable.attrs.get("NAME", b"")).startswith(_NO_VARIABLE):
+        return 0  # it has no values, and is not read
+    stated, stored = math.prod(variable.shape or (0,)) * kind.get_size(), variable.id.get_storage_size()
+    chunk = math.prod(variable.chunks or (0,)) * kind.get_size()
+    if stored > size or max(stated, chunk) > _SLACK + _RATIO * stored:
+        raise UnsafeError(
+            f"{path} is said to have {stated:,} bytes in chunks of {chunk:,}, of which {stored:,} are stored"
+        )
+    return stated
+
+
+def _refuse_attributes(part: h5py.HLObject, size: int) -> None:
+    for name in part.attrs:
+        attribute = part.attrs.get_id(name)
+        if name not in _OF_DIMENSIONS and attribute.get_type().get_class() not in _PLAIN:
+            raise UnsafeError(f"the attribute {name} of {part.name} is neither of numbers nor of text")
+        if (stored := attribute.get_storage_size()) > size:
+            raise UnsafeError(f"the attribute {name} of {part.name} is said to have {stored:,} bytes")
+
+
+def _groups(path: str, group: h5netcdf.Group) -> Iterator[tuple[str, Group]]:
+    yield path, _group(group)
+    for name, part in group.groups.items():
+        yield from _groups(f"{path.rstrip('/')}/{name}", part)
+
+
+def _group(group: h5netcdf.Group) -> Group:
+    variables = {
+        name: (variable.dimensions, _plain(variable[...]), _attributes(variable))
+        for name, variable in group.variables.items()
+    }
+    return Group(variables, _attributes(group))
+
+
+def _plain(values: Any) -> NDArray[Any]:
+    """Return values as an array without what HDF5 adds to its type."""
+    array = np.asarray(values)
+    return array.astype(np.dtype(array.dtype.str), copy=False) if array.dtype.kind != "O" else array.astype(object)
+
+
+def _attributes(of: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
+    """Return attributes, texts as such, as xarray does."""
+    found = dict(of.attrs)
+    for name, value in found.items():
+        if isinstance(value, bytes) and name not in ("_FillValue", "missing_value"):
+            with suppress(UnicodeDecodeError):
+                found[name] = value.decode()
+    return found
+
+
+# ---- from the script to the process that waits for it
+
+
+def send(groups: Mapping[str, Group], write: Callable[[bytes], object]) -> None:
+    """Write groups as arrays of numbers, one after the other; the first is a table of everything, as JSON."""
+    arrays: list[NDArray[Any]] = []
+    table = {
+        path: {
+            "attrs": _all_packed(group.attrs, arrays),
+            "variables": {
+                name: [dims, _packed(values, arrays), _all_packed(attrs, arrays)]
+                for name, (dims, values, attrs) in group.variables.items()
+            },
+        }
+        for path, group in groups.items()
+    }
+    file: Any = SimpleNamespace(write=write)  # an actual file is asked for its position, which a pipe has not
+    index = json.dumps([len(arrays), table]).encode()
+    for array in (np.frombuffer(index, dtype=np.uint8), *arrays):
+        np.save(file, array, allow_pickle=False)
+
+
+def received(file: BinaryIO) -> dict[str, Group]:
+    """Return the groups that `send` has written."""
+    count, table = json.loads(np.load(file, allow_pickle=False).tobytes())
+    arrays = [np.load(file, allow_pickle=False) for _ in range(count)]
+    return {
+        path: Group(
+            {
+                name: (tuple(dims), _unpacked(values, arrays), _all_unpacked(attrs, arrays))
+                for name, (dims, values, attrs) in group["variables"].items()
+            },
+            _all_unpacked(group["attrs"], arrays),
+        )
+        for path, group in table.items()
+    }
+
+
+def _packed(value: Any, arrays: list[NDArray[Any]]) -> list[Any]:
+    """Return a value as JSON, with its kind; arrays of numbers are numbered and go beside it."""
+    if isinstance(value, str):
+        return ["text", value]
+    if isinstance(value, bytes) and not isinstance(value, np.generic):
+        return ["bytes", value.decode("latin-1")]
+    if isinstance(value, list):
+        return ["list", [_packed(part, arrays) for part in value]]
+    array = np.asarray(value)
+    if array.dtype.kind == "O":
+        return ["objects", [_packed(part, arrays) for part in array.flat], array.shape]
+    arrays.append(_plain(array))
+    return ["array" if isinstance(value, np.ndarray) else "number", len(arrays) - 1]
+
+
+def _all_packed(values: Mapping[str, Any], arrays: list[NDArray[Any]]) -> dict[str, list[Any]]:
+    return {name: _packed(value, arrays) for name, value in values.items()}
+
+
+def _unpacked(packed: list[Any], arrays: list[NDArray[Any]]) -> Any:
+    kind, value, *shape = packed
+    match kind:
+        case "text":
+            return value
+        case "bytes":
+            return value.encode("latin-1")
+        case "list":
+            return [_unpacked(part, arrays) for part in value]
+        case "objects":
+            found = np.empty(len(value), dtype=object)
+            found[:] = [_unpacked(part, arrays) for part in value]
+            return found.reshape(shape[0])
+        case _:
+            return arrays[value] if kind == "array" else arrays[value][()]
+
+
+def _all_unpacked(packed: Mapping[str, list[Any]], arrays: list[NDArray[Any]]) -> dict[str, Any]:
+    return {name: _unpacked(value, arrays) for name, value in packed.items()}
+
+
+# ---- the script
+
+
+def time_limit(size: int) -> tuple[int, int]:
+    """Return the time of the processor, and the whole time, in which a file of this size is read [s].
+
+    The whole time is longer, since other work may take most of the processor; it holds where the system has no limit
+    of the other.
+    """
+    seconds = _SECONDS + size // _RATE
+    return seconds, _PATIENCE * seconds
+
+
+def _limit(size: int) -> None:
+    """Limit time and memory of this process, where the system can."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    seconds = math.ceil(used.ru_utime + used.ru_stime) + time_limit(size)[0]
+    _lower(resource.RLIMIT_CPU, seconds)
+    _lower(resource.RLIMIT_CORE, 0)
+    with suppress(OSError), open("/proc/self/statm", encoding="ascii") as statm:  # Linux
+        mapped = int(statm.read().split()[0]) * resource.getpagesize()
+        _lower(resource.RLIMIT_AS, mapped + 2 * size + largest_content(size) + _WORKSPACE)
+
+
+def _lower(limit: int, value: int) -> None:
+    import resource
+
+    _, highest = resource.getrlimit(limit)
+    value = value if highest == resource.RLIM_INFINITY else min(value, highest)
+    resource.setrlimit(limit, (value, highest))
+
+
+def _main() -> None:
+    """Read a file from the standard input, and write its content, or what is wrong with it, to the standard output."""
+    content = sys.stdin.buffer.read()
+    _limit(len(content))
+    try:
+        groups = content_of(content, with_groups=sys.argv[1:] == ["groups"])
+    except Exception as error:  # a damaged file causes many kinds of errors in HDF5
+        words = " ".join(str(error).split()) or type(error).__name__
+        kind = b"unsafe\n" if isinstance(error, UnsafeError) else b"damaged\n"
+        sys.stdout.buffer.write(kind + words.encode("utf-8", "backslashreplace"))
+    else:
+        sys.stdout.buffer.write(b"content\n")
+        send(groups, sys.stdout.buffer.write)
+    sys.stdout.buffer.flush()
+
+
+if __name__ == "__main__":
+    _main()
