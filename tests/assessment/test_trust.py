@@ -103,3 +103,11 @@ def test_a_posterior_of_contacts_alone_is_refused():
     tree.attrs = {**tree.attrs, "events": 0}
     with pytest.raises(InferenceError, match="events=False"):
         trust(tree)
+
+
+def test_too_few_loaded_samples_are_refused_with_the_reason():
+    tree = posterior().copy()
+    events = tree["events"].to_dataset()
+    tree["events"] = xr.DataTree(events.assign(snap_off_drive_angle=events["first_drive_angle"]))
+    with pytest.raises(InferenceError, match="too few to judge"):
+        trust(tree, replicates=0, assumptions=False)

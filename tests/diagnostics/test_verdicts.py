@@ -7,9 +7,15 @@ import pytest
 import xarray as xr
 
 from helpers.predicted_records import ideal, predicted, taken_for_a_parabola, with_readings
+from tactile_bayes.assessment.trust import trust
+from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.result import to_arviz
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.normal_band import normal_band
 
 
 def changed(tree, group, **values):
@@ -162,3 +168,57 @@ def test_a_zero_that_moved_is_not_told_where_that_is_inferred_or_stated():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.01))
     stated.attrs = stated.attrs | {f"load_cell_{name}": value for name, value in cell.entries().items()}
     assert not [words for words in verdicts(stated) if words.startswith("The zero moved")]
+
+
+def hardly_loaded():
+    """A result whose rod touches the object at no sample."""
+    tree = predicted().copy()
+    events = tree["events"].to_dataset()
+    tree["events"] = xr.DataTree(events.assign(snap_off_drive_angle=events["first_drive_angle"]))
+    return tree
+
+
+def test_a_check_that_was_not_made_is_not_passed():
+    check = check_record(hardly_loaded())
+    assert "too few" in check.attrs["not_checked"]
+    assert not check.attrs["passed"]
+    assert np.isnan(check.overall_p_value)
+    first = verdicts(hardly_loaded())[0]
+    assert "All is well" not in first
+    assert "nan" not in first
+    assert check.attrs["not_checked"] in first
+
+
+def test_too_few_predictions_are_the_reason_given():
+    first = verdicts(predicted(chains=1, draws=20))[0]
+    assert "All is well" not in first
+    assert "20 predictions" in first
+
+
+READERS = {
+    "verdicts": verdicts,
+    "check_record": check_record,
+    "contour_band": lambda tree: contour_band(tree, [0.0]),
+    "normal_band": lambda tree: normal_band(tree, [0.0]),
+    "to_arviz": to_arviz,
+    "trust": lambda tree: trust(tree, replicates=0, assumptions=False),
+}
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("read", READERS.values(), ids=READERS)
+def test_a_draw_that_is_no_number_is_named(read, value):
+    tree = predicted()
+    draws = {name: np.full((4, 250), 0.5) for name in ("a", "q", "x_c")}
+    draws["q"][1, 7] = value
+    with pytest.raises(InferenceError, match=r"1 of 1000 draws of q .* chain 1, draw 7"):
+        read(changed(tree, "posterior", **draws))
+
+
+def test_a_prediction_that_is_no_number_is_named():
+    tree = predicted()
+    predictive = tree["posterior_predictive"].to_dataset().copy(deep=True)
+    predictive["force_x"][0, 3, 5] = np.nan
+    tree["posterior_predictive"] = xr.DataTree(predictive)
+    with pytest.raises(InferenceError, match=r"predicted force_x .* chain 0, draw 3"):
+        verdicts(tree)

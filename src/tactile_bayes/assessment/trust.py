@@ -116,8 +116,9 @@ def trust(
     ParameterError
         If an argument is impossible.
     InferenceError
-        If there is no posterior of a contour with its predictions, or it is one without unloaded samples
-        (``events=False``), or with more than 2000 samples that share a drift process or a bias that is integrated out.
+        If there is no posterior of a contour with its predictions, too few samples are loaded, or it is one without
+        unloaded samples (``events=False``), or with more than 2000 samples that share a drift process or a bias that is
+        integrated out.
     CalibrationError
         If `out` holds replicates of another posterior, or another run uses it.
     TaskError
@@ -158,6 +159,8 @@ def trust(
         band = contour_band(posterior, x, chance)
         found = found.assign({name: band[name] for name in ("lower", "median", "upper")})
         check = check_record(posterior)
+        if check.attrs["not_checked"]:
+            raise InferenceError(f"there is nothing to judge this posterior by: {check.attrs['not_checked']}")
         found["check_p_value"] = check.overall_p_value
         parts = split_prediction(posterior, experiment.model)
         found = found.merge(parts.rename(p_value="part_p_value", sd="part_sd", overall_p_value="split_p_value"))

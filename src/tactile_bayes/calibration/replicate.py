@@ -350,7 +350,8 @@ def _checks(tree: xr.DataTree, simulation: Simulation, experiment: SimulatedExpe
     numbers = {"check_p_value": np.nan, "check_passed": np.nan, "misfit_probability": np.nan, "axial_score": np.nan}
     try:
         check = check_record(tree)
-        numbers |= {"check_p_value": float(check.overall_p_value), "check_passed": float(check.attrs["passed"])}
+        if not check.attrs["not_checked"]:
+            numbers |= {"check_p_value": float(check.overall_p_value), "check_passed": float(check.attrs["passed"])}
     except InferenceError:  # a run that was cut short has too few predictions
         pass
     if experiment.world == Misspecification():  # nothing to detect; this saves a tenth of the time

@@ -17,7 +17,8 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import Experiment, priors_in_words
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.parameters.prior_text import priors_in_words
 from tactile_bayes.inference.parameters.priors import refuse_unknown_priors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import bases_of

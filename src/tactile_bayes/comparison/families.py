@@ -29,7 +29,7 @@ from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, 
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.matched_priors import matched_priors
 from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.parameters.priors import Prior, check_priors
 from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig, rig_prior
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
 from tactile_bayes.load_cell import LoadCell
@@ -143,7 +143,7 @@ def compare_families(
             Largest Pareto k̂ of the importance sampling; above 0.7 its density is unreliable (Vehtari et al. 2024,
             JMLR 25(72)).
         p_value, fits
-            Overall p-value of `check_record`, and True if the check passes.
+            Overall p-value of `check_record`, and True if the check passes; NaN and False where it was not made.
         log_likelihood
             Largest log-likelihood among the starting points of the walkers, which is near the family's maximum.
         sampled
@@ -255,7 +255,7 @@ def checked_families(families: Sequence[str], priors: Mapping[str, Mapping[str, 
     for name, of_family in (priors or {}).items():
         if name not in names:
             raise ParameterError(f"there are priors for {name!r}, which is not among the families {', '.join(names)}")
-        check_mapping(f"priors[{name!r}]", of_family, "give distributions by name of a parameter")
+        check_priors(f"priors[{name!r}]", of_family)
     return names
 
 
@@ -289,10 +289,10 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
     if any(of_family is not None for of_family in predicted):
         variables |= _left_out(predicted)
     result = xr.Dataset(variables, coords={"family": list(tried), "prior_width": list(WIDTHS)}, attrs=asked)
+    result.attrs["none_fits"] = int(np.isfinite(result.p_value.values).any() and not result.fits.any())
     result.attrs |= {
         "verdict": verdict_on(result),
         "most_probable": str(result.family.values[np.argmax(result.probability.values)]) if complete else "",
-        "none_fits": int(not result.fits.any()),
     }
     return result
 

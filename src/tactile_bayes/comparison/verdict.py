@@ -20,8 +20,8 @@ _LIKELY = 0.05
 def verdict_on(result: xr.Dataset) -> str:
     """Return the verdict on a comparison of families, from the result of `compare_families`."""
     names = [str(name) for name in result.family.values]
-    fits = result.fits.values
-    if not fits.any():
+    fits, checked = result.fits.values, np.isfinite(result.p_value.values)
+    if result.attrs["none_fits"]:
         return f"{NONE_FITS} ({', '.join(names)}). Probabilities say which of them is the least wrong. " + what_to_try(
             names, read_json(result.attrs["nuisances"], "nuisances"), friction=result.attrs["friction"]
         )
@@ -34,7 +34,7 @@ def verdict_on(result: xr.Dataset) -> str:
         order = np.argsort(probability)[::-1]
         likely = [i for i in order if probability[i] >= _LIKELY]
         parts.append(", ".join(f"{names[i]} with probability {_share(probability[i])}" for i in likely))
-        if not fits[order[0]]:
+        if checked[order[0]] and not fits[order[0]]:
             parts.append(f"but a record of a {names[order[0]]} would not look like this one")
         elif names[order[0]] == "shape-free":
             parts.append("that is, a smooth contour of none of the other shapes")
@@ -44,6 +44,8 @@ def verdict_on(result: xr.Dataset) -> str:
                 f"which depends on the width of the priors: from {_share(firm.min())} to {_share(firm.max())} with "
                 "half and twice the width"
             )
+    if not checked.any():
+        parts.append("whether the record looks like one of them was not checked: too few samples are loaded")
     poor = [name for name, good in zip(names, (result.converged | ~result.sampled).values, strict=True) if not good]
     if poor:
         parts.append(f"not converged: {', '.join(poor)}")

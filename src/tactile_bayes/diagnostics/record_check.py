@@ -13,7 +13,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import FEWEST_PREDICTIONS
 from tactile_bayes.inference.parameters.discrepancy import PARAMETERS
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
-from tactile_bayes.inference.result import record_of, refuse_no_contour
+from tactile_bayes.inference.result import posterior_draws, record_of, refuse_no_contour, refuse_not_finite
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
@@ -89,10 +89,11 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             Standard deviation of white noise, estimated from second differences of neighbouring residuals, in the
             record's units: the noise if everything smooth is misfit.
         overall_p_value
-            Share of records of which the largest score is at least that of the real one.
+            Share of records of which the largest score is at least that of the real one; NaN if the check was not made.
 
-        Attributes: `passed` (0 or 1), `false_alarm` (the probability in effect), `predictions` (their number), and
-        `suggestion`, a sentence if the check fails because residuals are smooth and larger than the noise, and no
+        Attributes: `passed` (0 or 1; 0 also if the check was not made), `not_checked`, why it was not made (there are
+        too few loaded samples), else empty, `false_alarm` (the probability in effect), `predictions` (their number),
+        and `suggestion`, a sentence if the check fails because residuals are smooth and larger than the noise, and no
         discrepancy is inferred; else empty.
 
     Raises
@@ -161,8 +162,9 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     false_alarm = max(false_alarm, 1.0 / (1.0 + predictions))
     predicted = posterior["posterior_predictive"].to_dataset()
     units = {name: str(predicted[name].attrs.get("units", "1")) for name in channels}
-    passed = not overall <= false_alarm
-    smooth = _smooth(residuals, p_values, false_alarm) if not passed else {}
+    failed = overall <= false_alarm
+    not_checked = "" if failed else _not_checked(residuals, p_values)
+    smooth = _smooth(residuals, p_values, false_alarm) if failed else {}
     described = PARAMETERS[0] in posterior["posterior"].data_vars
     return xr.Dataset(
         {
@@ -174,7 +176,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             **travels,
             "worst_residual": ("channel", means),
             "neighbour_noise": ("channel", [_neighbour_noise(of_channel) for of_channel in residuals.values()]),
-            "overall_p_value": overall,
+            "overall_p_value": np.nan if not_checked else overall,
         },
         coords={
             "discrepancy": list(DISCREPANCIES),
@@ -182,7 +184,8 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             "unit": ("channel", [units[name] for name in channels]),
         },
         attrs={
-            "passed": int(passed),
+            "passed": int(not failed and not not_checked),
+            "not_checked": not_checked,
             "false_alarm": false_alarm,
             "predictions": predictions,
             "suggestion": "" if described else _suggestion(smooth),
@@ -199,6 +202,7 @@ def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
         If the tree is not a result of `infer_contour` with its record and predictions.
     """
     refuse_no_contour(posterior, "posterior_predictive", "observed_data", "constant_data", "sample_stats")
+    posterior_draws(posterior)
     predicted, observed = posterior["posterior_predictive"].to_dataset(), posterior["observed_data"].to_dataset()
     sweep = posterior["constant_data"].to_dataset().sweep.values
     sweeps = tuple(rows_of_sweeps(sweep))
@@ -206,7 +210,9 @@ def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
     log_probability = posterior["sample_stats"].to_dataset().lp
     found = (log_probability.sel(draw=predicted.draw) > float(log_probability.median()) - LOST_BELOW).values.ravel()
     residuals = {}
+    refuse_not_finite("lp, the log-probability,", log_probability)
     for name, values in predicted.items():
+        refuse_not_finite(f"the predicted {name}", values)
         of_draws = values.values.reshape(-1, sweep.size)[found]
         low, centre, high = np.quantile(of_draws, [0.025, 0.5, 0.975], axis=0)
         # At snap-off some draws are loaded and others not: such a sample must not outweigh all others.
@@ -257,6 +263,16 @@ def _discrepancies(residuals: Residuals) -> Floats:
 def _ratio(above: Floats, below: Floats) -> Floats:
     """Return the logarithm of a ratio, whose distribution over records has no long tail."""
     return np.asarray(np.log(np.maximum(above, _TINY)) - np.log(np.maximum(below, _TINY)))
+
+
+def _not_checked(residuals: dict[str, Residuals], p_values: Floats) -> str:
+    """Return why no loaded samples were judged; "" if some were."""
+    of_loaded = [DISCREPANCIES.index(name) for name in ("runs", "neighbours", "loaded")]
+    if np.isfinite(p_values[of_loaded]).any():
+        return ""
+    loaded = max(int(np.count_nonzero(of_channel.loaded)) for of_channel in residuals.values())
+    samples = "sample is" if loaded == 1 else "samples are"
+    return f"{loaded} {samples} loaded, too few to judge: it takes {_FEWEST_SAMPLES} in a sweep"
 
 
 def _smooth(residuals: dict[str, Residuals], p_values: Floats, false_alarm: float) -> dict[str, float]:

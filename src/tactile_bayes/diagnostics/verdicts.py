@@ -75,17 +75,18 @@ def verdicts(
     Returns
     -------
     tuple of str
-        One or more sentences. They report: loads that such a rod cannot have (`check_units_and_signs`); a zero that is
-        off, or that moved; a record unlike the predictions of the posterior (`check_record`); reasons not to rely on
-        the band (`trust`); ensembles that have not converged; noise twice as large as stated, or half; loads of a
-        sample that contradict one another; nuisance parameters that are nearly impossible under their prior; smooth
-        residuals, which a discrepancy can describe. The last, which are no faults, say that the prior sets the gap, and
-        name parameters that the record hardly determines.
+        One or more sentences, of which the first says that all is well only if the record was checked. They report:
+        loads that such a rod cannot have (`check_units_and_signs`); a zero that is off, or that moved; a record unlike
+        the predictions of the posterior (`check_record`); reasons not to rely on the band (`trust`); ensembles that
+        have not converged; noise twice as large as stated, or half; loads of a sample that contradict one another;
+        nuisance parameters that are nearly impossible under their prior; smooth residuals, which a discrepancy can
+        describe; a check that was not made, with the reason. The last, which are no faults, say that the prior sets the
+        gap, and name parameters that the record hardly determines.
 
     Raises
     ------
     InferenceError
-        If the tree is not such a result with its record and predictions.
+        If the tree is not such a result with its record and predictions, or has numbers that are not finite.
 
     Examples
     --------
@@ -101,8 +102,9 @@ def verdicts(
     record = record_of(posterior)
     try:
         check = check_record(posterior)
-    except InferenceError:  # there are too few draws, as the posterior's message says
-        check = None
+        not_checked = str(check.attrs["not_checked"])
+    except InferenceError as error:  # there are too few draws
+        check, not_checked = None, str(error)
     residuals = residuals_of(posterior)  # after the check has released its own: those of a long record are large
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DriftWarning)  # a message reports it
@@ -113,7 +115,7 @@ def verdicts(
         *_off_zero(record, unloaded, residuals),
         *_moved_zero(posterior, record, unloaded),
     ]
-    if check is not None and not check.attrs["passed"]:
+    if check is not None and not check.attrs["passed"] and not not_checked:
         against.append(_not_described(posterior, check))
     if trust is not None and trust.attrs["conclusion"] == _NOT:
         against.append(str(trust.attrs["summary"]))
@@ -125,9 +127,12 @@ def verdicts(
     against += _beyond_message(beyond)
     if check is not None and check.attrs["suggestion"]:
         against.append(check.attrs["suggestion"])
-    if not against:
-        drawn = "particles have lost their places" if is_streamed(posterior.attrs) else "ensembles agree"
-        p_value = math.nan if check is None else float(check.overall_p_value)
+    drawn = "particles have lost their places" if is_streamed(posterior.attrs) else "ensembles agree"
+    if not_checked and posterior.attrs["converged"]:
+        but = "" if against else f"The {drawn}, but this does not say that the result is right. "
+        against.append(f"{but}The record was NOT CHECKED against the predictions of the posterior: {not_checked}.")
+    if check is not None and not against:
+        p_value = float(check.overall_p_value)
         against.append(f"All is well: the {drawn}, and the record agrees with their predictions (p = {p_value:.2g}).")
     doubts = [] if trust is None or trust.attrs["conclusion"] in (_NOT, _HOLDS) else [str(trust.attrs["summary"])]
     return (*against, *doubts, *_prior_dominated(posterior, known=beyond))

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
-import numpy as np
 import xarray as xr
-from scipy.stats import rv_histogram
 
 from tactile_bayes.checks import check_names, check_optional, check_switch
 from tactile_bayes.contours.families import family_named
@@ -22,6 +19,7 @@ from tactile_bayes.inference.gauge import Gauge
 from tactile_bayes.inference.parameters.discrepancy import discrepancy_priors
 from tactile_bayes.inference.parameters.noise import Noise, noise_of
 from tactile_bayes.inference.parameters.nuisances import STANDARD, Nuisances, nuisances_of
+from tactile_bayes.inference.parameters.prior_text import priors_in_words
 from tactile_bayes.inference.parameters.priors import Prior, check_priors, refuse_unknown_priors
 from tactile_bayes.inference.parameters.priors import default_priors as contour_priors
 from tactile_bayes.inference.parameters.rig_prior import RigPrior
@@ -31,7 +29,7 @@ from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
 from tactile_bayes.record.attributes import rod_attributes
 
-__all__ = ["Experiment", "default_priors", "prior_in_words", "priors_in_words", "usual_load_cell"]
+__all__ = ["Experiment", "default_priors", "usual_load_cell"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,20 +188,3 @@ def default_priors(
     ['a', 'q', 'x_c', 'friction', 'moment_noise', 'force_noise']
     """
     return Experiment(measured, family, load_cell, nuisances=nuisances).default_priors
-
-
-def prior_in_words(prior: Prior) -> str:
-    """Return a distribution as text, for an attribute."""
-    distribution = getattr(prior, "dist", None)
-    if distribution is None:
-        return repr(prior)
-    if isinstance(distribution, rv_histogram):
-        counts, edges = distribution._histogram  # type: ignore[attr-defined]
-        return f"histogram of {len(counts)} bins ({zlib.crc32(np.concatenate([counts, edges]).tobytes()):08x})"
-    arguments = [f"{a:g}" for a in prior.args] + [f"{k}={v:g}" for k, v in prior.kwds.items()]  # type: ignore[attr-defined]
-    return f"{distribution.name}({', '.join(arguments)})"
-
-
-def priors_in_words(priors: Mapping[str, Prior]) -> str:
-    """Return distributions by name as text, for an attribute."""
-    return json.dumps({name: prior_in_words(prior) for name, prior in priors.items()})

@@ -38,6 +38,7 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers, spawn
+from tactile_bayes.inference.parameters.priors import check_prior
 from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.mechanics.clamped_rod import base_curvature
 
@@ -335,6 +336,7 @@ def _split_priors(
         if number is not None:
             known[name] = number
         else:
+            check_prior(name, prior)
             unknown[name] = prior
     check_number("compliance", known.get("compliance", 0.0), "it cannot be negative", least=0.0)
     check_positive("noise_sd", known.get("noise_sd", 1.0), "give the scatter of repeated readings, or a prior")

@@ -31,6 +31,8 @@ __all__ = [
     "provenance",
     "read_result",
     "record_of",
+    "refuse_no_contour",
+    "refuse_not_finite",
     "sample_stats",
     "seed_words",
     "to_arviz",
@@ -113,13 +115,33 @@ def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
     Raises
     ------
     InferenceError
-        If the tree has no such group.
+        If the tree has no such group, or a draw of a parameter is not a finite number.
     """
-    if isinstance(result, xr.Dataset):
-        return result
+    draws = result if isinstance(result, xr.Dataset) else _posterior_group(result)
+    for name, values in draws.data_vars.items():
+        if set(values.dims) == {"chain", "draw"} and values.dtype.kind == "f":
+            refuse_not_finite(f"{name} in the posterior", values)
+    return draws
+
+
+def _posterior_group(result: xr.DataTree) -> xr.Dataset:
     if "posterior" not in result.children:
         raise InferenceError(f"this tree has no group 'posterior', only {', '.join(result.children) or 'nothing'}")
     return result["posterior"].to_dataset()
+
+
+def refuse_not_finite(what: str, values: xr.DataArray) -> None:
+    """Refuse draws that are not finite numbers, and name the first of them."""
+    bad = ~np.isfinite(values.values)
+    if bad.any():
+        first = np.argwhere(bad)[0]
+        labels = (
+            values[dim].values[i] if dim in values.coords else i for dim, i in zip(values.dims, first, strict=True)
+        )
+        at = ", ".join(f"{dim} {label}" for dim, label in zip(values.dims, labels, strict=True))
+        raise InferenceError(
+            f"{int(bad.sum())} of {bad.size} draws of {what} are not finite numbers, the first at {at}: infer it again"
+        )
 
 
 def record_of(posterior: xr.DataTree) -> xr.Dataset:
@@ -205,7 +227,7 @@ def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
         raise InferenceError(f"{path}: a result is written as NetCDF, give a name that ends in .nc")
     if not isinstance(result, xr.DataTree):
         raise InferenceError("this is no result: give the tree that infer_contour or infer_contacts has returned")
-    posterior_draws(result)
+    _posterior_group(result)
     write_netcdf(result, path)
 
 
@@ -234,7 +256,7 @@ def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
         raise InferenceError(f"there is no file {path}") from None
     except OSError as error:
         raise InferenceError(f"{path} cannot be opened ({error.strerror}): give the file of a posterior") from error
-    posterior_draws(result)
+    _posterior_group(result)
     return result
 
 
@@ -255,6 +277,8 @@ def to_arviz(posterior: xr.DataTree) -> Any:
     ------
     ParameterError
         If the object is no tree.
+    InferenceError
+        If a draw of the posterior is not a finite number.
 
     Examples
     --------
@@ -265,6 +289,8 @@ def to_arviz(posterior: xr.DataTree) -> Any:
     import warnings
 
     check_kind("posterior", posterior, xr.DataTree, "give a result of infer_contour or infer_contacts")
+    if "posterior" in posterior.children:
+        posterior_draws(posterior)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 warns of its refactoring
         import arviz

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy import stats
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.experiment import Experiment, prior_in_words
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.parameters.prior_text import is_prior_in_words, prior_in_words, prior_of_words
 from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.inference.parameters.rig_prior import RigPrior
 from tactile_bayes.inference.result import contour_draws, record_of
 from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["experiment_of", "joint_of", "points_of", "predicted_points"]
-
-_WORDS = re.compile(r"(\w+)\((.*)\)")
 
 
 def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = None) -> Experiment:
@@ -40,6 +37,7 @@ def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = N
 
     Examples
     --------
+    >>> from scipy import stats
     >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -68,9 +66,9 @@ def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = N
     for name, words in read_json(attrs["priors"], "priors").items():
         if experiment.joint is not None and name in experiment.joint.priors:
             continue
-        if name in given or name not in default or prior_in_words(default[name]) != words:
-            own[name] = given.get(name) or _distribution(name, words)
-            if prior_in_words(own[name]) != words:
+        if name in given or name not in default or not is_prior_in_words(default[name], words):
+            own[name] = given.get(name) or prior_of_words(name, words)
+            if not is_prior_in_words(own[name], words):
                 raise InferenceError(f"the prior of {name} was {words}, not {prior_in_words(own[name])}: give that one")
     return Experiment(
         experiment.record,
@@ -88,7 +86,7 @@ def joint_of(attrs: Mapping[Any, Any]) -> RigPrior | None:
     if "rig_parameters" not in attrs:
         return None
     words = read_json(attrs["priors"], "priors")
-    own = {name: _distribution(name, words[name]) for name in read_json(attrs["rig_parameters"], "rig_parameters")}
+    own = {name: prior_of_words(name, words[name]) for name in read_json(attrs["rig_parameters"], "rig_parameters")}
     return RigPrior.from_entries(attrs, own)
 
 
@@ -103,14 +101,3 @@ def predicted_points(posterior: xr.DataTree, names: tuple[str, ...]) -> Floats:
     predicted = posterior["posterior_predictive"].to_dataset()
     draws = contour_draws(posterior).sel(chain=predicted["chain"], draw=predicted["draw"])
     return np.stack([draws[name].transpose("chain", "draw").values.ravel() for name in names], axis=-1)
-
-
-def _distribution(name: str, words: str) -> Prior:
-    """Return the distribution of a text from `prior_in_words`."""
-    match = _WORDS.fullmatch(words)
-    kind = getattr(stats, match[1], None) if match else None
-    if match is None or not isinstance(kind, stats.rv_continuous):
-        raise InferenceError(f"the prior of {name} was {words}, which text does not determine: give priors=")
-    parts = [part.partition("=") for part in match[2].split(", ")] if match[2] else []
-    positional = [float(value) for value, _, other in parts if not other]
-    return kind(*positional, **{key: float(value) for key, _, value in parts if value})

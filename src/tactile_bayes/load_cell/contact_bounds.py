@@ -5,18 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import betainc, betaln, fdtri, stdtrit
+from scipy.special import betainc, betaln, fdtrc, fdtri, stdtrit
 
 from tactile_bayes.arrays import Flags, Floats
-from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
 
 __all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
 
 FEWEST = 3
 """Least number of samples for an estimate of bias and noise."""
 
+_FIRM = 10.0
+"""Range of a smooth course of the readings, in standard deviations of the noise between neighbours, from which it is
+a load whatever the zero: less may be a drift."""
+
 _CLIP = 3.0
 _DOUBT = 0.05
+_FEWEST_OF_COURSE = 6
 _ROUNDS = 10
 _SHORT = 16
 _TINY = 1e-290
@@ -64,6 +69,9 @@ def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> Conta
     if p_value < false_alarm:  # a few outliers must not cause it
         p_value = max(p_value, _contact(_clipped(readings, floor), floor)[0])
     if not p_value < false_alarm:
+        of_course = _course(readings, floor)
+        if of_course < false_alarm:  # without an unloaded sample the ends are as loaded as the rest
+            return ContactBounds(of_course, True, (-1, -1), (-1, -1), 0, 0)
         parts = readings, readings[: n // 2], readings[n // 2 :]
         doubtful = p_value < _DOUBT or any(_trend(part, _DOUBT / len(parts)) for part in parts)
         return ContactBounds(p_value, False, (-1, -1), (-1, -1), 0 if doubtful else n, 0)
@@ -117,6 +125,27 @@ def _contact(readings: Floats, floor: Floats) -> tuple[float, int, int]:
     # where several have probability zero, the longest is taken.
     pair = np.lexsort((size, -log_p.sum(axis=1)))[-1]
     return float(min(1.0, np.exp(min(log_p.min() + np.log(log_p.size), 0.0)))), int(before[pair]), int(after[pair])
+
+
+def _course(readings: Floats, floor: Floats) -> float:
+    """Upper bound of the p-value of no contact, from a course of the readings that is smooth and large.
+
+    A parabola is fitted to each channel (an F-test, exact in white normal noise); 1 if none spans `_FIRM` deviations.
+    """
+    n, channels = readings.shape
+    if n < _FEWEST_OF_COURSE:
+        return 1.0
+    time = np.linspace(-1.0, 1.0, n)
+    root, _ = np.linalg.qr(np.stack([np.ones(n), time, time**2], axis=1))
+    total = ((readings - readings.mean(axis=0)) ** 2).sum(axis=0)
+    parts = root @ (root.T @ readings)
+    rest = np.maximum(((readings - parts) ** 2).sum(axis=0), np.maximum(floor * n, 1e-14 * total + _TINY))
+    noise = np.array([rough_noise(column) for column in readings.T])
+    firm = np.ptp(parts, axis=0) > _FIRM * np.sqrt(np.maximum(noise**2, floor)) + _TINY
+    if not firm.any():
+        return 1.0
+    p_values = fdtrc(2, n - 3, 0.5 * (n - 3) * np.maximum(total - rest, 0.0) / rest)
+    return float(min(1.0, channels * p_values[firm].min()))
 
 
 def _clipped(readings: Floats, floor: Floats) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from tactile_bayes.record import (
     COLUMNS,
     carried_sweeps,
     frame_of,
+    means_of_positions,
+    positions_of,
     present_channels,
     rows_of_sweeps,
     travels_of,
@@ -112,6 +115,13 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     below 0.1. However, a contact too weak to be detected shifts it: by 4 uncertainties for 100 samples that reach 1 σ,
     between 15 unloaded samples on either side.
 
+    *Stops.* Where the drive stops for several readings at each of 12 or more positions, contact and bias are found from
+    the means of the positions, so that noise that is correlated there, as that of a slow amplifier, is no load. The
+    noise is that of single readings.
+
+    *Cropped sweeps.* A sweep of loaded samples alone has no ends to compare with: its contact is significant where a
+    parabola fits the readings (an F-test) and spans ten standard deviations of the noise between neighbours.
+
     *Limits.* A load that is constant throughout a sweep counts as a bias. The warning reports a zero that moves during
     contact (2 σ in 7 of 10 sweeps, 15 samples on either side); but a change by more than about a sixth of the largest
     load counts as load, and the sweep then seems to have no snap-off. A rod that rings after snap-off counts as loaded
@@ -140,15 +150,23 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     floor = np.maximum(steps**2 / 12.0, rounding**2)
     sweep = record["sweep"].values
     sweeps = rows_of_sweeps(sweep)
-    bounds = [_if_long_enough(contact_bounds(readings[rows], false_alarm, floor), len(rows)) for rows in sweeps]
-    stretches = []
-    for rows, of_sweep in zip(sweeps, bounds, strict=True):
-        stretches += [rows[: of_sweep.before], rows[len(rows) - of_sweep.after :]]
-    stretches = [rows for rows in stretches if rows.size]
+    travels = travels_of(record)
+    bounds, stretches, means = [], [], []
+    for rows in sweeps:
+        positions = _positions(travels[rows])
+        of_sweep = _bounds(readings[rows], positions, false_alarm, floor)
+        bounds.append(of_sweep)
+        for part in (slice(of_sweep.before), slice(len(rows) - of_sweep.after, None)):
+            if rows[part].size:
+                stretches.append(rows[part])
+                means.append(means_of_positions(readings[rows[part]], positions[part]))
     unloaded = np.zeros(sweep.size, dtype=bool)
     for rows in stretches:
         unloaded[rows] = True
-    statistics = _statistics([readings[rows] for rows in stretches], steps, floor, false_alarm)
+    statistics = _statistics(means, steps, floor, false_alarm)
+    if any(len(rows) > len(mean) for rows, mean in zip(stretches, means, strict=True)):
+        of_samples = _statistics([readings[rows] for rows in stretches], steps, floor, false_alarm)
+        statistics |= {name: of_samples[name] for name in ("noise", "noise_uncertainty")}
     moved = np.flatnonzero(statistics["same_bias_p_value"] < false_alarm / len(channels))
     if moved.size:
         names = " and ".join(channels[index] for index in moved)
@@ -200,6 +218,33 @@ def _step(values: Floats) -> float:
     # With two different numbers both must repeat: noise does not repeat itself, but zero load without noise does.
     few = different.size == 2 and min(np.count_nonzero(values == v) for v in different) == 1
     return 0.0 if few or np.any(np.abs(whole - np.round(whole)) > _STEPS) else step
+
+
+def _positions(travel: Floats) -> Index:
+    """Return the position of each sample of a sweep, one each where positions are too few to see contact begin."""
+    positions = positions_of(travel)
+    return positions if positions[-1] + 1 >= _MIN_SAMPLES else np.arange(travel.size, dtype=np.intp)
+
+
+def _bounds(readings: Floats, positions: Index, false_alarm: float, floor: Floats) -> ContactBounds:
+    """Return the bounds of contact of one sweep, from the means of its positions: their noise may be correlated."""
+    means = means_of_positions(readings, positions)
+    bounds = _if_long_enough(contact_bounds(means, false_alarm, floor * len(means) / len(readings)), len(means))
+    if len(means) == len(readings):
+        return bounds
+    firsts = np.searchsorted(positions, np.arange(len(means) + 1))  # the first sample of each position, and the end
+
+    def samples(pair: tuple[int, int]) -> tuple[int, int]:
+        last, first = pair
+        return int(firsts[last + 1]) - 1 if last >= 0 else -1, int(firsts[first]) if first >= 0 else -1
+
+    return replace(
+        bounds,
+        onset=samples(bounds.onset),
+        snap_off=samples(bounds.snap_off),
+        before=int(firsts[bounds.before]),
+        after=len(readings) - int(firsts[len(means) - bounds.after]),
+    )
 
 
 def _if_long_enough(bounds: ContactBounds, samples: int) -> ContactBounds:

@@ -28,8 +28,8 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
-from tactile_bayes.inference.experiment import priors_in_words
 from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.inference.parameters.prior_text import priors_in_words
 from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod

@@ -12,13 +12,13 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_mapping, check_names, check_optional
+from tactile_bayes.checks import check_names, check_optional
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.parameters.priors import Prior, check_priors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import CERTAIN
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -69,7 +69,7 @@ class Plan:
     def __post_init__(self) -> None:
         check_optional("rod", self.rod, Rod)
         check_optional("load_cell", self.load_cell, LoadCell)
-        check_mapping("priors", self.priors, "give distributions by name")
+        check_priors("priors", self.priors)
         object.__setattr__(self, "nuisances", tuple(check_names("nuisances", self.nuisances)))
         deviations = self.cell.standard_deviations
         silent = [name for name in CHANNELS if not 0.0 < deviations[name] < np.inf]

@@ -5,6 +5,7 @@ from tactile_bayes.record.files import read_record, write_record
 from tactile_bayes.record.frame import frame_of, in_frame, turned
 from tactile_bayes.record.growing import GrowingRecord, Growth
 from tactile_bayes.record.identity import record_hash
+from tactile_bayes.record.positions import means_of_positions, positions_of
 from tactile_bayes.record.schema import (
     CHANNELS,
     COLUMNS,
@@ -39,6 +40,8 @@ __all__ = [
     "frame_of",
     "in_frame",
     "make_record",
+    "means_of_positions",
+    "positions_of",
     "present_channels",
     "read_record",
     "record_hash",

@@ -9,6 +9,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.record.parsing import parsed_column
+from tactile_bayes.record.positions import end_of_rest
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source, Table
 
@@ -147,7 +148,9 @@ def _turned_sweeps(stretch: slice, angle: Floats, moved: Flags, source: Source) 
     moves = stretch.start + 1 + np.flatnonzero(moved[stretch][1:])
     for begin, end in pairwise([stretch.start, *moves.tolist(), stretch.stop]):
         turns = turning_points(angle[begin:end], least)
-        starts += [begin, *(begin + turn for turn in _starts(turns))]
+        starts.append(begin)
+        for turn in _starts(turns):
+            starts.append(end_of_rest(angle[:end], starts[-1], begin + turn))
     sweeps = []
     for begin, end in pairwise([*starts, stretch.stop]):
         trend = _trend(angle[begin:end])

@@ -76,7 +76,7 @@ class Findings(ContourFindings):
     @property
     def is_rejected(self) -> bool:
         """True if the record fails its check, so that the contour must not be used."""
-        return self.check is not None and not self.check.attrs["passed"]
+        return self.check is not None and not self.check.attrs["passed"] and not self.check.attrs["not_checked"]
 
 
 def findings_of(

@@ -9,7 +9,8 @@ from typing import Any
 
 import xarray as xr
 
-from tactile_bayes.inference.experiment import default_priors, prior_in_words
+from tactile_bayes.inference.experiment import default_priors
+from tactile_bayes.inference.parameters.prior_text import is_prior_in_words
 from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.tasks.documents import read_json
@@ -93,10 +94,12 @@ def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
         found.append("The run was interrupted: without an interrupt it makes more steps.")
     nuisances = read_json(attrs["nuisances"], "nuisances")
     usual = default_priors(record, attrs["family"], LoadCell.from_record(record), nuisances)
-    words = {name: prior_in_words(prior) for name, prior in usual.items()}
     of_rig = read_json(attrs.get(_RIG, "[]"), _RIG)
-    priors = read_json(attrs["priors"], "priors")
-    own = [name for name, said in priors.items() if words.get(name) != said and name not in of_rig]
+    own = [
+        name
+        for name, words in read_json(attrs["priors"], "priors").items()
+        if name not in of_rig and not (name in usual and is_prior_in_words(usual[name], words))
+    ]
     if of_rig:
         found.append("The rig is read from the file that calibrate-rig wrote, here rig.nc: give its path.")
     if own:

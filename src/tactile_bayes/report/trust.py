@@ -87,6 +87,8 @@ def check_messages(findings: Findings) -> list[str]:
     check = findings.check
     if check is None:
         return ["There are too few draws for a check of the record."]
+    if check.attrs["not_checked"]:
+        return [f"The record was not checked against the predictions: {check.attrs['not_checked']}."]
     outcome = "passes" if check.attrs["passed"] else "FAILS"
     said = [
         f"The record {outcome} the check against {check.attrs['predictions']} records that the posterior predicts: "

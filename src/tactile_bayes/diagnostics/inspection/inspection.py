@@ -42,16 +42,19 @@ class Inspection:
     is_suspect : bool
         True if anything looks wrong.
     sweeps : xr.Dataset
-        Over "sweep": direction, samples, base_x, base_y, drive_angle_from, drive_angle_to and drive_step (the median)
-        [rad]; from `zero_load` contact, p_value, onset_drive_angle and snap_off_drive_angle [rad] (also over "side",
-        NaN where there is none); unloaded, the number of unloaded samples. If the drive carries the base in some sweep,
-        also carried, travel and travel_step (whole way of the base, and its median step, NaN for rotations), and
+        Over "sweep": direction, samples, positions (fewer than samples where the drive stops for several readings),
+        base_x, base_y, drive_angle_from, drive_angle_to and drive_step (the median, between positions) [rad]; from
+        `zero_load` contact, p_value, onset_drive_angle and snap_off_drive_angle [rad] (also over "side", NaN where
+        there is none); unloaded, the number of unloaded samples. If the drive carries the base in some sweep, also
+        carried, travel and travel_step (whole way of the base, and its median step, NaN for rotations), and
         onset_travel and snap_off_travel from `zero_load`; base_x and base_y are then those of the first sample.
     channels : xr.Dataset
         Over "channel", in the units of coordinate "unit", NaN for a missing channel: smallest, largest, bias,
         bias_uncertainty, noise, noise_uncertainty, resolution and same_bias_p_value (see `zero_load`), stated_noise
         (NaN if no noise is stated, or it has no standard deviation), neighbour_correlation of the unloaded samples and
-        its neighbour_score (about standard normal for white noise).
+        its neighbour_score (about standard normal for white noise); where the drive stops, position_noise, the standard
+        deviation of the means of unloaded positions, position_noise_expected if readings are independent, and
+        position_p_value of that.
     samples : xr.Dataset
         Over "sample" (and "channel"): unloaded; outlier, stuck and cut_off of each channel; repeated and uneven_step;
         status in raw Step 2 ("" where a load channel is missing).

@@ -247,10 +247,24 @@ def _far_off(record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None) ->
 def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float) -> list[str]:
     messages = []
     level = -float(ndtri(0.5 * false_alarm / len(CHANNELS)))
+    apart = {
+        str(row.channel.values): f"{row.channel.values} ({quantity(float(row.position_noise), str(row.unit.values))} "
+        f"instead of {quantity(float(row.position_noise_expected), str(row.unit.values))})"
+        for row in _rows(channels)
+        if float(row.position_p_value) < false_alarm / len(CHANNELS)
+    }
+    if apart and not _drifts(cell):
+        messages.append(
+            "The noise is not white: the means of unloaded positions scatter more than single readings explain, in "
+            f"{_and(list(apart.values()))}. Give the mean of each position as one sample, or have infer find a drift "
+            "(--nuisance drift), else bands come out too narrow."
+        )
     like = [
         f"{row.channel.values} ({float(row.neighbour_correlation):+.2f})"
         for row in _rows(channels)
-        if abs(float(row.neighbour_score)) > level and abs(float(row.neighbour_correlation)) > _CORRELATED
+        if abs(float(row.neighbour_score)) > level
+        and abs(float(row.neighbour_correlation)) > _CORRELATED
+        and str(row.channel.values) not in apart
     ]
     if like and not _drifts(cell):
         messages.append(

@@ -10,6 +10,7 @@ from scipy import stats
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.diagnostics.inspection.stretches import centred
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, robust_deviation
+from tactile_bayes.record import means_of_positions, positions_of
 
 __all__ = ["outliers", "repeat_chance", "repeated", "stuck", "uneven_steps"]
 
@@ -27,6 +28,12 @@ _JUMP = 2.0
 
 _WIDER = 0.5
 """Difference of an uneven step from the usual step, over the usual step."""
+
+_MOST_DIGITS = 6
+"""Largest number of significant digits of a written reading that can make noisy ones equal."""
+
+_WHOLE = 1e-6
+"""Tolerated distance of a reading, in units of its last digit, from a whole number."""
 
 _USUAL = 0.2
 """Largest share of uneven steps: with more of them, the drive is meant to move so."""
@@ -92,14 +99,28 @@ def _runs_of_equals(reading: Floats, rows: Index) -> list[Index]:
     return [part for part in parts if part.size > 1]
 
 
-def stuck(reading: Floats, sweeps: list[Index], chance: float, *, false_alarm: float) -> Flags:
+def stuck(reading: Floats, sweeps: list[Index], chance: float, noise: float, *, false_alarm: float) -> Flags:
     """Flag readings, shape (n_samples,), that stay equal for longer than the limited resolution explains."""
     flags = np.zeros(reading.size, dtype=bool)
+    chances = np.clip(_written_steps(reading) / (2.0 * math.sqrt(math.pi) * noise), chance, 1.0)
     for rows in sweeps:
         for run in _runs_of_equals(reading, rows):
-            if run.size >= _SHORTEST and reading.size * chance ** (run.size - 1) < false_alarm:
+            if run.size >= _SHORTEST and reading.size * chances[run[0]] ** (run.size - 1) < false_alarm:
                 flags[run] = True
     return flags
+
+
+def _written_steps(reading: Floats) -> Floats:
+    """Return the unit of each reading's last digit, where all are written with a few significant ones; else 0."""
+    size = np.abs(reading)
+    with np.errstate(divide="ignore"):
+        power = np.where(size > 0.0, np.floor(np.log10(size)), 0.0)
+    for digits in range(2, _MOST_DIGITS + 1):
+        step = 10.0 ** (power - digits + 1)
+        whole = reading / step
+        if np.all(np.abs(whole - np.round(whole)) < _WHOLE):
+            return np.where(size > 0.0, step, 0.0)
+    return np.zeros(reading.size)
 
 
 def repeated(readings: Floats, sweeps: list[Index], chances: Floats, *, false_alarm: float) -> Flags:
@@ -114,14 +135,18 @@ def repeated(readings: Floats, sweeps: list[Index], chances: Floats, *, false_al
 
 
 def uneven_steps(angle: Floats, rows: Index, sense: int) -> Flags:
-    """Flag rows of a sweep, shape (rows,), whose preceding step of the angle [rad] is unusual; none if many are."""
+    """Flag rows of a sweep, shape (rows,), whose preceding step of the angle [rad] is unusual; none if many are.
+
+    Where the drive stops to measure, its steps are those between positions.
+    """
     flags = np.zeros(rows.size, dtype=bool)
-    step = sense * np.diff(angle[rows])
+    positions = positions_of(angle[rows])
+    step = sense * np.diff(means_of_positions(angle[rows], positions))
     if step.size < _FEWEST:
         return flags
     usual = float(np.median(step))
     spread = robust_deviation(step - usual)
     differs = np.abs(step - usual) > max(_WIDER * abs(usual), 6.0 * spread)
     if np.mean(differs) <= _USUAL:
-        flags[1:] = differs
+        flags[np.flatnonzero(np.diff(positions))[differs] + 1] = True
     return flags

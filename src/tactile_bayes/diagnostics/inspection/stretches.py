@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import fdtrc
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.numerics.scatter import robust_deviation
+from tactile_bayes.record import means_of_positions
 
-__all__ = ["Autocorrelation", "autocorrelation", "centred", "unloaded_stretches"]
+__all__ = ["Autocorrelation", "PositionScatter", "autocorrelation", "centred", "position_scatter", "unloaded_stretches"]
 
 _CUT = 4.0
 """Robust standard deviations at which residuals are clipped, so that no single outlier dominates."""
@@ -22,6 +24,17 @@ class Autocorrelation(NamedTuple):
     """Coefficient, corrected for the bias from subtracting means; NaN if there are too few samples."""
     score: float
     """Coefficient in standard errors, about standard normal for white noise."""
+
+
+class PositionScatter(NamedTuple):
+    """Scatter of the means of unloaded positions; NaN where the drive does not stop, or positions are too few."""
+
+    found: float
+    """Standard deviation about the mean of the stretch."""
+    expected: float
+    """The same if only the noise of single readings causes it."""
+    p_value: float
+    """p-value of the hypothesis that it does (analysis of variance)."""
 
 
 def unloaded_stretches(sweeps: list[Index], unloaded: Flags) -> list[Index]:
@@ -61,3 +74,22 @@ def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:
     variance = square / pairs  # a stretch of n has n − 1 degrees of freedom, as many as pairs
     value = (product / variance - expected) / pairs
     return Autocorrelation(float(np.clip(value, -1.0, 1.0)), float(value * np.sqrt(pairs)))
+
+
+def position_scatter(reading: Floats, stretches: list[Index], positions: list[Index]) -> PositionScatter:
+    """Return the scatter of positions in all stretches, from readings, shape (samples,), and positions of each."""
+    between, within, square, places, samples, groups = 0.0, 0.0, 0.0, 0, 0, 0
+    for rows, stops in zip(stretches, positions, strict=True):
+        means = means_of_positions(reading[rows], stops)
+        if not 1 < means.size < rows.size:
+            continue
+        within += float(np.sum((reading[rows] - means[stops]) ** 2))
+        between += float(np.sum((means[stops] - reading[rows].mean()) ** 2))
+        square += float(np.sum((means - means.mean()) ** 2))
+        places, samples, groups = places + means.size, samples + rows.size, groups + 1
+    free, free_within = places - groups, samples - places
+    if free < 1 or free_within < 1 or within <= 0.0:
+        return PositionScatter(np.nan, np.nan, np.nan)
+    variance = within / free_within
+    p_value = float(fdtrc(free, free_within, between / free / variance))
+    return PositionScatter(float(np.sqrt(square / free)), float(np.sqrt(variance * places / samples)), p_value)

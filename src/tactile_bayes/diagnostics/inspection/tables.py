@@ -5,11 +5,18 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.arrays import Index
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, repeated, stuck, uneven_steps
-from tactile_bayes.diagnostics.inspection.stretches import autocorrelation
+from tactile_bayes.diagnostics.inspection.stretches import autocorrelation, position_scatter
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels, travels_of
+from tactile_bayes.record import (
+    CHANNELS,
+    carried_sweeps,
+    means_of_positions,
+    positions_of,
+    present_channels,
+    travels_of,
+)
 
 __all__ = ["channel_table", "sample_table", "sweep_table"]
 
@@ -43,7 +50,7 @@ def sample_table(
         chances.append(chance)
         readings.append(reading)
         flags["outlier"][:, index] = outliers(reading, sweeps, stretches, step, false_alarm=level)
-        equal = stuck(reading, sweeps, chance, false_alarm=level)
+        equal = stuck(reading, sweeps, chance, noise, false_alarm=level)
         at_end = equal & ~unloaded & ((reading == reading.max()) | (reading == reading.min()))
         flags["cut_off"][:, index] = at_end
         flags["stuck"][:, index] = equal & ~at_end
@@ -81,19 +88,23 @@ def sample_table(
 def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Index], stated: LoadCell | None) -> xr.Dataset:
     """Return `Inspection.channels`; `found` is the result of `zero_load`."""
     columns = {name: np.full(len(CHANNELS), np.nan) for name in ("smallest", "largest", "stated_noise", "stated_bias")}
-    likeness = np.full((2, len(CHANNELS)), np.nan)
+    likeness, apart = np.full((2, len(CHANNELS)), np.nan), np.full((3, len(CHANNELS)), np.nan)
+    travels = travels_of(record)
+    positions = [positions_of(travels[rows]) for rows in stretches]
     for index, name in enumerate(CHANNELS):
         if name not in present_channels(record):
             continue
         reading = record[name].values
         columns["smallest"][index], columns["largest"][index] = reading.min(), reading.max()
         likeness[:, index] = autocorrelation(reading, stretches)
+        apart[:, index] = position_scatter(reading, stretches, positions)
         if stated is not None:
             step = stated.resolution[index] / np.sqrt(12.0)
             noise = float(np.hypot(stated.standard_deviations[name], step))
             columns["stated_noise"][index] = noise if 0.0 < noise < np.inf else np.nan
             columns["stated_bias"][index] = stated.bias[index]
     columns["neighbour_correlation"], columns["neighbour_score"] = likeness
+    columns["position_noise"], columns["position_noise_expected"], columns["position_p_value"] = apart
     table = xr.Dataset(
         {name: ("channel", values) for name, values in columns.items()},
         coords={"channel": list(CHANNELS), "unit": ("channel", found["unit"].values)},
@@ -106,13 +117,16 @@ def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> x
     """Return `Inspection.sweeps`; `found` is the result of `zero_load`."""
     angle, unloaded = record["drive_angle"].values, found["unloaded"].values
     first = np.array([rows[0] for rows in sweeps])
-    steps = [float(np.median(np.abs(np.diff(angle[rows])))) if rows.size > 1 else np.nan for rows in sweeps]
+    travels = travels_of(record)
+    positions = [positions_of(travels[rows]) for rows in sweeps]
+    steps = [_usual_step(angle[rows], stops) for rows, stops in zip(sweeps, positions, strict=True)]
     length = {"units": record["base_x"].attrs["units"]}
     of_angle = {"units": "rad"}
     table = xr.Dataset(
         {
             "direction": ("sweep", record["direction"].values[first]),
             "samples": ("sweep", [rows.size for rows in sweeps]),
+            "positions": ("sweep", [int(stops[-1]) + 1 for stops in positions]),
             "base_x": ("sweep", record["base_x"].values[first], length),
             "base_y": ("sweep", record["base_y"].values[first], length),
             "drive_angle_from": ("sweep", angle[first], of_angle),
@@ -125,11 +139,16 @@ def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> x
     names = ["contact", "p_value", "onset_drive_angle", "snap_off_drive_angle"]
     carried = np.isin(table["sweep"].values, carried_sweeps(record))
     if carried.any():
-        travels = travels_of(record)
         whole = [travels[rows[-1]] for rows in sweeps]
-        steps = [float(np.median(np.diff(travels[rows]))) if rows.size > 1 else np.nan for rows in sweeps]
+        steps = [_usual_step(travels[rows], stops) for rows, stops in zip(sweeps, positions, strict=True)]
         table["carried"] = ("sweep", carried)
         table["travel"] = ("sweep", np.where(carried, whole, np.nan), length)
         table["travel_step"] = ("sweep", np.where(carried, steps, np.nan), length)
         names += ["onset_travel", "snap_off_travel"]
     return table.assign({name: found[name].variable for name in names})
+
+
+def _usual_step(along: Floats, positions: Index) -> float:
+    """Return the median step of a sweep between its positions; NaN if there is one alone."""
+    steps = np.abs(np.diff(means_of_positions(along, positions)))
+    return float(np.median(steps)) if steps.size else np.nan

@@ -13,7 +13,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named, sides_of
 from tactile_bayes.contours.family import Family
-from tactile_bayes.inference.parameters.priors import Prior, own_priors
+from tactile_bayes.inference.parameters.priors import Prior, numbers_of, own_priors
 
 __all__ = ["matched_priors", "mean_log_radius", "widened"]
 
@@ -121,5 +121,5 @@ def _is_log_normal(prior: Prior) -> bool:
 
 
 def _log_normal(prior: Prior, width: float, stretch: float = 1.0) -> Prior:
-    known = dict(prior.kwds)  # type: ignore[attr-defined]
-    return stats.lognorm(s=width * known["s"], loc=known.get("loc", 0.0), scale=stretch * known.get("scale", 1.0))
+    known = numbers_of(prior)
+    return stats.lognorm(s=width * known["s"], loc=known["loc"], scale=stretch * known["scale"])

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import stats
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.parameters.priors import Prior, numbers_of
 
 __all__ = ["log_density_of"]
 
@@ -27,10 +27,8 @@ def log_density_of(prior: Prior) -> Callable[[Floats], Floats]:
     closed = _CLOSED.get(type(distribution))
     if distribution is None or closed is None:
         return prior.logpdf
-    names = [*(distribution.shapes.split(", ") if distribution.shapes else []), "loc", "scale"]
-    given = dict(zip(names, prior.args, strict=False)) | prior.kwds  # type: ignore[attr-defined]
-    values = {"loc": 0.0, "scale": 1.0} | given
-    if set(values) != set(names) or any(np.ndim(value) for value in values.values()):
+    values = numbers_of(prior)
+    if any(np.ndim(value) for value in values.values()):
         return prior.logpdf
     return partial(closed, **{name: float(value) for name, value in values.items()})
 

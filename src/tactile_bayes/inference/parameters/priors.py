@@ -8,19 +8,30 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from scipy import stats
 
-from tactile_bayes.checks import check_kind, check_mapping, shown
+from tactile_bayes.checks import as_number, check_kind, check_mapping, shown
 from tactile_bayes.contours.family import Family, FamilyParameter
 from tactile_bayes.errors import ParameterError
 
 __all__ = [
     "MAY_VANISH",
     "Prior",
+    "check_prior",
     "check_priors",
     "default_priors",
+    "numbers_of",
     "own_priors",
     "refuse_unknown_priors",
     "support_of",
 ]
+
+_TRIED = 16
+"""Number of draws with which a prior is tried."""
+
+_NARROWEST = 64.0 * float(np.finfo(float).eps)
+"""Range of draws over their size up to which they count as one number."""
+
+_HELD = 1e-6
+"""Standard deviation of a prior that holds a parameter, over its value."""
 
 MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem")
 """Nuisance parameters that are zero or positive, and may be zero."""
@@ -36,7 +47,7 @@ class Prior(Protocol):
 
 
 def check_priors(name: str, priors: Any) -> None:
-    """Refuse an argument that is no mapping of names to frozen distributions.
+    """Refuse an argument that is no mapping of names to frozen distributions with a density.
 
     Raises
     ------
@@ -47,9 +58,72 @@ def check_priors(name: str, priors: Any) -> None:
     check_kind(name, priors, Mapping, correction)
     check_mapping(name, priors, correction)
     for parameter, prior in priors.items():
-        if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
-            correction = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
-            raise ParameterError(f"the prior of {parameter} is {shown(prior)}: {correction}")
+        check_prior(parameter, prior)
+
+
+def check_prior(parameter: str, prior: Any) -> None:
+    """Refuse a prior that is no frozen distribution, or has no density.
+
+    Raises
+    ------
+    ParameterError
+        If it is none; the message names the parameter.
+    """
+    if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
+        correction = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+        raise ParameterError(f"the prior of {parameter} is {shown(prior)}: {correction}")
+    flaw = _flaw_of(prior)
+    if flaw:
+        kind = getattr(getattr(prior, "dist", None), "name", "")
+        raise ParameterError(f"the prior of {parameter}{f', {kind},' if kind else ''} {flaw}")
+
+
+def _flaw_of(prior: Prior) -> str:
+    """Return what keeps a prior from having a density, and what to do; "" if nothing does."""
+    numbers = numbers_of(prior)
+    for name, value in numbers.items():
+        number = as_number(value)
+        if number is None or np.isnan(number):
+            return f"has the {name} {shown(value)}: give a number"
+    if numbers.get("scale") == 0.0:
+        return _no_width(float(numbers["loc"]))
+    try:
+        with np.errstate(all="ignore"):
+            low, high = support_of(prior)
+            draws = np.asarray(prior.rvs(_TRIED, random_state=np.random.default_rng(0)), dtype=float)
+            density = np.asarray(prior.logpdf(draws), dtype=float)
+    except (TypeError, ValueError) as error:
+        return f"cannot be drawn from ({error}): check its numbers"
+    if draws.shape != (_TRIED,) or density.shape != (_TRIED,):
+        return "does not give one number for each draw: give the distribution of a single number"
+    if not low <= high or not np.isfinite(draws).all() or np.isnan(density).any() or np.isneginf(density).any():
+        return "has no finite draws, or no density there: check its numbers"
+    if not np.ptp(draws) > _NARROWEST * float(np.abs(draws).max()):
+        return _no_width(float(draws[0]))
+    return ""
+
+
+def _no_width(value: float) -> str:
+    narrow = f"scipy.stats.norm({value:.6g}, {_HELD * abs(value) or _HELD:.6g})"
+    return f"has no width, and so no density: to hold the parameter, give a narrow one, like {narrow}"
+
+
+def numbers_of(prior: Prior) -> dict[str, Any]:
+    """Return shapes, loc and scale of a frozen distribution of scipy.stats by name, however they were given.
+
+    {} for an object of another kind.
+
+    Examples
+    --------
+    >>> numbers_of(stats.lognorm(0.5, scale=2.0))
+    {'s': 0.5, 'loc': 0, 'scale': 2.0}
+    """
+    distribution = getattr(prior, "dist", None)
+    if not isinstance(distribution, stats.rv_continuous):
+        return {}
+    shapes, loc, scale = distribution._parse_args(*prior.args, **prior.kwds)  # type: ignore[attr-defined]
+    names = distribution.shapes.split(", ") if distribution.shapes else []
+    return dict(zip((*names, "loc", "scale"), (*shapes, loc, scale), strict=True))
 
 
 def refuse_unknown_priors(priors: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:

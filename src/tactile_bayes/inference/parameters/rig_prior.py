@@ -13,7 +13,7 @@ from scipy import optimize, stats
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.parameters.priors import MAY_VANISH, Prior
+from tactile_bayes.inference.parameters.priors import MAY_VANISH, Prior, numbers_of
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.tasks.documents import read_json
 
@@ -209,11 +209,10 @@ def _truncated(values: Floats) -> Prior:
 
 def _scores_of(prior: Prior, x: Floats) -> Floats:
     """Return the normal scores of values: quantiles of the standard normal with the same probabilities."""
-    known: dict[str, Any] = prior.kwds  # type: ignore[attr-defined]
+    known = numbers_of(prior)
     match prior.dist.name:  # type: ignore[attr-defined]
         case "norm":
-            loc, scale = prior.args  # type: ignore[attr-defined]
-            scores = (x - loc) / scale
+            scores = (x - known["loc"]) / known["scale"]
         case "lognorm":
             with np.errstate(divide="ignore", invalid="ignore"):
                 scores = np.nan_to_num(np.log(x / known["scale"]) / known["s"], nan=-np.inf)

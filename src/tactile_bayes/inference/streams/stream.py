@@ -25,7 +25,7 @@ from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, seed
 from tactile_bayes.inference.ensembles.identity import changes, seed_as_text
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.parameters.priors import Prior, check_priors
 from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig, rig_prior
 from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, WIDER, Particles, effective_number
@@ -129,7 +129,9 @@ class Stream:
         check_whole_number("particles", particles, 100, "give a whole number of at least 100", most=10**7)
         check_function("stop", stop)
         self._x = None if x is None else check_numbers("x", x, "give a list of finite numbers", shape=(None,))
-        self._arguments = (family, load_cell, {} if priors is None else priors, rod, friction, nuisances)
+        given = {} if priors is None else priors
+        check_priors("priors", given)
+        self._arguments = (family, load_cell, given, rod, friction, nuisances)
         self._rig, self._joint = rig, None if rig is None else rig_prior(rig)
         self._seed, self._entropy = seed, seed_sequence(seed)
         self._particles, self._stop = particles, stop
