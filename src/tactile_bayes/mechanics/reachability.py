@@ -35,6 +35,8 @@ class Reachability(IntEnum):
     """A rod that is carried touches the contour already at the beginning of its drive."""
     STICKS = 10
     """Friction would hold the contact of a rod that is carried, or the contact would slide the other way."""
+    FOLDS_OVER = 11
+    """The tip would turn over until the other side of the rod lies along the contour."""
 
     @property
     def message(self) -> str:
@@ -54,6 +56,7 @@ _MESSAGES = {
     Reachability.SLIPS_OFF: "slips off at once",
     Reachability.BEGINS_INSIDE: "touched at the beginning",
     Reachability.STICKS: "held by friction",
+    Reachability.FOLDS_OVER: "folded over at its tip",
 }
 
 

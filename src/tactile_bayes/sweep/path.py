@@ -23,6 +23,10 @@ Direction = Literal["forward", "backward"]
 
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
+_SAME = 1e-9
+"""Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: it is then
+the side to which it is turned less."""
+
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
 """Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
 of the object on one side seems to have passed it on the other."""
@@ -71,13 +75,23 @@ def carried_paths(
         sweep_frame = to_sweep_frame(contour, base, direction, rod)
         found[direction] = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile, lines=lines)
 
+    first = {direction: float(of_side.first_angle[0]) for direction, of_side in found.items()}
+    is_same = abs(first["forward"] - first["backward"]) < _SAME
+
     def rank(direction: Direction) -> tuple[int, float]:
-        reach, first = int(found[direction].reach[0]), float(found[direction].first_angle[0])
-        return (_PLAIN.index(reach) if reach in _PLAIN else 1), first
+        reach = int(found[direction].reach[0])
+        by = _turn_to_tangency(found[direction]) if is_same else first[direction]
+        return (_PLAIN.index(reach) if reach in _PLAIN else 1), by
 
     side = min(_DIRECTIONS, key=rank)
     _refuse(found[side], contour, rod, side, f"in the drive that begins at ({base[0]:g}, {base[1]:g})")
     return found[side], side
+
+
+def _turn_to_tangency(paths: Paths) -> float:
+    """Angle by which the tip is turned from the contour at first contact [rad]; 0 in tangential contact."""
+    _, q, _, is_tip, _, friction_angle = paths.changes[0, 0]
+    return float(q + friction_angle) if is_tip > 0.0 else 0.0
 
 
 def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, sweep: str) -> None:
@@ -138,6 +152,12 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 f"{sweep} the rod's tip slips off the contour as soon as it touches it: it is turned beyond the normal "
                 "of the contour there, so that any load pushes it on; sweep in the other direction, move the pivot, or "
                 "take a rod that is less curved"
+            )
+        case Reachability.FOLDS_OVER:
+            raise ReachError(
+                f"{sweep} the rod's tip folds over: at {_point(paths)} it lies along the contour with the other side of "
+                "the rod, and contact with both sides in one sweep is not modelled; end the drive before, take a rod "
+                "that is stiffer or less curved at its tip, sweep in the other direction, or move the pivot"
             )
         case Reachability.TOUCHES_TWICE:
             raise ContourError(

@@ -79,7 +79,7 @@ from tactile_bayes.mechanics.branches.readings import (
     write_loads,
     write_states,
 )
-from tactile_bayes.mechanics.branches.second_contact import second_contact
+from tactile_bayes.mechanics.branches.second_contact import folded_over, second_contact
 from tactile_bayes.mechanics.branches.series import change_of, copy_rows, tail, value
 from tactile_bayes.mechanics.branches.slip import held
 from tactile_bayes.mechanics.compiler import compiled
@@ -139,6 +139,7 @@ _RESOLVED_LOADS = 1e-10
 _TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_OUT), int(Reachability.GRAZES)
 _TOUCHES_TWICE, _SLIPS_OFF = int(Reachability.TOUCHES_TWICE), int(Reachability.SLIPS_OFF)
 _STICKS, _TOO_CLOSE, _CLEARANCE = int(Reachability.STICKS), int(Reachability.TOO_CLOSE), CLEARANCE
+_FOLDS_OVER = int(Reachability.FOLDS_OVER)
 _NEVER, _FOLD, _CORNER, _THRUST, _RELEASE = (int(kind) for kind in SnapOff)
 
 _ACROSS = 0.5 * math.pi
@@ -363,7 +364,7 @@ def follow_branch(
             at_change = settle(loaded, guess(work, change), limit, _BY_Q, 0.0, SETTLED)
             change = min(max(share_of(leg, at_change), 0.0), 1.0)
         last, behind, twice, stuck, over, at_over = min(change, 1.0), -1.0, math.nan, math.nan, 2.0, begin
-        stop, goes_on = 2.0, math.isfinite(behind_begin.at.p)
+        folded, stop, goes_on = math.nan, 2.0, math.isfinite(behind_begin.at.p)
         if fate == _NEVER:
             stop = first_fall(accuracy, is_first, curves)
             over = end_of_line(scene.line, min(stop, last), accuracy, work)
@@ -409,10 +410,13 @@ def follow_branch(
                     _store(leg, line, course, work, workspace, done)
                     done += 1
                 begin_angle, is_first, behind = until.travel, False, stop
+            folded = folded_over(scene, leg, stop, work)
         if not math.isnan(twice):
             return _nothing(_TOUCHES_TWICE, near.distance, twice)
         if not math.isnan(stuck):
             return _nothing(_STICKS, near.distance, stuck)
+        if not math.isnan(folded):
+            return _nothing(_FOLDS_OVER, near.distance, folded)
         if fate == _RELEASE:
             break
         onward = 2.0

@@ -1,4 +1,5 @@
-"""A second contact: a rod that is curved toward the object may touch it at two points."""
+"""A second contact: a rod that is curved toward the object may touch it at two points, and a tip that folds over with the
+other side of the rod."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.poses.beam import free_end, from_tip, loaded_part, rest_curvature
 from tactile_bayes.mechanics.poses.forward_table import PARTS
 
-__all__ = ["second_contact"]
+__all__ = ["folded_over", "second_contact"]
 
 _SHORT_END = 1e-3
 """Length of a free end [L] up to which its curvature at the contact tells whether it is in the object."""
@@ -38,6 +39,22 @@ def second_contact(scene: Scene, seen: Outline, leg: Leg, goes_on: bool, stop: f
             return p
     at = guess(work, stop)
     return at.p if _touches_twice(scene, leg.tip, at, True, low, high) else math.nan
+
+
+@inlined
+def folded_over(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> float:
+    """Contact up to a position on a leg at which the tip lies along the contour with the other side of the rod; NaN
+    without one. Beyond it, the rod beside its tip would be in the object."""
+    if not leg.tip:
+        return math.nan
+    most = math.pi - scene.rig.friction_angle - scene.outline.half_angle
+    for k in range(work.nodes.size):
+        if work.nodes[k] > stop:
+            break
+        if work.at_nodes[REST, k] > most:
+            return work.at_nodes[PLACE, k]
+    at = guess(work, stop)
+    return at.p if at.q > most else math.nan
 
 
 @inlined
