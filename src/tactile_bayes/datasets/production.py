@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.datasets.card import CARD, card
 from tactile_bayes.datasets.manifest import MANIFEST, Manifest, read_manifest, versions_here, write_manifest
 from tactile_bayes.datasets.shard import Written, shard_file, write_shard
@@ -102,7 +103,8 @@ def generate(
     ['README.md', 'manifest.json', 'shard-000000.nc']
     """
     spec = spec if isinstance(spec, Specification) else read_specification(spec)
-    folder = Path(out).resolve()
+    check_function("progress", progress)
+    folder = check_path("out", out, "give the path of a folder").resolve()
     with alone_in(folder, SpecificationError):
         manifest = _begun(spec, folder)
         done = {shard.file for shard in manifest.shards}

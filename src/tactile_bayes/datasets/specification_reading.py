@@ -8,12 +8,19 @@ import tomllib
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from tactile_bayes.checks import as_number, check_choice, check_kind, check_number, check_whole_number, refused
+from tactile_bayes.checks import (
+    as_number,
+    check_choice,
+    check_kind,
+    check_number,
+    check_path,
+    check_whole_number,
+    refused,
+)
 from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
 from tactile_bayes.contours.family import Family
 from tactile_bayes.datasets.distributions import Distribution, distribution_of
@@ -80,9 +87,10 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
     if isinstance(source, Mapping):
         text, where = toml_of(source), "specification"
     else:
-        where = str(source)
+        path = check_path("the specification", source, "give a file, like 'study.toml', or its content as a mapping")
+        where = str(path)
         try:
-            text = Path(source).read_text(encoding="utf-8")
+            text = path.read_text(encoding="utf-8")
         except UnicodeDecodeError as error:
             raise SpecificationError(f"{where}: not a text in UTF-8: {error.reason} at byte {error.start}") from error
     try:

@@ -12,6 +12,7 @@ import xarray as xr
 from scipy import stats
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_mapping
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.experiment import Experiment, prior_in_words
 from tactile_bayes.inference.parameters.priors import Prior
@@ -50,6 +51,7 @@ def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = N
     'uniform(0.4, 0.2)'
     """
     contour_draws(posterior)
+    check_mapping("priors", priors, "give the argument of infer_contour, or None")
     attrs: dict[Any, Any] = posterior.attrs
     lacking = {"priors", "nuisances", "friction"} - set(attrs)
     if lacking:

@@ -13,6 +13,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.report.findings import FINDING_STEPS, findings_of
 from tactile_bayes.report.page import page_of
 from tactile_bayes.tasks import write_atomically
@@ -58,11 +59,14 @@ def write_report(
     OSError
         If the page cannot be written.
     """
-    folder = Path(run)
-    path = folder / "report.html" if out is None else Path(out)
+    folder = check_path("run", run, "give the folder of a run")
+    path = folder / "report.html" if out is None else check_path("out", out, "give a path, like 'report.html', or None")
+    check_function("progress", progress)
     report = progress or (lambda done, count: None)
     findings = findings_of(
-        folder, None if compare is None else Path(compare), lambda done: report(done, FINDING_STEPS + 1)
+        folder,
+        None if compare is None else check_path("compare", compare),
+        lambda done: report(done, FINDING_STEPS + 1),
     )
     text = _rendered(page_of(findings, folder.resolve().name))
     with write_atomically(path) as temporary:
