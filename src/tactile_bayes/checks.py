@@ -7,6 +7,7 @@ import os
 from collections.abc import Collection, Mapping, Sequence, Set
 from numbers import Real
 from pathlib import Path
+from types import UnionType
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ __all__ = [
     "TINY",
     "as_number",
     "as_numbers",
+    "check_array",
+    "check_arrays",
     "check_choice",
     "check_function",
     "check_kind",
@@ -102,6 +105,43 @@ def as_numbers(values: Any) -> Floats | None:
     except (TypeError, ValueError):
         return None
     return array.astype(float)
+
+
+def check_array(name: str, values: Any, correction: str = "give a number, or an array of numbers") -> Floats:
+    """Return real numbers, which need not be finite, as an array of their shape.
+
+    Examples
+    --------
+    >>> check_array("x", [1, math.nan])
+    array([ 1., nan])
+    """
+    if (
+        isinstance(values, np.ndarray) and values.dtype == np.float64
+    ):  # a short cut, since contours are located in loops
+        return values
+    numbers = as_numbers(values)
+    if numbers is None:
+        raise refused(name, values, correction)
+    return numbers
+
+
+def check_arrays(**values: Any) -> list[Floats]:
+    """Return arrays of numbers whose shapes broadcast; None stays None.
+
+    Examples
+    --------
+    >>> check_arrays(x=[1.0, 2.0], y=[1.0, 2.0, 3.0])
+    Traceback (most recent call last):
+    ...
+    tactile_bayes.errors.ParameterError: x of shape (2,), y of shape (3,) do not broadcast: give numbers, or ...
+    """
+    arrays = {name: check_array(name, given) for name, given in values.items()}
+    try:
+        np.broadcast_shapes(*(array.shape for array in arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} of shape {array.shape}" for name, array in arrays.items() if array.shape)
+        raise ParameterError(f"{shapes} do not broadcast: give numbers, or arrays of shapes that broadcast") from None
+    return list(arrays.values())
 
 
 def check_number(
@@ -217,7 +257,7 @@ def check_choice(name: str, value: Any, choices: Collection[str], correction: st
     raise refused(name, value, correction or f"choose {', '.join(others)} or {last}")
 
 
-def check_kind(name: str, value: Any, kind: type, correction: str) -> None:
+def check_kind(name: str, value: Any, kind: type | UnionType, correction: str) -> None:
     """Refuse a value that is not an instance of a class."""
     if not isinstance(value, kind):
         raise refused(name, value, correction)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -18,14 +17,22 @@ from tactile_bayes.assessment.prior_sensitivity import prior_sensitivity
 from tactile_bayes.assessment.sampling_error import sampling_error
 from tactile_bayes.assessment.split_prediction import split_prediction
 from tactile_bayes.assessment.wording import conclusion, sentences
-from tactile_bayes.checks import check_function, check_probability, check_seed, check_switch, check_whole_number
+from tactile_bayes.checks import (
+    check_function,
+    check_path,
+    check_probability,
+    check_seed,
+    check_switch,
+    check_whole_number,
+)
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import check_record
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.inference.result import contour_draws, read_result
 from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.tasks import TaskProgress
+from tactile_bayes.tasks.workers import check_pool
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.summary import gap_if_any, reach
 
@@ -147,6 +154,9 @@ def trust(
     check_switch("assumptions", assumptions)
     seed = check_seed(seed)
     check_function("progress", progress)
+    check_pool(workers, scheduler)
+    if out is not None:
+        check_path("out", out, "give the path of a folder, or None")
     posterior = _posterior_of(run_or_posterior)
     stated = posterior.attrs.get("probability", _USUAL) if probability is None else probability
     chance = check_probability("probability", stated)
@@ -228,9 +238,7 @@ def draws_digest(posterior: xr.DataTree) -> str:
 def _posterior_of(given: str | os.PathLike[str] | xr.DataTree) -> xr.DataTree:
     if isinstance(given, xr.DataTree):
         return given
-    if not isinstance(given, str | os.PathLike):
-        raise ParameterError(f"this is {type(given).__name__}: give the folder of a run, or a result of infer_contour")
-    path = Path(given)
+    path = check_path("run_or_posterior", given, "give the folder of a run, or a result of infer_contour")
     return read_result(path / "posterior.nc" if path.is_dir() else path)
 
 

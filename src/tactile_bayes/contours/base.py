@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.checks import as_numbers, shown
+from tactile_bayes.checks import as_numbers, check_array, refused, shown
 from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
 from tactile_bayes.numerics.roots import bound_ends, falling_root
@@ -24,6 +24,7 @@ __all__ = [
     "Vertexed",
     "alike",
     "as_parameter",
+    "check_single",
     "common_shape",
     "finite",
     "refuse_unless",
@@ -99,6 +100,17 @@ class Contour(ABC):
     def domain(self) -> tuple[Floats, Floats]:
         """Least and greatest parameter; the contour ends at a finite one, and is endless at an infinite one."""
 
+    def _at(self, name: str, values: ArrayLike) -> Floats:
+        """Return the argument of a method as an array, or refuse one that does not broadcast with the parameters."""
+        numbers = check_array(name, values)
+        if numbers.ndim and (shape := self.shape):
+            try:
+                np.broadcast_shapes(numbers.shape, shape)
+            except ValueError:
+                wanted = f"give a number, or numbers of a shape that broadcasts with that of the contours, {shape}"
+                raise refused(name, values, wanted) from None
+        return numbers
+
     def end_name(self, side: Literal["left", "right"]) -> str:
         """Description of the end on one side, for messages."""
         return "where it ends"
@@ -116,7 +128,8 @@ class Contour(ABC):
         ndarray
             Of the broadcast shape; NaN where the contour has no such slope.
         """
-        return self._parameter_where(slope_angle, lambda locus: (locus.slope_angle, locus.slope_rate))
+        wanted = self._at("slope_angle", slope_angle)
+        return self._parameter_where(wanted, lambda locus: (locus.slope_angle, locus.slope_rate))
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         """Contour's own parameter at a position.
@@ -131,7 +144,8 @@ class Contour(ABC):
         ndarray
             Of the broadcast shape; NaN beyond the ends.
         """
-        return self._parameter_where(x, lambda locus: (locus.x, locus.arclength_rate * np.cos(locus.slope_angle)))
+        wanted = self._at("x", x)
+        return self._parameter_where(wanted, lambda locus: (locus.x, locus.arclength_rate * np.cos(locus.slope_angle)))
 
     def height(self, x: ArrayLike) -> Floats:
         """Height of the contour at x.
@@ -168,11 +182,20 @@ class Contour(ABC):
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Self:
         """Contours with every parameter broadcast to one shape, as `take` requires."""
-        return self._each(lambda value: np.broadcast_to(value, (*shape, *np.shape(value)[len(self.shape) :])))
+        try:
+            return self._each(lambda value: np.broadcast_to(value, (*shape, *np.shape(value)[len(self.shape) :])))
+        except (TypeError, ValueError):
+            raise refused(
+                "shape", shape, f"give a shape to which that of the contours, {self.shape}, broadcasts"
+            ) from None
 
     def take(self, index: Index | tuple[Index, ...]) -> Self:
         """Contours at `index`, of a contour whose parameters are all arrays of one shape."""
-        return self._each(lambda value: value[index])
+        try:
+            return self._each(lambda value: value[index])
+        except (IndexError, TypeError, ValueError):
+            wanted = f"give an index of the contours, whose shape is {self.shape}, after broadcast_to"
+            raise refused("index", index, wanted) from None
 
     def _each(self, change: Callable[[Any], Floats]) -> Self:
         """Contours with a change applied to every array that has an entry for each."""
@@ -213,10 +236,10 @@ class Contour(ABC):
         with np.errstate(divide="ignore"):
             return locus.arclength_rate / locus.slope_rate
 
-    def _parameter_where(self, wanted: ArrayLike, measure: Callable[[Locus], tuple[Floats, Floats]]) -> Floats:
+    def _parameter_where(self, wanted: Floats, measure: Callable[[Locus], tuple[Floats, Floats]]) -> Floats:
         """Parameters at which an increasing function of the parameter, given with its rate, has a value; else NaN."""
         shape = np.broadcast_shapes(self.shape, np.shape(wanted))
-        goal = np.broadcast_to(np.asarray(wanted, dtype=float), shape).ravel()
+        goal = np.broadcast_to(wanted, shape).ravel()
         many, place = self.broadcast_to(shape or (1,)), np.unravel_index(np.arange(goal.size), shape or (1,))
 
         def short_of(i: Index, parameter: Floats) -> tuple[Floats, Floats]:
@@ -269,6 +292,12 @@ class Single(Contour):
         return self
 
 
+def check_single(name: str, value: Any, correction: str = "give one contour, such as Parabola(0.5, 0.3)") -> None:
+    """Refuse an argument that is not a single contour."""
+    if not isinstance(value, Contour) or value.shape != ():
+        raise refused(name, value, correction)
+
+
 class Graph(Contour):
     """A contour given as the graph y = g(x), with the parameter x.
 
@@ -313,12 +342,12 @@ class Graph(Contour):
         return np.asarray(-np.inf), np.asarray(np.inf)
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        x, (lo, hi) = np.asarray(x, dtype=float), self.domain
+        x, (lo, hi) = self._at("x", x), self.domain
         with np.errstate(invalid="ignore"):
             return np.where((x >= lo) & (x <= hi), x, np.nan)
 
     def locate(self, parameter: ArrayLike) -> Locus:
-        x = np.asarray(parameter, dtype=float)
+        x = self._at("parameter", parameter)
         x, g, slope, bend = np.broadcast_arrays(x, *self.derivatives(x))
         steepness = 1.0 + slope * slope
         return Locus(x, g, np.arctan(slope), np.sqrt(steepness), bend / steepness)

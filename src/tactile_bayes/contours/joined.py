@@ -118,7 +118,7 @@ class Joined(Contour):
         return (*(np.minimum(k, 0.0) for k in inner[0]), np.zeros(()), edge, *(np.maximum(k, edge) for k in inner[1]))
 
     def locate(self, parameter: ArrayLike) -> Locus:
-        p = np.asarray(parameter, dtype=float)
+        p = self._at("parameter", parameter)
         before, after, edge = self._joint
         left = self.left.locate(np.minimum(p, 0.0) + before)
         right = self.right.locate(np.maximum(p - edge, 0.0) + after)
@@ -135,20 +135,20 @@ class Joined(Contour):
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         before, after, edge = self._joint
         last = self.left.locate(before).slope_angle
-        past = np.asarray(slope_angle, dtype=float) - last
+        past = self._at("slope_angle", slope_angle) - last
         left = self.left.parameter_of_slope(last + np.minimum(past, 0.0)) - before
         right = self.right.parameter_of_slope(self.right.locate(after).slope_angle + np.maximum(past - edge, 0.0))
         return np.where(past < 0.0, left, np.where(past < edge, past, right - after + edge))
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         before, after, edge = self._joint
-        x, joint = np.asarray(x, dtype=float), self.right.locate(after).x
+        x, joint = self._at("x", x), self.right.locate(after).x
         left = self.left.parameter_of_x(np.minimum(x, joint)) - before
         right = self.right.parameter_of_x(np.maximum(x, joint)) - after + edge
         return np.where(x < joint, left, right)
 
     def height(self, x: ArrayLike) -> Floats:
-        x = np.asarray(x, dtype=float)
+        x = self._at("x", x)
         return np.where(x < self.right.locate(self._joint[1]).x, self.left.height(x), self.right.height(x))
 
     @property

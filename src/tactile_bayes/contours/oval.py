@@ -39,10 +39,10 @@ class _Oval(Vertexed):
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         with np.errstate(invalid="ignore"):
-            return np.asarray(np.arcsin((np.asarray(x, dtype=float) - self.x_c) / self.half_axes[0]))
+            return np.asarray(np.arcsin((self._at("x", x) - self.x_c) / self.half_axes[0]))
 
     def height(self, x: ArrayLike) -> Floats:
-        offset = np.asarray(x, dtype=float) - self.x_c
+        offset = self._at("x", x) - self.x_c
         a, b = self.half_axes
         with np.errstate(invalid="ignore"):
             sunk = offset**2 / (a + np.sqrt((a - offset) * (a + offset)))
@@ -85,13 +85,13 @@ class Circle(_Oval):
         return self.r, self.r
 
     def locate(self, parameter: ArrayLike) -> Locus:
-        alpha = np.asarray(parameter, dtype=float)
+        alpha = self._at("parameter", parameter)
         x, y = self.x_c + self.r * np.sin(alpha), self.q + 2.0 * self.r * np.sin(0.5 * alpha) ** 2
         x, y, alpha, radius = alike(x, y, alpha, self.r + 0.0 * alpha)
         return Locus(x, y, alpha, radius, np.ones_like(alpha))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = np.asarray(slope_angle, dtype=float)
+        alpha = self._at("slope_angle", slope_angle)
         return np.where(np.abs(alpha) <= 0.5 * np.pi, alpha, np.nan)
 
 
@@ -134,7 +134,7 @@ class Ellipse(_Oval):
         return self.a, self.b
 
     def locate(self, parameter: ArrayLike) -> Locus:
-        t = np.asarray(parameter, dtype=float)  # the eccentric angle from the lowest point
+        t = self._at("parameter", parameter)  # the eccentric angle from the lowest point
         a, b = self.a, self.b
         sin, cos = np.sin(t), np.cos(t)
         speed2 = (a * cos) ** 2 + (b * sin) ** 2
@@ -148,6 +148,6 @@ class Ellipse(_Oval):
         return Locus(x, y, slope, speed, bend)
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = np.asarray(slope_angle, dtype=float)
+        alpha = self._at("slope_angle", slope_angle)
         t = np.arctan2(self.a * np.sin(alpha), self.b * np.cos(alpha))
         return np.where(np.abs(alpha) <= 0.5 * np.pi, t, np.nan)

@@ -49,6 +49,6 @@ def paper_profile(name: Literal["I", "II", "III", "IV"], q: float) -> Contour:
         "III": Circle(1.0, q),
         "IV": Joined(Parabola(0.5, q), PowerLaw(1.0, 4.0, q)),
     }
-    if name not in profiles:
+    if not isinstance(name, str) or name not in profiles:
         raise ContourError(f"there is no profile {name!r}: choose 'I', 'II', 'III' or 'IV'")
     return profiles[name]

@@ -59,18 +59,18 @@ class Parabola(Vertexed):
         return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q))
 
     def locate(self, parameter: ArrayLike) -> Locus:
-        alpha = np.asarray(parameter, dtype=float)
+        alpha = self._at("parameter", parameter)
         t = np.tan(alpha)
         offset, square = t / (2.0 * self.a), 1.0 + t * t
         x, y, radius = self.x_c + offset, self.q + 0.5 * t * offset, square * np.sqrt(square) / (2.0 * self.a)
         return Locus(*alike(x, y, alpha, radius, np.ones(alpha.shape)))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = np.asarray(slope_angle, dtype=float)
+        alpha = self._at("slope_angle", slope_angle)
         return np.where(np.abs(alpha) < 0.5 * np.pi, alpha, np.nan)
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        return np.asarray(np.arctan(2.0 * self.a * (np.asarray(x, dtype=float) - self.x_c)))
+        return np.asarray(np.arctan(2.0 * self.a * (self._at("x", x) - self.x_c)))
 
     def height(self, x: ArrayLike) -> Floats:
-        return np.asarray(self.a * (np.asarray(x, dtype=float) - self.x_c) ** 2 + self.q)
+        return np.asarray(self.a * (self._at("x", x) - self.x_c) ** 2 + self.q)

@@ -14,7 +14,8 @@ from scipy.optimize import minimize_scalar, nnls
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.contours.base import Graph, Parameter, Single
+from tactile_bayes.checks import check_kind, check_numbers
+from tactile_bayes.contours.base import Graph, Parameter, Single, as_parameter
 from tactile_bayes.contours.bends import STRAIGHT, Bends, refuse_two_bands, refuse_unless_convex
 from tactile_bayes.errors import ContourError
 
@@ -54,6 +55,9 @@ class MeasuredContour(Graph, Single):
     graph: PPoly
 
     def __post_init__(self) -> None:
+        check_kind("graph", self.graph, PPoly, "give a PPoly of SciPy, or take from_points")
+        for name in ("x", "y", "scatter", "residual_rms"):
+            check_numbers(name, getattr(self, name))
         self.__dict__["_derivatives"] = self.graph, self.graph.derivative(), self.graph.derivative(2)
 
     @property
@@ -247,7 +251,7 @@ def _checked(x: ArrayLike, y: ArrayLike, scatter: ArrayLike | None) -> tuple[Flo
     columns = {"x": x, "y": y} if scatter is None else {"x": x, "y": y, "scatter": scatter}
     checked: dict[str, Floats] = {}
     for name, given in columns.items():
-        values = np.array(given, dtype=float)
+        values = np.asarray(as_parameter("from_points", name, given))
         values.flags.writeable = False
         if values.ndim != 1 and not (name == "scatter" and values.ndim == 0):
             raise ContourError(f"from_points: {name} has shape {values.shape}: it must be a list of numbers")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.contours.base import Locus, Parameter, Vertexed, alike, refuse_unless
+from tactile_bayes.contours.base import Locus, Parameter, Vertexed, alike, as_parameter, common_shape, refuse_unless
 from tactile_bayes.contours.halves import POWER_LAW, Half, Halves
 
 __all__ = ["PowerLaw"]
@@ -94,7 +94,8 @@ class PowerLaw(Vertexed):
         >>> PowerLaw.of_width(0.5, 3, q=0.3)
         PowerLaw(a=4.0, n=3.0, q=0.3, x_c=0.0)
         """
-        w = np.asarray(w, dtype=float)[()]
+        w, n = as_parameter("PowerLaw", "w", w), as_parameter("PowerLaw", "n", n)
+        common_shape("PowerLaw", w=np.shape(w), n=np.shape(n))
         refuse_unless(np.greater(w, 0.0) & np.isfinite(w), "PowerLaw", "w must be positive and finite", w=w)
         with np.errstate(over="ignore", divide="ignore"):  # where it is narrow, or wide, and n is large
             a = np.clip(w ** (1.0 - n), 1.0 / _STEEPEST, _STEEPEST)
@@ -124,7 +125,7 @@ class PowerLaw(Vertexed):
         return of_offset, of_slope, of_offset + of_slope
 
     def locate(self, parameter: ArrayLike) -> Locus:
-        p, a, n = np.asarray(parameter, dtype=float), self.a, self.n
+        p, a, n = self._at("parameter", parameter), self.a, self.n
         of_offset, of_slope, of_height = self._powers()
         size = np.abs(p)
         flat = size ** (of_offset - 1.0)
@@ -141,13 +142,13 @@ class PowerLaw(Vertexed):
         return Locus(x, y, alpha, speed, bend)
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = np.asarray(slope_angle, dtype=float)
+        alpha = self._at("slope_angle", slope_angle)
         slope = np.where(np.abs(alpha) < 0.5 * np.pi, np.tan(alpha), np.nan)
         return np.asarray(np.copysign((np.abs(slope) / (self.a * self.n)) ** (1.0 / self._powers()[1]), slope))
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        offset = np.asarray(x, dtype=float) - self.x_c
+        offset = self._at("x", x) - self.x_c
         return np.asarray(np.copysign(np.abs(offset) ** (1.0 / self._powers()[0]), offset))
 
     def height(self, x: ArrayLike) -> Floats:
-        return np.asarray(self.q + self.a * np.abs(np.asarray(x, dtype=float) - self.x_c) ** self.n)
+        return np.asarray(self.q + self.a * np.abs(self._at("x", x) - self.x_c) ** self.n)

@@ -123,12 +123,12 @@ class ShapeFree(Tabled):
         return "the last slope angle for which a radius is given"
 
     def locate(self, parameter: ArrayLike) -> Locus:
-        alpha = np.asarray(parameter, dtype=float)
+        alpha = self._at("parameter", parameter)
         log_radius, x, y = self._evaluate(alpha)
         alpha = np.broadcast_to(alpha, x.shape)
         return Locus(x, y, alpha, np.exp(log_radius), np.ones_like(alpha))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = np.asarray(slope_angle, dtype=float)
+        alpha = self._at("slope_angle", slope_angle)
         with np.errstate(invalid="ignore"):
             return np.where((alpha >= self.slope_angles[0]) & (alpha <= self.slope_angles[-1]), alpha, np.nan)

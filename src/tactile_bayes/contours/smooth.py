@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours.base import Locus, Parameter
 from tactile_bayes.contours.halves import SLOPES, Half, Halves
 from tactile_bayes.contours.tabled import Tabled
@@ -22,6 +23,9 @@ __all__ = ["Smooth"]
 _UPRIGHT = 0.5 * np.pi
 _LARGEST = 100.0
 """Bound on the logarithm of a radius."""
+
+_MOST_NODES = 10_000
+"""Largest number of nodes that is given."""
 
 _CELLS = 128
 """Cells of a contour, on each of which it is a polynomial of fifth degree; even, so that the vertex ends a cell."""
@@ -76,6 +80,7 @@ class Smooth(Tabled):
     @staticmethod
     def nodes(count: int) -> Floats:
         """Slope angles at which radii of curvature are given, increasing in (−π/2, π/2), shape (count,) [rad]."""
+        check_whole_number("count", count, 2, most=_MOST_NODES)
         return 2.0 * _UPRIGHT * (chebyshev.nodes(count) - 0.5)
 
     @property
@@ -92,7 +97,7 @@ class Smooth(Tabled):
         return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), tables=tables)
 
     def locate(self, parameter: ArrayLike) -> Locus:
-        alpha, row = np.broadcast_arrays(np.asarray(parameter, dtype=float), self.__dict__["_row"])
+        alpha, row = np.broadcast_arrays(self._at("parameter", parameter), self.__dict__["_row"])
         way = (alpha + _UPRIGHT) * (_CELLS / (2.0 * _UPRIGHT))
         cell = np.nan_to_num(np.clip(way, 0, _CELLS - 1)).astype(np.intp)
         table = self.__dict__["_table"]
@@ -101,12 +106,13 @@ class Smooth(Tabled):
         return Locus(self.x_c + x, self.q + y, alpha, speed, np.ones_like(alpha))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = np.asarray(slope_angle, dtype=float)
+        alpha = self._at("slope_angle", slope_angle)
         with np.errstate(invalid="ignore"):
             return np.where(np.abs(alpha) <= _UPRIGHT, alpha, np.nan)
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        shape = np.broadcast_shapes(self.shape, np.shape(x))
+        x = self._at("x", x)
+        shape = np.broadcast_shapes(self.shape, x.shape)
         row = np.broadcast_to(self.__dict__["_row"], shape).ravel()
         goal = (np.broadcast_to(x, shape) - np.broadcast_to(self.x_c, shape)).ravel()
         table = self.__dict__["_table"]

@@ -18,6 +18,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from tactile_bayes.arrays import Index
+from tactile_bayes.checks import check_path
 from tactile_bayes.datasets.manifest import Manifest, read_manifest
 from tactile_bayes.datasets.shard import Written, file_in
 from tactile_bayes.errors import SpecificationError
@@ -54,7 +55,7 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     UserWarning
         If shards are still missing.
     """
-    folder = Path(path)
+    folder = check_path("path", path, "give the folder of a data set")
     manifest = read_manifest(folder)
     if manifest.shards and not manifest.is_complete:
         have = sum(shard.records for shard in manifest.shards)

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.datasets.card import CARD, card
 from tactile_bayes.datasets.manifest import MANIFEST, Manifest, read_manifest, versions_here, write_manifest
 from tactile_bayes.datasets.shard import Written, file_in, shard_file, write_shard
@@ -101,7 +102,8 @@ def generate(
     ...     sorted(path.name for path in manifest.parent.iterdir())
     ['README.md', 'manifest.json', 'shard-000000.nc']
     """
-    folder = Path(out).resolve()
+    check_function("progress", progress)
+    folder = check_path("out", out, "give the path of a folder").resolve()
     if isinstance(spec, str | os.PathLike):
         refuse_replacing([folder / MANIFEST, folder / CARD, *folder.glob("shard-*.nc")], [Path(spec)])
     spec = spec if isinstance(spec, Specification) else read_specification(spec)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_switch
+from tactile_bayes.checks import check_kind, check_path, check_switch
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.datasets.collection import opened
@@ -65,7 +64,10 @@ def record(
     (360, 'parabola', 0.02)
     """
     check_switch("truth", truth)
-    folder = None if isinstance(source, Mapping | Specification) or not Path(source).is_dir() else Path(source)
+    folder = None
+    if not isinstance(source, Mapping | Specification):
+        path = check_path("source", source, "give a specification, its file, or the folder of a data set")
+        folder = path if path.is_dir() else None
     if folder is not None:
         manifest = read_manifest(folder)
         spec = read_text(manifest.specification)
@@ -108,6 +110,7 @@ def contour_of(record: xr.Dataset) -> Contour:
     >>> contour_of(record({"records": 1, "seed": 1, "contours": contours}, 0)).right
     Parabola(a=0.7, q=0.4, x_c=0.0)
     """
+    check_kind("record", record, xr.Dataset, "give a record of a data set")
     family = FAMILIES.get(str(record.attrs.get("truth_family")))
     if family is None:
         raise ParameterError("the record's attributes name no contour: take it from a data set, with truth=True")

@@ -11,7 +11,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from tactile_bayes.checks import as_number, check_choice, check_kind, check_number, check_whole_number, refused
+from tactile_bayes.checks import (
+    as_number,
+    check_choice,
+    check_kind,
+    check_number,
+    check_path,
+    check_whole_number,
+    refused,
+)
 from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
 from tactile_bayes.contours.family import Family
 from tactile_bayes.datasets.distributions import Distribution, distribution_of
@@ -79,9 +87,10 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
     if isinstance(source, Mapping):
         text, where = toml_of(source), "specification"
     else:
-        where = str(source)
+        path = check_path("the specification", source, "give a file, like 'study.toml', or its content as a mapping")
+        where = str(path)
         try:
-            with open(source, encoding="utf-8-sig") as file:
+            with open(path, encoding="utf-8-sig") as file:
                 text = file.read(LARGEST + 1)
         except UnicodeDecodeError as error:
             raise SpecificationError(f"{where}: not a text in UTF-8: {error.reason} at byte {error.start}") from error

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tactile_bayes.checks import check_function, check_path, check_whole_number
 from tactile_bayes.datasets.card import CARD
 from tactile_bayes.datasets.collection import read_shard
 from tactile_bayes.datasets.generation import generate_records
@@ -17,7 +18,7 @@ from tactile_bayes.datasets.manifest import Manifest, read_manifest
 from tactile_bayes.datasets.shard import file_in, records_as_dataset
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_text
-from tactile_bayes.errors import ParameterError, SpecificationError
+from tactile_bayes.errors import SpecificationError
 from tactile_bayes.numerics.selection import evenly_spread
 
 __all__ = ["Verification", "verify"]
@@ -59,9 +60,9 @@ def verify(
     ParameterError
         If `regenerate` is not a number of shards.
     """
-    if not isinstance(regenerate, int) or regenerate < 0:
-        raise ParameterError(f"regenerate is {regenerate!r}: give a number of shards, 0 for none")
-    folder = Path(path)
+    check_whole_number("regenerate", regenerate, 0, "give a number of shards, 0 for none")
+    check_function("progress", progress)
+    folder = check_path("path", path, "give the folder of a data set")
     manifest = read_manifest(folder)
     spec = read_text(manifest.specification)
     if not manifest.is_of(spec):

@@ -6,9 +6,10 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.checks import check_optional
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides
-from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
+from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned, validate
 
 __all__ = ["CHECK_UNITS", "check_units_and_signs"]
 
@@ -62,6 +63,8 @@ def check_units_and_signs(measured: xr.Dataset, load_cell: LoadCell | None = Non
     >>> print(check_units_and_signs(record.assign(force_y=-record.force_y))[0])
     force_y is negative in contact, but the object pushes the pivot's support up: its sign is wrong, or the frame.
     """
+    check_optional("load_cell", load_cell, LoadCell)
+    measured = validate(measured)
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     present = present_channels(measured)
     if len(present) == len(CHANNELS):

@@ -11,13 +11,14 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_optional, refused
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.misfit import CHECK_RIG, GAUGE, is_inferred, what_to_try
 from tactile_bayes.inference.parameters.discrepancy import PARAMETERS
-from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of
+from tactile_bayes.inference.result import contour_draws, is_streamed, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps
@@ -99,7 +100,11 @@ def verdicts(
     >>> print(found[0].split(":")[0])
     The family parabola and the rig as assumed do not describe the record
     """
+    contour_draws(posterior)
     record = record_of(posterior)
+    check_optional("contacts", contacts, xr.Dataset, "give what reconstruct returned")
+    if trust is not None and "conclusion" not in getattr(trust, "attrs", {}):
+        raise refused("trust", trust, "give what trust returned, or None")
     try:
         check = check_record(posterior)
         not_checked = str(check.attrs["not_checked"])

@@ -311,6 +311,7 @@ def _posterior_of(
     if checkpoint is not None:
         check_path("checkpoint", checkpoint, "give the path of a folder, or None")
     check_function("progress", progress)
+    check_function("keep", keep)
     seed_sequence(seed)
     problem = contour_problem(experiment)
     return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress, keep=keep).tree

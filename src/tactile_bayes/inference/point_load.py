@@ -29,6 +29,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
     as_number,
     as_numbers,
+    check_function,
     check_mapping,
     check_number,
     check_optional,
@@ -416,6 +417,7 @@ def infer_point_load(
         full_scale = 10.0 ** math.ceil(math.log10(np.abs(reading).max()))
     check_positive("full_scale", full_scale, "give a positive reading")
     check_optional("settings", settings, SamplerSettings)
+    check_function("progress", progress)
     settings = settings or _SETTINGS
     unknown, known = _split_priors(priors, default_priors(axial, lateral, full_scale=full_scale))
     unit = 3.0 / _reach(axial, lateral)

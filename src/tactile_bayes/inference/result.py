@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -147,6 +146,8 @@ def refuse_not_finite(what: str, values: xr.DataArray) -> None:
 def record_of(posterior: xr.DataTree) -> xr.Dataset:
     """Return the record from which a contour was inferred, with the rod and the load cell of the inference."""
     refuse_no_contour(posterior, "constant_data", "observed_data")
+    if "units" not in posterior.attrs:
+        raise InferenceError(_NO_CONTOUR)
     kept = {
         name: value
         for name, value in posterior.attrs.items()
@@ -223,7 +224,8 @@ def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
     ...     read_result(path)["posterior"].sizes["draw"]
     100
     """
-    if Path(path).suffix != ".nc":
+    path = check_path("path", path, "give the path of a file, like 'posterior.nc'")
+    if path.suffix != ".nc":
         raise InferenceError(f"{path}: a result is written as NetCDF, give a name that ends in .nc")
     if not isinstance(result, xr.DataTree):
         raise InferenceError("this is no result: give the tree that infer_contour or infer_contacts has returned")

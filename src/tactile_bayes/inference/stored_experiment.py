@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_mapping
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.prior_text import is_prior_in_words, prior_in_words, prior_of_words
@@ -48,6 +49,7 @@ def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = N
     'uniform(0.4, 0.2)'
     """
     contour_draws(posterior)
+    check_mapping("priors", priors, "give the argument of infer_contour, or None")
     attrs: dict[Any, Any] = posterior.attrs
     lacking = {"priors", "nuisances", "friction"} - set(attrs)
     if lacking:

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_seed, check_switch
+from tactile_bayes.checks import check_array, check_optional, check_seed, check_switch, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_loads
 from tactile_bayes.load_cell.covariance import covariance, squared_mahalanobis_distance
@@ -278,6 +278,7 @@ class LoadCell(DataSheet):
 
     def refuse_other_frame(self, record: xr.Dataset) -> None:
         """Raise ParameterError if a record is not in the frame of this cell."""
+        validate(record)
         if self.frame is not None and frame_of(record) != self.frame:
             raise ParameterError(
                 f"the load cell is {self.frame}, but the record's forces are {frame_of(record)}: give the cell without "
@@ -319,7 +320,8 @@ class LoadCell(DataSheet):
         >>> LoadCell(force_resolution=0.25, moment_range=1.0).simulate([[2.0, 0.3, 0.1]], seed=1)
         array([[1.  , 0.25, 0.  ]])
         """
-        given = np.asarray(loads, dtype=np.float64)
+        check_optional("discrepancy", discrepancy, Discrepancy)
+        given = check_array("loads", loads)
         if given.ndim < 2 or given.shape[-1] != len(CHANNELS):
             raise ParameterError(
                 f"loads have the shape {given.shape}: give (..., samples, 3), with the channels {', '.join(CHANNELS)}"
@@ -352,7 +354,7 @@ class LoadCell(DataSheet):
         >>> np.sqrt(np.diagonal(cell.covariance(np.zeros((1, 3)))[0])).round(3)
         array([0.02, 0.05, 0.03])
         """
-        return covariance(self, np.asarray(loads, dtype=np.float64))
+        return covariance(self, _by_sample("loads", loads))
 
     @property
     def drive_angle_deviation(self) -> float:
@@ -383,7 +385,7 @@ class LoadCell(DataSheet):
         >>> LoadCell(moment_noise=0.02).squared_mahalanobis_distance([[0.04, np.nan, np.nan]]).round(6)
         array([4.])
         """
-        return squared_mahalanobis_distance(self, np.asarray(readings, dtype=np.float64))
+        return squared_mahalanobis_distance(self, _by_sample("readings", readings))
 
     def log_likelihood(
         self,
@@ -486,6 +488,15 @@ class LoadCell(DataSheet):
         array([ 0.7,  0.7, -5.6])
         """
         return log_density_left_out(self, measured, predicted, noise_scale, discrepancy)
+
+
+def _by_sample(name: str, values: ArrayLike) -> Floats:
+    """Return loads or readings of samples, shape (samples, 3)."""
+    correction = f"give an array of shape (samples, 3), with the channels {', '.join(CHANNELS)}"
+    numbers = check_array(name, values, correction)
+    if numbers.ndim != 2 or numbers.shape[1] != len(CHANNELS):
+        raise refused(name, values, correction)
+    return numbers
 
 
 def _generator(seed: int | np.random.Generator) -> np.random.Generator:

@@ -12,7 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.checks import as_number, check_choice, check_number, check_numbers, check_positive, refused
+from tactile_bayes.checks import (
+    as_number,
+    check_array,
+    check_choice,
+    check_kind,
+    check_number,
+    check_numbers,
+    check_positive,
+    refused,
+)
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.curve import curved, slope_of, straightened
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
@@ -26,6 +35,8 @@ Triple = tuple[float, float, float]
 
 CERTAIN = ("bias", "gain", "lever", "moment_curve", "drive_angle_offset", "drive_angle_backlash")
 """Deterministic entries: known errors, for which a record can be corrected."""
+
+_LOADS = f"give an array of shape (..., 3), with the channels {', '.join(CHANNELS)}"
 
 _IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _SCALARS = (
@@ -215,6 +226,9 @@ class DataSheet:
         A channel that was not measured is NaN throughout; it affects others only through cross-talk, or the moment
         through its lever.
         """
+        loads = check_array("loads", loads, _LOADS)
+        if loads.shape[-1:] != (len(CHANNELS),):
+            raise refused("loads", loads, _LOADS)
         if self.gain == _IDENTITY and not any((*self.lever, *self.moment_curve)):
             return loads + np.array(self.bias) if any(self.bias) else loads
         if any(self.moment_curve):
@@ -291,6 +305,7 @@ class DataSheet:
         >>> DataSheet(force_noise=0.5, moment_noise=0.25).dimensionless(Rod(0.5, 2.0)).noise
         array([0.0625, 0.0625, 0.0625])
         """
+        check_kind("rod", rod, Rod, "give the Rod with which the cell is used")
         sizes = rod.unit_sizes
         entries = dict(self._all_entries())
         for name, unit in LOAD_CELL_UNITS.items():

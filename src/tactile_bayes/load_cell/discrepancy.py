@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Draws, Floats, Index
+from tactile_bayes.checks import check_array, check_kind, check_numbers, refused
 
 __all__ = ["Course", "Discrepancy", "joined"]
 
@@ -31,8 +32,14 @@ class Course(NamedTuple):
         >>> Course.along(np.array([0.0, 0.5, 3.0, 2.0]), [np.array([0, 1]), np.array([2, 3])])
         Course(order=array([0, 1, 3, 2]), step=array([inf, 0.5, inf, 1. ]))
         """
-        ordered = [samples[np.argsort(coordinate[samples], kind="stable")] for samples in sweeps]
-        ordered.sort(key=lambda samples: int(samples.min()))
+        coordinate = check_numbers("coordinate", coordinate, "give a finite number for each sample", shape=(None,))
+        try:
+            ordered = [samples[np.argsort(coordinate[samples], kind="stable")] for samples in sweeps]
+            ordered.sort(key=lambda samples: int(samples.min()))
+        except (AttributeError, IndexError, TypeError, ValueError):
+            raise refused("sweeps", sweeps, "give the samples of each sweep, as arrays of their indices") from None
+        if sum(map(len, ordered)) != coordinate.size:
+            raise refused("sweeps", sweeps, f"give each of the {coordinate.size} samples in one sweep")
         step = [np.append(np.inf, np.diff(coordinate[samples])) for samples in ordered]
         return cls(np.concatenate(ordered), np.concatenate(step))
 
@@ -63,6 +70,15 @@ class Discrepancy:
     course: Course
     deviation: Floats
     length: Floats
+
+    def __post_init__(self) -> None:
+        check_kind("course", self.course, Course, "give a Course")
+        object.__setattr__(self, "length", check_array("length", self.length))
+        samples = len(self.course.order)
+        correction = f"give numbers, shape (..., samples, channels), with {samples} samples"
+        object.__setattr__(self, "deviation", check_array("deviation", self.deviation, correction))
+        if self.deviation.shape[-2:-1] != (samples,):
+            raise refused("deviation", self.deviation, correction)
 
     def take(self, where: Index | int) -> Discrepancy:
         """Return some of a batch, or one."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaln, gammaln, hyp2f1, log_ndtr, stdtr
 
 from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.checks import check_array, check_optional
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
@@ -55,6 +56,7 @@ def log_likelihood(
 
     Dependent samples are conditional on those before, or on all others if `left_out`.
     """
+    check_optional("discrepancy", discrepancy, Discrepancy)
     readings, loads, scale = _checked(measured, predicted, noise_scale)
     present = _present(sheet, readings)
     if not present.size:
@@ -133,7 +135,7 @@ def approximations(sheet: DataSheet) -> tuple[str, ...]:
 
 def checked_noise_scale(noise_scale: ArrayLike, loads: tuple[int, ...]) -> Floats:
     """Return factors on the white noise for loads of a shape, or refuse them."""
-    scale = np.asarray(noise_scale, dtype=np.float64)
+    scale = check_array("noise_scale", noise_scale, "give a positive factor, or one for each channel")
     if not (scale > 0).all():
         raise ParameterError(f"a noise_scale is {float(np.min(scale))!r}: give positive factors")
     try:
@@ -398,8 +400,7 @@ def _sum_before(values: Floats) -> Floats:
 
 
 def _checked(measured: ArrayLike, predicted: ArrayLike, noise_scale: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    readings = np.asarray(measured, dtype=np.float64)
-    loads = np.asarray(predicted, dtype=np.float64)
+    readings, loads = check_array("measured", measured), check_array("predicted", predicted)
     if readings.shape[1:] != (len(CHANNELS),) or loads.shape[-2:] != readings.shape:
         raise ParameterError(
             f"measured has shape {readings.shape} and predicted {loads.shape}: give (n_samples, 3) and "

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_arrays, check_kind, check_number, check_optional
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.phases import NONE
 from tactile_bayes.mechanics.rods.profile import Profile, Rods
@@ -35,6 +36,9 @@ __all__ = [
 MAX_FRICTION_ANGLE = 0.7
 """Largest friction angle δ [rad]: the map of Phase B folds unless 2 E(m) > K(m) for m = (1 + sin δ)/2."""
 
+
+_STEM = "give a length in rod lengths, from 0 for none"
+_PROFILE = "give the profile of a rod, Rod(...).profile"
 
 _FARTHEST = 3.0
 """Angle [rad] by which a rod on a stem may be turned from the bearing of its contact."""
@@ -126,7 +130,15 @@ def tangential_arclength(
     >>> tangential_arclength(0.2, 0.6, [0.1, 0.2]).round(6)
     array([1.053211, 0.976104])
     """
-    return _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, NONE)[1][8]
+    x, y, alpha, delta, bent = check_arrays(
+        contact_x=contact_x,
+        contact_y=contact_y,
+        slope_angle=slope_angle,
+        friction_angle=friction_angle,
+        rest_curvature=rest_curvature,
+    )
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _states(x, y, alpha, delta, bent, NONE)[1][8]
 
 
 def wrench_from_contact(
@@ -187,12 +199,23 @@ def wrench_from_contact(
     >>> w.phase, w.drive_angle.round(6)
     (array([1, 2], dtype=int8), array([2.901776, 2.923367]))
     """
-    sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
+    x, y, alpha, delta, sides, curvature, known = check_arrays(
+        contact_x=contact_x,
+        contact_y=contact_y,
+        slope_angle=slope_angle,
+        friction_angle=friction_angle,
+        side=side,
+        rest_curvature=rest_curvature,
+        phase=NONE if phase is None else phase,
+    )
+    check_optional("profile", profile, Profile, _PROFILE)
+    stem = check_number("stem", stem, _STEM, least=0.0)
+    sign = np.where(sides < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
-    bent = sign * (rest_curvature if profile is None else profile.sign)
-    known = NONE if phase is None else phase
-    contacts: tuple[Any, ...] = sign * contact_x, contact_y, sign * slope_angle, friction_angle, bent, known, profile
-    found, columns = _states(*contacts) if stem == 0.0 else _states_on_stem(stem, *contacts)
+    bent = sign * (curvature if profile is None else profile.sign)
+    contacts: tuple[Any, ...] = sign * x, y, sign * alpha, delta, bent, known, profile
+    with np.errstate(over="ignore", invalid="ignore"):  # of contacts out of reach
+        found, columns = _states(*contacts) if stem == 0.0 else _states_on_stem(stem, *contacts)
     drive_angle, moment, force_x, force_y, arclength, tip_angle, by_slope, by_distance, tangential = columns
     return Wrench(
         drive_angle=np.where(mirrored, np.pi - drive_angle, drive_angle),
@@ -367,19 +390,27 @@ def contact_from_wrench(
     >>> c.contact_x.round(12), c.contact_y.round(12), c.slope_angle.round(12)
     (np.float64(0.2), np.float64(0.6), np.float64(0.1))
     """
-    moment = np.asarray(holding_moment, dtype=float)
-    if side is None:
-        side = np.where(moment < 0.0, -1.0, 1.0)
-    delta = np.asarray(friction_angle, dtype=float)
+    angle, moment, fx, fy, delta, curvature, sides = check_arrays(
+        drive_angle=drive_angle,
+        holding_moment=holding_moment,
+        force_x=force_x,
+        force_y=force_y,
+        friction_angle=friction_angle,
+        rest_curvature=rest_curvature,
+        side=holding_moment if side is None else side,
+    )
+    check_optional("profile", profile, Profile, _PROFILE)
+    stem = check_number("stem", stem, _STEM, least=0.0)
     _refuse_friction(delta, 0.0 if profile is None else -MAX_FRICTION_ANGLE)
-    sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
+    sign = np.where(sides < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
-    phi0 = np.where(mirrored, np.pi - np.asarray(drive_angle), drive_angle)
-    of_rods = sign * rest_curvature if profile is None else sign
-    given = np.broadcast_arrays(phi0, sign * moment, sign * force_x, force_y, delta, of_rods)
+    phi0 = np.where(mirrored, np.pi - angle, angle)
+    of_rods = sign * curvature if profile is None else sign
+    given = np.broadcast_arrays(phi0, sign * moment, sign * fx, fy, delta, of_rods)
     *wrench, of_rods = (column.ravel() for column in given)
     rods = Rods(of_rods.astype(float), profile, stem)
-    found = forward_contacts(np.stack(wrench, axis=-1).astype(float), rods)
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = forward_contacts(np.stack(wrench, axis=-1).astype(float), rods)
     x, y, slope_angle, arclength, tip_angle, modulus = found.reshape(6, *given[0].shape)
     tip_angle = np.where(mirrored, np.pi - tip_angle, tip_angle)
     return Contact(sign * x, y, sign * slope_angle, arclength, tip_angle, modulus)
@@ -440,14 +471,16 @@ def largest_curvature(wrench: Wrench, rest_curvature: ArrayLike = 0.0) -> Floats
     >>> bent.holding_moment.round(6), largest_curvature(bent).round(6)
     (array([2.18262 , 3.400363]), array([4.000574, 3.400363]))
     """
+    check_kind("wrench", wrench, Wrench, "give what wrench_from_contact returned")
+    *_, curvature = check_arrays(wrench=wrench.drive_angle, rest_curvature=rest_curvature)
     cos, sin = np.cos(wrench.drive_angle), np.sin(wrench.drive_angle)
     along, across = wrench.force_x * cos + wrench.force_y * sin, wrench.force_y * cos - wrench.force_x * sin
     sign, force = np.where(wrench.holding_moment < 0.0, -1.0, 1.0), np.hypot(wrench.force_x, wrench.force_y)
-    moment, rest = sign * wrench.holding_moment, sign * np.asarray(rest_curvature)
+    moment, rest = sign * wrench.holding_moment, sign * curvature
     at_pivot = rest - moment
     # The rod lies across the force in its sense or, if its curvature keeps the other sign, in the opposite one.
     squared = at_pivot**2 - 2.0 * (force + along)
     inflated = rest + np.sqrt(at_pivot**2 + 2.0 * (force - along))
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         inflated = np.where((at_pivot > 0.0) & (squared > 0.0), rest - np.sqrt(squared), inflated)
     return np.where(sign * across < 0.0, np.maximum(moment, inflated), moment)

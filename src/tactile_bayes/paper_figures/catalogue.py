@@ -202,7 +202,7 @@ def _number(value: float) -> str:
 
 
 def _chosen(number: int, *, distances: Sequence[float] | None, **options: Any) -> tuple[_Entry, Choice]:
-    if isinstance(number, bool) or number not in _ENTRIES:
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number not in _ENTRIES:
         raise ParameterError(f"there is no figure {number!r}: choose from {NUMBERS[0]} to {NUMBERS[-1]}")
     entry = _ENTRIES[number]
     return entry, choice_of(entry.distances if distances is None else distances, **options)

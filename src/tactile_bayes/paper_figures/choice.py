@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tactile_bayes.checks import as_numbers, check_number, check_optional, check_whole_number
+from tactile_bayes.checks import (
+    as_numbers,
+    check_number,
+    check_optional,
+    check_positive,
+    check_seed,
+    check_whole_number,
+)
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ContourError, ParameterError
 from tactile_bayes.load_cell import LoadCell
@@ -114,6 +121,9 @@ def choice_of(
     inches = f"give inches from 3 to 12, like {COLUMN_WIDTH} or {PAGE_WIDTH}"
     width = check_number("width", width, inches, least=3.0, most=12.0)
     check_optional("load_cell", load_cell, LoadCell, "give a LoadCell")
+    check_seed(seed)
+    if drive_step is not None:
+        check_positive("drive_step", drive_step)
     check_optional("drive", drive, Carried, "the paper's rotations have none: give a Translation or a Motion")
     if drive is not None and not np.ptp(drive.poses[:, :2], axis=0).any():
         raise ParameterError("drive is a motion that does not move the base: give one that does, or no drive")

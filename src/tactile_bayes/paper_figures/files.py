@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tactile_bayes.checks import check_function, check_names, check_optional, check_path
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.paper_figures.catalogue import NUMBERS, caption, figure
 from tactile_bayes.plotting.style import Style, own_style, save_figure
@@ -68,15 +69,17 @@ def draw_all(
     ...     files[3]["svg"].name
     'figure_03.svg'
     """
-    numbers = list(dict.fromkeys(NUMBERS if only is None else only))
-    wanted = list(dict.fromkeys(formats))
+    wanted = list(dict.fromkeys(check_names("formats", formats)))
     absent = [name for name in wanted if name not in _FORMATS]
     if absent or not wanted:
         raise ParameterError(f"formats are {list(formats)!r}: choose from {', '.join(_FORMATS)}")
+    check_optional("only", only, Collection, "give a list of numbers of figures")
+    numbers = NUMBERS if only is None else only
     captions = {number: caption(number, **options) for number in numbers}  # refuses before anything is written
+    check_function("progress", progress)
     drive = options.get("drive")
     kind = "" if drive is None else f"_{type(drive).__name__.lower()}"
-    folder = Path(out)
+    folder = check_path("out", out, "give the path of a folder")
     files: dict[int, dict[str, Path]] = {}
     with own_style(style):
         for done, (number, text) in enumerate(captions.items(), start=1):

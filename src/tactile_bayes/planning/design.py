@@ -19,6 +19,7 @@ from tactile_bayes.checks import (
     TINY,
     check_choice,
     check_numbers,
+    check_optional,
     check_probability,
     check_seed,
     check_switch,
@@ -200,7 +201,7 @@ def design(
     steps = check_numbers("drive_steps", several, correction, shape=(None,), least=TINY, most=0.5)
     pivots = [] if bases is None and drives is not None else _bases(bases, knowledge)
     choices: list[tuple[Drive, ...]] = [(Rotation(base),) for base in pivots]
-    choices += [tuple(drives_of(drive, (0.0, 0.0))) for drive in drives or ()]
+    choices += [tuple(drives_of(drive, (0.0, 0.0))) for drive in _several(drives)]
     candidates = tuple(Candidate(choice, float(step)) for choice, step in product(choices, steps))
     x = np.linspace(*_span(span, knowledge), _GRID_POINTS)
     question = Question(knowledge, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
@@ -211,6 +212,12 @@ def design(
     if not any(expected.reached for expected in found.values()):
         raise ReachError(_out_of_reach(question))
     return _labelled(question, [found[number] for number in range(len(candidates))], criterion)
+
+
+def _several(drives: Any) -> Sequence[Any]:
+    """Return the given drives; none by default."""
+    check_optional("drives", drives, Sequence, "give a list of drives, or of lists of them")
+    return drives or ()
 
 
 def _out_of_reach(question: Question) -> str:

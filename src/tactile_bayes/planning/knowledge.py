@@ -12,11 +12,11 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.result import posterior_draws, record_of
+from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import carried_sweeps, rod_of
@@ -133,9 +133,8 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
     ParameterError
         If the contour is shape-free.
     """
+    contour_draws(posterior)
     attrs: dict[Any, Any] = posterior.attrs
-    if "family" not in attrs:
-        raise InferenceError("this is no posterior of a contour: give what infer_contour has returned")
     _refuse_shape_free(str(attrs["family"]))
     record = record_of(posterior)
     samples = posterior_draws(posterior)

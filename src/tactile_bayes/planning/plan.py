@@ -12,8 +12,9 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_names, check_optional
+from tactile_bayes.checks import check_choice, check_names, check_optional, check_positive
 from tactile_bayes.contours import Contour
+from tactile_bayes.contours.base import check_single
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
@@ -26,6 +27,8 @@ from tactile_bayes.planning.family_parameters import family_parameters
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Drive, Scan, scan
+from tactile_bayes.sweep.path import friction_angle_of
+from tactile_bayes.sweep.scanning import drives_of
 
 __all__ = ["Plan"]
 
@@ -69,6 +72,10 @@ class Plan:
     def __post_init__(self) -> None:
         check_optional("rod", self.rod, Rod)
         check_optional("load_cell", self.load_cell, LoadCell)
+        check_single("contour", self.contour)
+        drives_of(self.drive, self.base)
+        check_choice("direction", self.direction, ("both", "forward", "backward"))
+        friction_angle_of(0.0 if self.friction is None else self.friction)
         check_priors("priors", self.priors)
         object.__setattr__(self, "nuisances", tuple(check_names("nuisances", self.nuisances)))
         deviations = self.cell.standard_deviations
@@ -152,6 +159,7 @@ class Plan:
 
     def with_noise(self, factor: float) -> Plan:
         """Return the plan with force_noise and moment_noise of the load cell multiplied by a factor."""
+        check_positive("factor", factor)
         noisier = replace(
             self.cell, force_noise=factor * self.cell.force_noise, moment_noise=factor * self.cell.moment_noise
         )

@@ -14,7 +14,15 @@ import xarray as xr
 from scipy.optimize import brentq
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import TINY, check_choice, check_kind, check_numbers, check_positive, check_probability
+from tactile_bayes.checks import (
+    TINY,
+    check_choice,
+    check_function,
+    check_kind,
+    check_numbers,
+    check_positive,
+    check_probability,
+)
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, StrainWarning
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
@@ -171,6 +179,7 @@ def required_rod(
     check_kind("plan", plan, Plan, "give a Plan")
     check_probability("probability", probability)
     check_positive("elastic_strain", elastic_strain)
+    check_function("progress", progress)
     if plan.rod is None or plan.rod.is_dimensionless or plan.load_cell is None:
         raise ParameterError(
             "a rod is sought for a load cell in N and N m: give a plan with a rod in SI, and a load_cell"
@@ -178,7 +187,11 @@ def required_rod(
     x = _grid_points(plan, where)
     dimensions = {
         name: check_numbers(
-            f"{name}s", np.atleast_1d(values), "give a list of positive numbers [m]", shape=(None,), least=TINY
+            f"{name}s",
+            values if np.iterable(values) else [values],
+            "give a list of positive numbers [m]",
+            shape=(None,),
+            least=TINY,
         )
         for name, values in (("length", lengths), ("diameter", diameters))
     }

@@ -9,7 +9,15 @@ from typing import Literal
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from tactile_bayes.checks import check_names, check_optional, refused
+from tactile_bayes.checks import (
+    check_function,
+    check_names,
+    check_optional,
+    check_probability,
+    check_seed,
+    check_whole_number,
+    refused,
+)
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.inference.parameters.priors import Prior
@@ -115,6 +123,10 @@ def sensitivity(
     if not set(check_names("parts", parts)) <= set(PARTS) or not parts:
         raise refused("parts", parts, f"give a list of some of {', '.join(PARTS)}")
     check_optional("rod", rod, Rod)
+    check_seed(seed)
+    check_probability("probability", probability)
+    check_whole_number("samples", samples, 1)
+    check_function("progress", progress)
     taken = rod or Rod()
     if contour is None:
         contour = enlarged(paper_profile("II", q=0.5), taken.length)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import check_dataset, new_panels
+from tactile_bayes.plotting.axes import check_dataset, check_drawing, new_panels
 from tactile_bayes.plotting.labels import show_numbers
 from tactile_bayes.plotting.legends import legend
 from tactile_bayes.plotting.marks import PALETTE
@@ -57,6 +57,7 @@ def assumptions(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     'distance of the medians [widths of the band]'
     """
     check_dataset(found, {"moved_in_gap", "moved_beside", "fits"}, "result with assumptions", "trust")
+    check_drawing(ax)
     count = found.sizes["assumption"]
     if ax is None:
         ax = new_panels(1, 1, 1.2 + 0.28 * count)[0, 0]

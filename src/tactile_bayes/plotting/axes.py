@@ -10,6 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_numbers, check_optional, refused
+from tactile_bayes.contours.base import check_single
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.marks import PALETTE
 
@@ -19,7 +21,9 @@ if TYPE_CHECKING:
 __all__ = [
     "AxesArray",
     "check_dataset",
+    "check_drawing",
     "check_panels",
+    "checked_samples",
     "new_panels",
     "single_axes",
     "tile_edges",
@@ -44,9 +48,33 @@ def new_panels(rows: int, columns: int, height: float, width: float = 7.0, **opt
     return plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **options)[1]
 
 
+def check_drawing(ax: Any = None, truth: Any = None) -> None:
+    """Refuse Axes that are not Matplotlib's, and a truth that is not one contour; both are optional."""
+    from matplotlib.axes import Axes
+
+    check_optional("ax", ax, Axes, "give Axes of Matplotlib")
+    if truth is not None:
+        check_single("truth", truth, "give one contour, or None")
+
+
+def checked_samples(samples: Any) -> NDArray[np.intp] | None:
+    """Return numbers of samples as an array; None for the usual ones."""
+    if samples is None:
+        return None
+    correction = "give a list of numbers of samples, or None"
+    numbers = np.atleast_1d(check_numbers("samples", samples, correction))
+    if numbers.ndim != 1 or np.any(numbers != np.round(numbers)):
+        raise refused("samples", samples, correction)
+    return numbers.astype(np.intp)
+
+
 def check_panels(axes: Any, shape: tuple[int, ...], meaning: str) -> AxesArray:
     """Return the given Axes if they have the wanted shape, and refuse others; `meaning` describes the wanted ones."""
-    panels = np.atleast_1d(np.asarray(axes, dtype=object))
+    from matplotlib.axes import Axes
+
+    panels = np.atleast_1d(np.array(None if hasattr(axes, "data_vars") else axes, dtype=object))
+    if panels.shape == shape and not all(isinstance(ax, Axes) for ax in panels.flat):
+        raise refused("axes", axes, f"give an array of Axes of Matplotlib, shape {shape}: {meaning}")
     if panels.shape != shape:
         raise ParameterError(f"axes have shape {panels.shape}, and {shape} is wanted: {meaning}")
     return panels

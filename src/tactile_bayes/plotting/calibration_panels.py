@@ -11,7 +11,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.ranks import expected_shares, simultaneous_band
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, check_dataset, check_panels, new_panels, write_instead
+from tactile_bayes.plotting.axes import AxesArray, check_dataset, check_drawing, check_panels, new_panels, write_instead
 from tactile_bayes.plotting.labels import number, percent
 from tactile_bayes.plotting.marks import PALETTE
 
@@ -152,6 +152,7 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     names = {"coverage", "coverage_error", "coverage_replicates", "claim"}
     check_dataset(calibration, names, "calibration", "calibrate", ["probability"])
+    check_drawing(ax)
     is_enough = calibration["coverage_replicates"].values >= _FEWEST
     is_shown = is_enough & np.isfinite(calibration["coverage"].values)
     shown = calibration.isel(claim=is_shown)

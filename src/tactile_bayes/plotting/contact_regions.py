@@ -9,9 +9,10 @@ import numpy as np
 import xarray as xr
 from scipy.special import chdtri
 
+from tactile_bayes.arrays import Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import single_axes
+from tactile_bayes.plotting.axes import check_drawing, checked_samples, single_axes
 from tactile_bayes.plotting.labels import percent
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import finish_map, fit_height, outline
@@ -63,16 +64,18 @@ def contact_ellipses(
         If no sample has an ellipse, or the probability is not in (0, 1).
     """
     check_probability("probability", probability)
+    check_drawing(ax, truth)
+    numbers = checked_samples(samples)
     if not (isinstance(contacts, xr.Dataset) and "contact_x_sd" in contacts):
         raise ParameterError(
             "this is no result of reconstruct: give what it returned; contact_regions draws posteriors"
         )
-    if samples is not None and not np.isin(samples, np.arange(contacts.sizes["sample"])).all():
+    if numbers is not None and not np.isin(numbers, np.arange(contacts.sizes["sample"])).all():
         raise ParameterError(f"samples are numbered from 0 to {contacts.sizes['sample'] - 1}: give some of these")
     spread_x, spread_y = contacts["contact_x_sd"].values, contacts["contact_y_sd"].values
     has = np.isfinite(spread_x) & np.isfinite(spread_y)
     certain = contacts["status"] == "ok" if "status" in contacts else contacts["contact_probability"] == 1.0
-    chosen = _spread(has, has & certain.values, samples)
+    chosen = _spread(has, has & certain.values, numbers)
     if not chosen:
         raise ParameterError(
             "no contact here has a standard deviation: reconstruct with a load cell that states its noise, and choose "
@@ -126,17 +129,19 @@ def contact_regions(
     from tactile_bayes.uncertainty.contact_region import contact_region
 
     check_probability("probability", probability)
+    check_drawing(ax, truth)
+    numbers = checked_samples(samples)
     draws = contact_draws(posterior)
     x, y = (draws[name].median(("chain", "draw")).values for name in ("contact_x", "contact_y"))
     tangential = draws["tangential"].mean(("chain", "draw")).values
     has = draws["contact_x"].notnull().sum(("chain", "draw")).values >= LEAST_DRAWS
     labels = draws["sample"].values
-    if samples is not None:
-        absent = np.setdiff1d(samples, labels)
+    if numbers is not None:
+        absent = np.setdiff1d(numbers, labels)
         if absent.size:
             raise ParameterError(f"there is no sample {absent[0]}: the posterior has {labels.min()} to {labels.max()}")
-        samples = np.flatnonzero(np.isin(labels, samples)).tolist()
-    chosen = _spread(has, has, samples)
+        numbers = np.flatnonzero(np.isin(labels, numbers))
+    chosen = _spread(has, has, numbers)
     if not chosen:
         raise ParameterError("no sample here has a contact: choose others")
     own, ax = ax is None, single_axes() if ax is None else ax
@@ -173,11 +178,11 @@ def radius_of(probability: float) -> float:
     return float(np.sqrt(chdtri(2.0, 1.0 - probability)))
 
 
-def _spread(has: Any, is_candidate: Any, samples: Sequence[int] | None) -> list[int]:
+def _spread(has: Any, is_candidate: Any, samples: Index | None) -> list[int]:
     """Return the requested samples, or a dozen of the candidates, without those that have no contact."""
     chosen = np.flatnonzero(is_candidate)
     if samples is not None:
-        chosen = np.atleast_1d(np.asarray(samples, dtype=np.intp))
+        chosen = samples
     elif chosen.size > _DRAWN:
         chosen = chosen[np.linspace(0, chosen.size - 1, _DRAWN).astype(int)]
     return [int(i) for i in chosen[has[chosen]]]

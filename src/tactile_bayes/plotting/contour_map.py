@@ -10,8 +10,9 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_array, check_numbers
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import single_axes, write_instead
+from tactile_bayes.plotting.axes import check_dataset, check_drawing, single_axes, write_instead
 from tactile_bayes.plotting.labels import LABELS, number, percent, set_unit, shown_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entries, legend_entry
 from tactile_bayes.plotting.maps import draw_gap, draw_pivot, finish_map, outline
@@ -41,6 +42,10 @@ _ENDS: dict[str, Any] = {
     "capsize": 2.5,
     "zorder": 4,
 }
+
+
+_BAND = "band", "contour_band"
+_GAP = {"left", "right", "bound"}
 
 
 def contour(
@@ -89,14 +94,22 @@ def contour(
     >>> contour([-0.6, 0.6], truth=paper_profile("II", q=0.5), gap=(-0.1, 0.1), base=(0.0, 0.0)).get_ylabel()
     '$y$ [$L$]'
     """
-    drawn = np.asarray(x, dtype=float)
+    check_drawing(ax, truth)
+    if band is not None:
+        check_dataset(band, {"x", "lower", "upper"}, *_BAND)
+    if contacts is not None:
+        check_dataset(contacts, {"contact_x", "contact_y"}, "dataset of contact points", "reconstruct")
+    if base is not None:
+        check_numbers("base", base, "give a pivot (x, y)", shape=(2,))
+    ends = None if gap is None else _ends_of_gap(gap)
+    drawn = check_array("x", x, "give numbers that span the range to be drawn")
     if not (drawn.size >= 2 and np.all(np.isfinite(drawn)) and np.ptp(drawn) > 0.0):
         raise ParameterError("x must span the range to be drawn: at least two different finite numbers")
     low, high = float(drawn.min()), float(drawn.max())
     ax = single_axes() if ax is None else ax
 
-    if gap is not None:
-        _draw_gap(ax, gap)
+    if ends is not None:
+        _draw_gap(ax, *ends)
     attrs: Mapping[Any, Any] = {}
     if band is not None:
         attrs = band["lower"].attrs or band["x"].attrs
@@ -152,11 +165,14 @@ def band_detail(
     >>> band_detail(xr.Dataset(flat, coords={"x": [0.0, 1.0]})).get_ylabel()
     '$y$ − median [$L$]'
     """
+    check_drawing(ax, truth)
+    check_dataset(band, {"x", "lower", "median", "upper"}, *_BAND)
+    ends = None if gap is None else _ends_of_gap(gap)
     ax = single_axes() if ax is None else ax
     x, median = band["x"].values, band["median"].values
     lower, upper = band["lower"].values - median, band["upper"].values - median
-    if gap is not None:
-        _draw_gap(ax, gap)
+    if ends is not None:
+        _draw_gap(ax, *ends)
     ax.fill_between(x, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5)
     ax.axhline(0.0, color=PALETTE["median"], linewidth=1.0)
     if truth is not None:
@@ -202,6 +218,8 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     >>> gap(gap_of(tree)).get_ylabel()
     '$y$ − chord [$L$]'
     """
+    check_drawing(ax, truth)
+    check_dataset(found, _GAP, "gap", "gap", ["probability"])
     ax = single_axes() if ax is None else ax
     attrs = found["left"].attrs
     middle = {name: float(found[name].sel(bound="median")) for name, v in found.items() if v.dims == ("bound",)}
@@ -284,10 +302,18 @@ def _draw_contacts(ax: Axes, contacts: xr.Dataset, low: float, high: float) -> N
             legend_entry(ax, label, markersize=4.0, **style)
 
 
-def _draw_gap(ax: Axes, gap: tuple[float, float] | xr.Dataset) -> None:
-    begin, end = (gap[side].sel(bound="median") for side in ("left", "right")) if isinstance(gap, xr.Dataset) else gap
-    left, right = sorted((float(begin), float(end)))
-    overlap = float(begin) > float(end)
+def _ends_of_gap(gap: Any) -> tuple[float, float]:
+    """Return where a gap begins and ends, from a result of `gap` or two numbers."""
+    if isinstance(gap, xr.Dataset):
+        check_dataset(gap, _GAP, "gap", "gap")
+        gap = [gap[side].sel(bound="median").item() for side in ("left", "right")]
+    begin, end = check_numbers("gap", gap, "give two numbers, or what gap returned", shape=(2,)).tolist()
+    return begin, end
+
+
+def _draw_gap(ax: Axes, begin: float, end: float) -> None:
+    left, right = sorted((begin, end))
+    overlap = begin > end
     draw_gap(ax, left, right, "overlap" if overlap else "gap", hatched=not overlap)
 
 

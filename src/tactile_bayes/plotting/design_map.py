@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.plotting.axes import check_dataset, new_panels, single_axes, tile_edges
+from tactile_bayes.plotting.axes import check_dataset, check_drawing, new_panels, single_axes, tile_edges
 from tactile_bayes.plotting.labels import number, shown_unit
 from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, label_map
@@ -79,6 +79,7 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     if not found["is_pivot"].values.all():
         return _draw_rows(ax, found)
     pivots = np.stack([found["present_base_x"].values, found["present_base_y"].values], axis=-1)
+    check_drawing(ax)
     own, ax = ax is None, single_axes() if ax is None else ax
     grid = _grid_of(found)
     if grid is None:

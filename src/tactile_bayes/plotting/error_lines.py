@@ -9,7 +9,7 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice
-from tactile_bayes.plotting.axes import check_dataset, single_axes, write_instead
+from tactile_bayes.plotting.axes import check_dataset, check_drawing, single_axes, write_instead
 from tactile_bayes.plotting.labels import number, percent, shown_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entry
 from tactile_bayes.plotting.marks import BASES
@@ -76,6 +76,7 @@ def error_map(
     check_dataset(found, {"rms_across", "contour", "distance", "noise_factor"}, "error map", "error_map")
     check_choice("quantity", quantity, ("across", "along", *_BANDS))
     check_among("reconstruction", reconstruction, found)
+    check_drawing(ax)
     ax = single_axes() if ax is None else ax
     found = found.isel(noise_factor=np.argsort(found["noise_factor"].values))
     observed, predicted = _observed_and_predicted(found, quantity, reconstruction)

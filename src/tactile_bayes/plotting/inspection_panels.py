@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tactile_bayes.checks import check_kind
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
 from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
 from tactile_bayes.plotting.labels import LABELS, set_unit
@@ -68,6 +69,9 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
     >>> inspection(inspect_record(measured))[0, 1].get_title()
     'unloaded'
     """
+    from tactile_bayes.diagnostics.inspection import Inspection
+
+    check_kind("inspected", inspected, Inspection, "give what inspect_record returned")
     if axes is None:
         panels = new_panels(3, 2, 5.6, sharex="col", width_ratios=(2.2, 1.0))
     else:

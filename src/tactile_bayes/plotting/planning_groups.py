@@ -44,7 +44,7 @@ def check_among(name: str, value: str, found: xr.Dataset) -> None:
     ParameterError
         If it is not one of the labels.
     """
-    if value not in found[name].values:
+    if not isinstance(value, str) or value not in found[name].values:
         raise ParameterError(f"{name} is {value!r}: there are {', '.join(map(str, found[name].values))}")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_kind, check_mapping, check_names, check_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels
 from tactile_bayes.plotting.labels import number
@@ -131,8 +132,9 @@ def pairs(
     """
     from matplotlib import rcParams
 
+    check_mapping("truth", truth, "give true values by the names of parameters")
+    truth = {name: check_number(f"truth of {name}", value) for name, value in (truth or {}).items()}
     parameters = _parameters(posterior, names)
-    truth = truth or {}
     unknown = set(truth) - {parameter.name for parameter in parameters}
     if unknown and names is None:
         raise ParameterError(
@@ -183,6 +185,8 @@ class _Parameter(NamedTuple):
 
 
 def _parameters(posterior: xr.DataTree | xr.Dataset, names: Sequence[str] | None) -> list[_Parameter]:
+    check_kind("posterior", posterior, xr.DataTree | xr.Dataset, "give a posterior, or its group 'posterior'")
+    names = None if names is None else check_names("names", names)
     if isinstance(posterior, xr.DataTree):
         posterior = (posterior["posterior"] if "posterior" in posterior.children else posterior).to_dataset()
     known = [str(name) for name, values in posterior.data_vars.items() if {"chain", "draw"} <= set(values.dims)]

@@ -11,7 +11,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_switch, check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.plotting.axes import single_axes
+from tactile_bayes.plotting.axes import check_drawing, single_axes
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, finish_map, outline
 from tactile_bayes.plotting.marks import PALETTE, TRUTH
@@ -89,6 +89,7 @@ def prior_contours(
     """
     from tactile_bayes.inference.contour import contours_of
 
+    check_drawing(ax, truth)
     if not {"prior", "constant_data"} <= set(getattr(posterior, "children", ())):
         raise ParameterError("there are no draws from a prior here: give the tree that infer_contour returned")
     check_whole_number("contours", contours, 1, _COUNT)
@@ -142,6 +143,7 @@ def posterior_contours(
     from tactile_bayes.inference.contour import contours_of
     from tactile_bayes.uncertainty.band import contours_drawn
 
+    check_drawing(ax, truth)
     if not {"posterior", "constant_data"} <= set(getattr(posterior, "children", ())):
         raise ParameterError("this is no posterior of a contour: give the tree that infer_contour returned")
     check_whole_number("contours", contours, 1, _COUNT)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.checks import check_kind, check_mapping
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
 from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
@@ -16,11 +17,10 @@ from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
 from tactile_bayes.plotting.sweep_lines import draw_events, finish_channels, phase_runs, reading_style, with_events
 from tactile_bayes.record import CHANNELS, Frame, frame_of, validate
+from tactile_bayes.sweep import SweepEvents
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from tactile_bayes.sweep import SweepEvents
 
 __all__ = ["observables", "predictive"]
 
@@ -83,6 +83,10 @@ def observables(
     'drive angle $\\\\varphi_0$ [°]'
     """
     record = validate(record)
+    correction = "give the events of a scan, by direction"
+    check_mapping("events", events, correction)
+    for name, of_sweep in (events or {}).items():
+        check_kind(f"events[{name!r}]", of_sweep, SweepEvents, correction)
     panels = _panels(axes)
     along = drive_axis(record)
     _draw_observables(panels, record, events, along, with_truth=True)
@@ -143,6 +147,8 @@ def predictive(
     (3,)
     """
     record = validate(record)
+    check_kind("predicted", predicted, xr.Dataset, "give what predictive_interval returned")
+    check_kind("label", label, str, "give a text")
     if predicted.sizes.get("sample") != record.sizes["sample"]:
         raise ParameterError(
             f"predicted has {predicted.sizes.get('sample', 'no')} samples and the record {record.sizes['sample']}: "

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.plotting.axes import check_dataset, single_axes, tile_edges, write_instead
+from tactile_bayes.plotting.axes import check_dataset, check_drawing, single_axes, tile_edges, write_instead
 from tactile_bayes.plotting.labels import number, percent, set_unit, show_numbers, shown_unit
 from tactile_bayes.plotting.legends import legend, legend_above
 from tactile_bayes.plotting.marks import BEST, PALETTE
@@ -63,6 +63,7 @@ def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -
     """
     names = {"band_width", "noise_factor", "force_noise", "moment_noise", "present_width", "prior_width"}
     needed = group_of(found, "required_noise", names)
+    check_drawing(ax)
     ax = single_axes() if ax is None else ax
     needed = needed.isel(band_width=np.argsort(needed["band_width"].values))
     is_had = np.isfinite(needed["noise_factor"].values)
@@ -143,6 +144,7 @@ def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     names = {"width", "status", "length", "diameter", "best_length", "best_diameter", "best_width"}
     check_dataset(found, names, "choice of rods", "required_rod")
+    check_drawing(ax)
     ax = single_axes() if ax is None else ax
     found = found.sortby(["length", "diameter"])
     lengths, diameters = found["length"].values, found["diameter"].values

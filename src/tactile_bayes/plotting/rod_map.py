@@ -8,19 +8,20 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_whole_number
+from tactile_bayes.checks import check_choice, check_kind, check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.centreline import rod_shape
-from tactile_bayes.plotting.axes import single_axes
+from tactile_bayes.plotting.axes import check_drawing, single_axes
 from tactile_bayes.plotting.maps import draw_object, draw_path, draw_pivot, finish_map
 from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES
 from tactile_bayes.plotting.sweep_lines import ENDINGS
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
+from tactile_bayes.sweep import Scan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tactile_bayes.sweep import Event, Scan
+    from tactile_bayes.sweep import Event
 
 __all__ = ["rods"]
 
@@ -72,6 +73,8 @@ def rods(
     >>> rods(scan(paper_profile("I", q=0.4), base=[(0, 0), (0.25, 0)]), sweep=2).get_xlabel()
     '$x$ [$L$]'
     """
+    check_kind("scan", scan, Scan, "give what scan returned")
+    check_drawing(ax)
     number = _number(scan, direction, sweep)
     check_whole_number("count", count, 1, "at least one rod must be drawn")
     record, events, rod = in_frame(scan.record, "fixed"), scan.sweeps[number], rod_of(scan.record)
@@ -130,10 +133,10 @@ def _number(scan: Scan, direction: str | None, sweep: int | None) -> int:
     if sweep is not None:
         if direction is not None:
             raise ParameterError(f"both direction={direction!r} and sweep={sweep!r} are given: one of them is enough")
-        if sweep not in range(len(scan.sweeps)):
+        if check_whole_number("sweep", sweep, 0) not in range(len(scan.sweeps)):
             raise ParameterError(f"the scan has no sweep {sweep!r}: choose from\n{_listed(scan)}")
         return sweep
-    direction = direction or "forward"
+    direction = "forward" if direction is None else check_choice("direction", direction, ("forward", "backward"))
     numbers = [number for number, events in enumerate(scan.sweeps) if events.direction == direction]
     if not numbers:
         have = ", ".join(dict.fromkeys(events.direction for events in scan.sweeps))

@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import single_axes
+from tactile_bayes.plotting.axes import check_drawing, single_axes
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, number
 from tactile_bayes.plotting.legends import legend_above, legend_entry
 from tactile_bayes.plotting.marks import BASES, SWEEP_LINES
@@ -83,6 +84,7 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
     'standard deviation of a contact point [$L$]'
     """
     grown = _of_sweep(group_of(found, "amplification", _VARIABLES), sweep)
+    check_drawing(ax)
     ax = single_axes() if ax is None else ax
     angle = np.degrees(grown["drive_angle"].values)
     first, last = _events(grown)
@@ -155,6 +157,7 @@ def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> A
     'leverage of a reading'
     """
     told = group_of(found, "information", {"leverage", "channel", "sweep", "direction", "drive_angle"})
+    check_drawing(ax)
     ax = single_axes() if ax is None else ax
     for sweep in np.unique(told["sweep"].values):
         of = _of_sweep(told, sweep)
@@ -226,6 +229,7 @@ def noise_shares(
     for name, value in (("reconstruction", reconstruction), ("error", error)):
         check_among(name, value, shares)
     chosen = _of_sweep(shares.sel(reconstruction=reconstruction, error=error), sweep)
+    check_drawing(ax)
     ax = single_axes() if ax is None else ax
     angle = np.degrees(chosen["drive_angle"].values)
     wide = float(np.median(np.diff(angle))) if angle.size > 1 else 1.0
@@ -259,9 +263,10 @@ def _of_sweep(found: xr.Dataset, sweep: int) -> xr.Dataset:
     ParameterError
         If there is no such sweep.
     """
+    check_whole_number("sweep", sweep, 0)
     numbers = found["sweep"].values
     here = np.flatnonzero(numbers == sweep)
-    if isinstance(sweep, bool) or not here.size:
+    if not here.size:
         raise ParameterError(f"sweep is {sweep!r}: there are {', '.join(map(str, np.unique(numbers)))}")
     return found.isel(sample=here[np.argsort(found["drive_angle"].values[here], kind="stable")])
 

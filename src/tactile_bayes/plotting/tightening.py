@@ -10,7 +10,7 @@ import xarray as xr
 
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, check_panels
+from tactile_bayes.plotting.axes import AxesArray, check_drawing, check_panels, checked_samples
 from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, radius_of
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, show_numbers
 from tactile_bayes.plotting.legends import legend_above, legend_entry
@@ -90,6 +90,7 @@ def tightening(
     from tactile_bayes.uncertainty.contact_moments import contact_moments
 
     check_probability("probability", probability)
+    check_drawing(truth=truth)
     tight = contact_moments(implied)
     loose = single if isinstance(single, xr.Dataset) and "contact_x_sd" in single else contact_moments(single)
     _refuse_another_record(implied, single, tight, loose)
@@ -136,7 +137,7 @@ def _certain(moments: xr.Dataset) -> Any:
 
 def _panels(axes: Any) -> AxesArray:
     if axes is not None:
-        return check_panels(np.ravel(axes), (5,), "give five, for the map, three details, and the ratios")
+        return check_panels(axes, (5,), "give five, for the map, three details, and the ratios")
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(7.0, 7.6), layout="constrained")
@@ -159,11 +160,11 @@ def _fit_map(ax: Axes) -> None:
 
 
 def _enlarged(shown: Any, implied: xr.DataTree, samples: Sequence[int] | None) -> Any:
-    if samples is not None:
-        chosen = np.atleast_1d(np.asarray(samples, dtype=np.intp))
+    chosen = checked_samples(samples)
+    if chosen is not None:
         if chosen.size != len(_DETAILS) or not np.isin(chosen, np.flatnonzero(shown)).all():
             raise ParameterError(
-                f"samples are {list(samples)!r}: give three that are certainly in contact and have standard deviations"
+                f"samples are {chosen.tolist()}: give three that are certainly in contact and have standard deviations"
             )
         return chosen
     sweep = implied["constant_data"].to_dataset()["sweep"].values

@@ -9,7 +9,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import single_axes
+from tactile_bayes.plotting.axes import check_drawing, single_axes
 from tactile_bayes.plotting.labels import number, shown_unit
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import draw_gap, draw_object, draw_pivot, finish_map, limits_of, outline, write_on_top
@@ -79,6 +79,7 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
             f"touched draws what scan(...) returns, and not a {type(scan).__name__}: a record alone does not say what "
             "was touched; plotting.observables draws it"
         )
+    check_drawing(ax)
     rod, attrs = rod_of(scan.record), scan.record["base_x"].attrs
     same = _SAME_PLACE * rod.length_unit
     ax = single_axes() if ax is None else ax

@@ -13,6 +13,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.report.findings import FINDING_STEPS, findings_of
 from tactile_bayes.report.page import page_of
 from tactile_bayes.tasks import refuse_replacing, write_atomically
@@ -60,14 +61,14 @@ def write_report(
     OSError
         If the page cannot be written.
     """
-    folder = Path(run)
-    path = folder / "report.html" if out is None else Path(out)
-    sources = [folder / "posterior.nc", folder / "trust.nc", Path(compare or folder) / "comparison.nc"]
+    folder = check_path("run", run, "give the folder of a run")
+    path = folder / "report.html" if out is None else check_path("out", out, "give a path, like 'report.html', or None")
+    check_function("progress", progress)
+    compare = None if compare is None else check_path("compare", compare)
+    sources = [folder / "posterior.nc", folder / "trust.nc", (compare or folder) / "comparison.nc"]
     refuse_replacing([path], [source for source in sources if source.exists()])
     report = progress or (lambda done, count: None)
-    findings = findings_of(
-        folder, None if compare is None else Path(compare), lambda done: report(done, FINDING_STEPS + 1)
-    )
+    findings = findings_of(folder, compare, lambda done: report(done, FINDING_STEPS + 1))
     text = _rendered(page_of(findings, folder.resolve().name))
     with write_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_number, check_numbers, check_positive
+from tactile_bayes.checks import check_array, check_number, check_numbers, check_positive
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import carried_sweeps
 
@@ -67,13 +67,14 @@ class Carried(ABC):
 
     def side(self, length: float) -> str:
         """Return "forward" if the left side of an unloaded rod of a length leads on average, else "backward"."""
+        check_positive("length", length)
         steps, angle = np.diff(self.poses, axis=0), self.poses[:-1, 2]
         ahead = steps[:, 1] * np.cos(angle) - steps[:, 0] * np.sin(angle) + 0.5 * length * steps[:, 2]
         return "forward" if ahead.sum() >= 0.0 else "backward"
 
     def at(self, travels: ArrayLike) -> Floats:
         """Poses of the base at travels between the first and the last [length and rad], shape (k, 3)."""
-        wanted = np.asarray(travels, dtype=float)
+        wanted = check_array("travels", travels)
         return np.stack([np.interp(wanted, self.travels, column) for column in self.poses.T], axis=-1)
 
 

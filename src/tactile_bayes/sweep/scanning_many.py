@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.checks import check_array, check_choice, check_numbers, check_optional
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
@@ -72,8 +73,8 @@ def scan_many(
     >>> many.sizes["contour"], many.snap_off_drive_angle.values[[0, -1]].round(4)
     (1000, array([3.1218, 3.2172]))
     """
-    if direction not in ("forward", "backward"):
-        raise ParameterError(f"direction is {direction!r}: choose 'forward' or 'backward'")
+    check_choice("direction", direction, ("forward", "backward"))
+    check_optional("rod", rod, Rod)
     if not isinstance(contours, Contour):
         raise ParameterError(
             f"contours is a {type(contours).__name__}: give one contour whose parameters are arrays, as in "
@@ -86,8 +87,8 @@ def scan_many(
         )
     rod, (count,) = rod or Rod(), contours.shape
     try:
-        x, y = (np.broadcast_to(np.asarray(b, dtype=float), (count,)) for b in base)
-        angles = np.asarray(drive_angles, dtype=float)
+        x, y = (np.broadcast_to(check_numbers("base", b), (count,)) for b in base)
+        angles = check_array("drive_angles", drive_angles)
         angles = np.broadcast_to(angles, (count, angles.shape[-1]))
     except (TypeError, ValueError, IndexError) as error:
         raise ParameterError(

@@ -11,7 +11,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from tactile_bayes.checks import check_path
+from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.tasks.files import alone_in, write_atomically
@@ -129,6 +129,7 @@ def keep_outcomes(
     progress : callable, optional
         Called with a `TaskProgress` after each outcome.
     """
+    check_function("progress", progress)
     began = time.monotonic()
     kept = {number: outcome for number, outcome in store.outcomes.items() if number < count}
     tasks = [(task, number) for number in range(count) if number not in kept]

@@ -17,11 +17,11 @@ from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from tactile_bayes.checks import check_whole_number
+from tactile_bayes.checks import check_optional, check_whole_number
 from tactile_bayes.errors import ParameterError, TaskError
 from tactile_bayes.tasks.threads import cores, one_thread
 
-__all__ = ["run_tasks"]
+__all__ = ["check_pool", "run_tasks"]
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -78,8 +78,7 @@ def run_tasks(
     >>> sorted(run_tasks(abs, [-1, 2], workers=1))
     [(-1, 1), (2, 2)]
     """
-    if workers is not None:
-        check_whole_number("workers", workers, 1, "give a positive number")
+    check_pool(workers, scheduler)
     if scheduler is not None:
         yield from _on_cluster(function, tasks, scheduler)
         return
@@ -242,6 +241,13 @@ def _travels(error: Exception) -> bool:
     except Exception:
         return False
     return True
+
+
+def check_pool(workers: Any, scheduler: Any) -> None:
+    """Refuse a number of processes, or the address of a scheduler, that `run_tasks` does not take."""
+    if workers is not None:
+        check_whole_number("workers", workers, 1, "give a positive number")
+    check_optional("scheduler", scheduler, str, "give the address of a Dask scheduler, like 'tcp://10.0.0.1:8786'")
 
 
 # ---- a cluster

@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Flags, Floats
-from tactile_bayes.checks import check_probability
+from tactile_bayes.checks import check_probability, check_whole_number
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.result import contact_draws
 
@@ -103,6 +103,7 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
     """
     check_probability("probability", probability, "give a number between 0 and 1, like 0.9")
     draws = contact_draws(posterior)
+    check_whole_number("sample", sample, 0, "give the number of a sample")
     if sample not in draws["sample"].values:
         low, high = draws["sample"].values.min(), draws["sample"].values.max()
         raise ParameterError(f"there is no sample {sample!r}: the posterior has {low} to {high}")

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_optional, check_probability
+from tactile_bayes.checks import check_function, check_optional, check_probability
 from tactile_bayes.diagnostics.inspection.fit import Fit, fit_of
 from tactile_bayes.diagnostics.inspection.known_cell import known_cell
 from tactile_bayes.diagnostics.inspection.messages import UNFIT, inspection_messages
@@ -146,6 +146,7 @@ def inspect_record(
     """
     check_optional("load_cell", load_cell, LoadCell)
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 0.5, such as 1e-3", below=0.5)
+    check_function("progress", progress)
     record = validate(record)
     report = progress or (lambda done, count: None)
     with warnings.catch_warnings():

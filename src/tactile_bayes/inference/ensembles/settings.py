@@ -88,6 +88,7 @@ class SamplerSettings:
 
     def walkers_for(self, parameters: int) -> int:
         """Return the number of walkers of each ensemble for a target of this many parameters."""
+        check_whole_number("parameters", parameters, 1)
         if self.walkers is None:
             return max(48, 6 * parameters)
         refuse_few_walkers(self.walkers, parameters)

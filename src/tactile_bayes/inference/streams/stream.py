@@ -16,7 +16,15 @@ from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_function, check_numbers, check_path, check_whole_number
+from tactile_bayes.checks import (
+    check_function,
+    check_names,
+    check_numbers,
+    check_optional,
+    check_path,
+    check_whole_number,
+)
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
 from tactile_bayes.inference.contour_model import ContourModel
@@ -35,6 +43,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import carried_sweeps, validate
 from tactile_bayes.record.netcdf import write_netcdf
+from tactile_bayes.sweep.path import friction_angle_of
 
 __all__ = ["LEVELS", "Stream", "surprise_after"]
 
@@ -128,6 +137,12 @@ class Stream:
     ) -> None:
         check_whole_number("particles", particles, 100, "give a whole number of at least 100", most=10**7)
         check_function("stop", stop)
+        family_named(family)
+        check_optional("load_cell", load_cell, LoadCell)
+        check_optional("rod", rod, Rod)
+        friction_angle_of(0.0 if friction is None else friction)
+        check_names("nuisances", nuisances)
+        check_priors("priors", {} if priors is None else priors)
         self._x = None if x is None else check_numbers("x", x, "give a list of finite numbers", shape=(None,))
         given = {} if priors is None else priors
         check_priors("priors", given)
@@ -363,6 +378,7 @@ class Stream:
         InferenceError
             Before the first update.
         """
+        check_whole_number("count", count, 1)
         state = self._known_state()
         picked = resampled(np.exp(state.log_weights), count, self._random(2, state.updates))
         return state.points[picked, : len(state.experiment.model.family.parameters)]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_number, check_positive
+from tactile_bayes.checks import check_array, check_number, check_positive
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.rods.along import MISS, Along, along
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER, Profile, Rods, profile_of
@@ -264,6 +264,8 @@ class Rod:
         """
         from tactile_bayes.mechanics.rods.traced import traced_rod
 
+        check_number("diameter", diameter, "give zero or a positive number, in the unit of the points", least=0.0)
+        check_number("stem", stem, "give a length from 0, for none, in the unit of the points", least=0.0)
         traced = traced_rod(x, y, scatter=scatter, length=length)
         whole, rigidity = (1.0, 1.0) if flexural_rigidity is None else (traced.length, flexural_rigidity)
         s = np.linspace(0.0, 1.0, _POINTS)
@@ -287,7 +289,7 @@ class Rod:
 
     def mirrored(self, side: ArrayLike) -> Rods:
         """Return the rods of contacts with the sides +1, or −1 where they are mirrored, shape (n,)."""
-        side = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
+        side = np.where(check_array("side", side) < 0.0, -1.0, 1.0)
         curvature = side * self.arc_curvature if self.profile is None else side
         return Rods(curvature, self.profile, self.stem / self.length)
 
