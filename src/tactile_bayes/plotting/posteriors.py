@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["pairs", "trace"]
 
 _CHAINS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-_MOST_DRAWS = 2000
+_MOST_DRAWS = 500
 _INTERVAL = 0.95
 _REGIONS = (0.95, 0.5)
 _ROWS = "rows are parameters"
@@ -44,7 +44,7 @@ def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = 
     Returns
     -------
     ndarray of Axes, shape (parameters, 2)
-        The left Axes hold the draws in their order, thinned to at most 2000 a chain; the right ones a histogram for
+        The left Axes hold the draws in their order, thinned to at most 500 a chain; the right ones a histogram for
         each chain.
 
     Raises

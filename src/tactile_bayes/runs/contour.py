@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes import plotting
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
@@ -40,6 +41,9 @@ from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 __all__ = ["ContourRun", "RunFolder", "analyse", "complete", "file_of", "origin_of"]
 
 _POSTERIOR = "posterior.nc"
+
+_MOST_PARAMETERS = 6
+"""Largest number of parameters in a figure, unless a contour has more."""
 
 
 @dataclass(frozen=True)
@@ -238,7 +242,7 @@ def _written(
 
     write_summary()
     before = len(folder.left_out)
-    _draw(_Figures(measured, result, contacts, band, edges, truth), folder)
+    _draw(_Figures(measured, result, contacts, band, edges, numbers, truth), folder)
     if len(folder.left_out) > before:
         write_summary()
     return ContourRun(result, contacts, band, numbers, (*found, *folder.messages), folder.files, folder.left_out)
@@ -278,6 +282,7 @@ class _Figures:
     contacts: xr.Dataset | None
     band: xr.Dataset | None
     edges: xr.Dataset | None
+    numbers: xr.Dataset
     truth: Contour | None
 
     @cached_property
@@ -289,6 +294,11 @@ class _Figures:
         """Parameters that have a meaning by themselves."""
         mute = family_named(self.result.attrs["family"]).roughness
         return [str(name) for name in self.draws.data_vars if name not in mute]
+
+    @cached_property
+    def of_contour(self) -> list[str]:
+        """Those of them that are the contour's."""
+        return [name for name in family_named(self.result.attrs["family"]).parameters if name in self.names]
 
     @cached_property
     def directions(self) -> list[Literal["forward", "backward"]]:
@@ -356,10 +366,33 @@ class _Figures:
         return plotting.gap(self.edges, truth=self.truth, ax=panels(1, 1, 7.0, 3.6)[0, 0])
 
     def trace(self) -> Any:
-        axes = panels(len(self.names), 2, 7.0, 1.6 * len(self.names))
-        return plotting.trace(self.result, names=self.names, axes=axes)
+        """Return the traces of the contour's parameters, and of those with the fewest effective draws."""
+        draws = self.numbers["ess_bulk"].sel(quantity=self.names).values
+        names = self._with_the_contour(draws)
+        margins = {"left": 0.13, "right": 0.98, "bottom": 0.1, "top": 0.98, "hspace": 0.5, "wspace": 0.1}
+        axes = _plain_panels(len(names), 2, 7.0, 0.6 + 1.1 * len(names), width_ratios=(2.0, 1.0), **margins)
+        return plotting.trace(self.result, names=names, axes=axes)
 
     def pairs(self) -> Any:
-        count = len(self.names)
-        axes = panels(count, count, 1.6 * count + 0.6, 1.6 * count + 0.6)
-        return plotting.pairs(self.result, names=self.names, axes=axes)
+        """Return the marginals of the contour's parameters, and of those most correlated with them."""
+        found = np.stack([self.draws[name].values.ravel() for name in self.names])
+        shape = [self.names.index(name) for name in self.of_contour]
+        with np.errstate(invalid="ignore"):
+            alike = np.abs(np.atleast_2d(np.corrcoef(found))[shape]).max(axis=0)
+        names = self._with_the_contour(-np.nan_to_num(alike))
+        margins = {"left": 0.14, "right": 0.98, "bottom": 0.14, "top": 0.98, "hspace": 0.08, "wspace": 0.08}
+        axes = _plain_panels(len(names), len(names), 7.0, 7.0, **margins)
+        return plotting.pairs(self.result, names=names, axes=axes)
+
+    def _with_the_contour(self, rank: Floats) -> list[str]:
+        """Return the contour's parameters, and those of least rank among the others, in their order."""
+        others = [self.names[k] for k in np.argsort(rank, kind="stable") if self.names[k] not in self.of_contour]
+        chosen = {*self.of_contour, *others[: max(0, _MOST_PARAMETERS - len(self.of_contour))]}
+        return [name for name in self.names if name in chosen]
+
+
+def _plain_panels(rows: int, columns: int, width: float, height: float, **grid: Any) -> Any:
+    """Return Axes of a new figure with margins that are given: to fit those of many Axes takes longer than to draw."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height)).subplots(rows, columns, squeeze=False, gridspec_kw=grid)
