@@ -1,6 +1,6 @@
 """Every writer under faults of the system: nothing is lost, nothing is half, and a rerun makes up for it.
 
-Each call by which a writer changes files fails once (no space, a fault of the disk, no right), or its process is killed.
+Each call that changes files fails once (no space, a fault of the disk, no right), or the process is killed there.
 After an error the files are the old ones or the new ones, and no temporary file is left; after a kill old and new
 files are never side by side, and without the first of its names a folder shows that it is not complete.
 """

@@ -369,9 +369,10 @@ class _Figures:
         """Return the traces of the contour's parameters, and of those with the fewest effective draws."""
         draws = self.numbers["ess_bulk"].sel(quantity=self.names).values
         names = self._with_the_contour(draws)
-        margins = {"left": 0.13, "right": 0.98, "bottom": 0.1, "top": 0.98, "hspace": 0.5, "wspace": 0.1}
-        axes = _plain_panels(len(names), 2, 7.0, 0.6 + 1.1 * len(names), width_ratios=(2.0, 1.0), **margins)
-        return plotting.trace(self.result, names=names, axes=axes)
+        axes = _plain_panels(len(names), 2, 7.5, 1.25 * len(names), 0.85, hspace=0.75, width_ratios=(2.0, 1.0))
+        plotting.trace(self.result, names=names, axes=axes)
+        axes[0, 0].figure.align_ylabels(list(axes[:, 0]))
+        return axes
 
     def pairs(self) -> Any:
         """Return the marginals of the contour's parameters, and of those most correlated with them."""
@@ -380,9 +381,11 @@ class _Figures:
         with np.errstate(invalid="ignore"):
             alike = np.abs(np.atleast_2d(np.corrcoef(found))[shape]).max(axis=0)
         names = self._with_the_contour(-np.nan_to_num(alike))
-        margins = {"left": 0.14, "right": 0.98, "bottom": 0.14, "top": 0.98, "hspace": 0.08, "wspace": 0.08}
-        axes = _plain_panels(len(names), len(names), 7.0, 7.0, **margins)
-        return plotting.pairs(self.result, names=names, axes=axes)
+        side = 1.5 + 1.15 * len(names)
+        axes = _plain_panels(len(names), len(names), side, side, 1.35, hspace=0.08, wspace=0.08)
+        plotting.pairs(self.result, names=names, axes=axes)
+        axes[0, 0].figure.align_labels(list(axes[:, 0]) + list(axes[-1]))
+        return axes
 
     def _with_the_contour(self, rank: Floats) -> list[str]:
         """Return the contour's parameters, and those of least rank among the others, in their order."""
@@ -391,8 +394,9 @@ class _Figures:
         return [name for name in self.names if name in chosen]
 
 
-def _plain_panels(rows: int, columns: int, width: float, height: float, **grid: Any) -> Any:
-    """Return Axes of a new figure with margins that are given: to fit those of many Axes takes longer than to draw."""
+def _plain_panels(rows: int, columns: int, width: float, height: float, below: float, **grid: Any) -> Any:
+    """Return Axes of a new figure with given margins [inches]: to fit those of many Axes takes longer than to draw."""
     from matplotlib.figure import Figure
 
+    grid |= {"left": 1.35 / width, "right": 1.0 - 0.15 / width, "bottom": below / height, "top": 1.0 - 0.1 / height}
     return Figure(figsize=(width, height)).subplots(rows, columns, squeeze=False, gridspec_kw=grid)

@@ -76,7 +76,8 @@ def replace_together(folder: Path, names: Sequence[str]) -> Iterator[Path]:
     Names of which the block writes no file are removed from `folder`. If the block raises, or a file cannot be
     replaced, `folder` stays as it was. While the files are moved there are never old ones beside new ones: the old ones
     go first, and the first name is the first to go and the last to come. A single new file that is not the first
-    replaces the old one at once. So a folder in which a process was killed holds the old files, or the new ones, or lacks the first name.
+    replaces the old one at once. So a folder in which a process was killed holds the old files, or the new ones, or
+    lacks the first name.
 
     Parameters
     ----------
