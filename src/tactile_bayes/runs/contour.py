@@ -104,12 +104,15 @@ class RunFolder(Folder):
     @property
     def messages(self) -> tuple[str, ...]:
         """A message for each part that is left out."""
-        return tuple(
-            f"Left out: {what}. {error}"
-            if isinstance(error, TactileBayesError)
-            else f"Left out: {what}. Unexpected error, {type(error).__name__}: {str(error) or 'no message'}"
-            for what, error in self.left_out.items()
-        )
+        return tuple(f"Left out: {what}. {_said(error)}" for what, error in self.left_out.items())
+
+
+def _said(error: Exception) -> str:
+    if isinstance(error, TactileBayesError):
+        return str(error)
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return f"Unexpected error, {type(error).__name__}: {str(error) or 'no message'}"
 
 
 def analyse(
@@ -325,11 +328,11 @@ class _Figures:
         return scan(contour, direction=direction, base=self.base, rod=rod, friction=friction)
 
     def observables(self) -> Any:
-        axes = panels(3, 1, 7.0, 5.4, sharex=True)
+        axes = _plain_panels(3, 1, 7.0, 5.4, 0.55, above=0.75, sharex=True, hspace=0.12)
         return plotting.observables(self.measured, events=self.fitted.events, axes=axes[:, 0])
 
     def predictive(self) -> Any:
-        axes = panels(6, 1, 7.0, 8.4, sharex=True, height_ratios=3 * (2.0, 1.0))
+        axes = _plain_panels(6, 1, 7.0, 8.4, 0.55, above=0.75, sharex=True, hspace=0.14, height_ratios=3 * (2.0, 1.0))
         probability = float(self.result.attrs["probability"])
         interval = predictive_interval(self.result, probability)
         label = f"{100 * probability:.6g} % predictive"
@@ -394,9 +397,19 @@ class _Figures:
         return [name for name in self.names if name in chosen]
 
 
-def _plain_panels(rows: int, columns: int, width: float, height: float, below: float, **grid: Any) -> Any:
+def _plain_panels(
+    rows: int,
+    columns: int,
+    width: float,
+    height: float,
+    below: float,
+    *,
+    above: float = 0.1,
+    sharex: bool = False,
+    **grid: Any,
+) -> Any:
     """Return Axes of a new figure with given margins [inches]: to fit those of many Axes takes longer than to draw."""
     from matplotlib.figure import Figure
 
-    grid |= {"left": 1.35 / width, "right": 1.0 - 0.15 / width, "bottom": below / height, "top": 1.0 - 0.1 / height}
-    return Figure(figsize=(width, height)).subplots(rows, columns, squeeze=False, gridspec_kw=grid)
+    grid |= {"left": 1.35 / width, "right": 1.0 - 0.15 / width, "bottom": below / height, "top": 1.0 - above / height}
+    return Figure(figsize=(width, height)).subplots(rows, columns, squeeze=False, sharex=sharex, gridspec_kw=grid)

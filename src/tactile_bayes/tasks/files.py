@@ -16,7 +16,7 @@ from pathlib import Path
 
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["alone_in", "is_temporary", "refuse_replacing", "replace_together", "write_atomically"]
+__all__ = ["alone_in", "errors_of", "is_temporary", "refuse_replacing", "replace_together", "write_atomically"]
 
 _HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 _TEMPORARY = re.compile(r"\.tactile-bayes-(?P<host>[0-9a-f]{8})-[0-9a-f]{16}\.tmp")
@@ -156,9 +156,15 @@ def _beside(parent: Path, target: Path) -> Iterator[Path]:
     if not parent.is_dir():  # else the refusal would name the temporary file
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(parent))
     _remove_leftovers(parent)
+    with errors_of(target), _hidden_folder(parent) as folder:
+        yield folder
+
+
+@contextmanager
+def errors_of(target: Path) -> Iterator[None]:
+    """Have errors of the system in a block, which name no file or a temporary one, name the file that is written."""
     try:
-        with _hidden_folder(parent) as folder:
-            yield folder
+        yield
     except OSError as error:
         if error.errno is None or not (error.filename is None or _in_hidden_folder(error.filename)):
             raise
