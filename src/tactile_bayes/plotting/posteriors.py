@@ -110,6 +110,7 @@ def pairs(
         True values by name of the parameter, in its unit; drawn as dashed lines.
     axes : array_like of Axes, shape (parameters, parameters), optional
         One for each pair of parameters; a variable with further dimensions is one parameter for each of its elements.
+        Above the diagonal None will do.
 
     Returns
     -------
@@ -145,7 +146,8 @@ def pairs(
     for row, column in np.ndindex(size, size):
         ax: Axes = grid.item(row, column)
         if column > row:
-            ax.set_axis_off()
+            if ax is not None:
+                ax.set_axis_off()
             continue
         across = parameters[column]
         if row == column:

@@ -42,7 +42,7 @@ __all__ = ["ContourRun", "RunFolder", "analyse", "complete", "file_of", "origin_
 
 _POSTERIOR = "posterior.nc"
 
-_MOST_PARAMETERS = 6
+_MOST_PARAMETERS = 5
 """Largest number of parameters in a figure, unless a contour has more."""
 
 
@@ -328,11 +328,15 @@ class _Figures:
         return scan(contour, direction=direction, base=self.base, rod=rod, friction=friction)
 
     def observables(self) -> Any:
-        axes = _plain_panels(3, 1, 7.0, 5.4, 0.55, above=0.75, sharex=True, hspace=0.12)
-        return plotting.observables(self.measured, events=self.fitted.events, axes=axes[:, 0])
+        axes = _plain_panels(3, 1, 7.0, 5.4, 0.55, above=0.65, left=0.95, hspace=0.12)
+        _share_x(axes)
+        plotting.observables(self.measured, events=self.fitted.events, axes=axes[:, 0])
+        axes[0, 0].figure.align_ylabels(axes[:, 0])
+        return axes
 
     def predictive(self) -> Any:
-        axes = _plain_panels(6, 1, 7.0, 8.4, 0.55, above=0.75, sharex=True, hspace=0.14, height_ratios=3 * (2.0, 1.0))
+        axes = _plain_panels(6, 1, 7.0, 8.4, 0.55, above=0.65, left=0.95, hspace=0.14, height_ratios=3 * (2.0, 1.0))
+        _share_x(axes)
         probability = float(self.result.attrs["probability"])
         interval = predictive_interval(self.result, probability)
         label = f"{100 * probability:.6g} % predictive"
@@ -385,7 +389,7 @@ class _Figures:
             alike = np.abs(np.atleast_2d(np.corrcoef(found))[shape]).max(axis=0)
         names = self._with_the_contour(-np.nan_to_num(alike))
         side = 1.5 + 1.15 * len(names)
-        axes = _plain_panels(len(names), len(names), side, side, 1.35, hspace=0.08, wspace=0.08)
+        axes = _plain_panels(len(names), len(names), side, side, 1.35, lower=True, hspace=0.08, wspace=0.08)
         plotting.pairs(self.result, names=names, axes=axes)
         axes[0, 0].figure.align_labels(list(axes[:, 0]) + list(axes[-1]))
         return axes
@@ -397,6 +401,13 @@ class _Figures:
         return [name for name in self.names if name in chosen]
 
 
+def _share_x(axes: Any) -> None:
+    """Give Axes in one column the scale of the last one, which alone has labels."""
+    for ax in axes[:-1, 0]:
+        ax.sharex(axes[-1, 0])
+        ax.tick_params(labelbottom=False)
+
+
 def _plain_panels(
     rows: int,
     columns: int,
@@ -405,11 +416,20 @@ def _plain_panels(
     below: float,
     *,
     above: float = 0.1,
-    sharex: bool = False,
+    left: float = 1.35,
+    lower: bool = False,
     **grid: Any,
 ) -> Any:
-    """Return Axes of a new figure with given margins [inches]: to fit those of many Axes takes longer than to draw."""
+    """Return Axes of a new figure with given margins [inches]: to fit those of many Axes takes longer than to draw.
+
+    With `lower` there are none above the diagonal.
+    """
     from matplotlib.figure import Figure
 
-    grid |= {"left": 1.35 / width, "right": 1.0 - 0.15 / width, "bottom": below / height, "top": 1.0 - above / height}
-    return Figure(figsize=(width, height)).subplots(rows, columns, squeeze=False, sharex=sharex, gridspec_kw=grid)
+    grid |= {"left": left / width, "right": 1.0 - 0.15 / width, "bottom": below / height, "top": 1.0 - above / height}
+    figure = Figure(figsize=(width, height))
+    places, axes = figure.add_gridspec(rows, columns, **grid), np.full((rows, columns), None)
+    for row, column in np.ndindex(rows, columns):
+        if not (lower and column > row):
+            axes[row, column] = figure.add_subplot(places[row, column])
+    return axes
