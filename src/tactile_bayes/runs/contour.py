@@ -328,14 +328,14 @@ class _Figures:
         return scan(contour, direction=direction, base=self.base, rod=rod, friction=friction)
 
     def observables(self) -> Any:
-        axes = _plain_panels(3, 1, 7.0, 5.4, 0.55, above=0.65, left=0.95, hspace=0.12)
+        axes = _plain_panels(3, 1, 7.0, 5.4, 0.55, above=0.65, left=1.1, hspace=0.12)
         _share_x(axes)
         plotting.observables(self.measured, events=self.fitted.events, axes=axes[:, 0])
         axes[0, 0].figure.align_ylabels(axes[:, 0])
         return axes
 
     def predictive(self) -> Any:
-        axes = _plain_panels(6, 1, 7.0, 8.4, 0.55, above=0.65, left=0.95, hspace=0.14, height_ratios=3 * (2.0, 1.0))
+        axes = _plain_panels(6, 1, 7.0, 8.4, 0.55, above=0.65, left=1.1, hspace=0.14, height_ratios=3 * (2.0, 1.0))
         _share_x(axes)
         probability = float(self.result.attrs["probability"])
         interval = predictive_interval(self.result, probability)
