@@ -77,3 +77,38 @@ def test_a_figure_of_pyplot_is_closed(tmp_path):
     with Folder(tmp_path, NAMES) as folder:
         folder.draw("figure", "figure.png", lambda: plt.subplots(figsize=(1.0, 1.0))[1])
     assert plt.get_fignums() == before
+
+
+ODD = {
+    "LaTeX": {"text.usetex": True},
+    "numbers": {"axes.formatter.use_locale": True, "axes.unicode_minus": False, "axes.formatter.limits": [0, 0]},
+    "letters": {"font.family": ["NoSuchFont"], "font.size": 30.0},
+    "layout": {"figure.constrained_layout.use": True, "figure.dpi": 30.0, "savefig.bbox": "tight", "savefig.dpi": 20.0},
+    "colours": {"axes.facecolor": "black", "text.color": "white", "savefig.transparent": True},
+    "lines": {"path.sketch": (3.0, 100.0, 2.0), "lines.linewidth": 9.0},
+    "format": {"savefig.format": "pdf", "timezone": "Asia/Tokyo"},
+}
+
+
+def axes():
+    ax = panels(1, 1, 2.0, 1.5)[0, 0]
+    ax.plot([-1e5, 1e5], [-1.0, 1.0])
+    ax.set_xlabel("$x$ − y")
+    return ax
+
+
+def drawn(folder):
+    with Folder(folder, NAMES) as results:
+        results.draw("figure", "figure.png", axes)
+    return results.files["figure"].read_bytes()
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_settings_of_the_user_do_not_change_a_figure(tmp_path, odd):
+    import matplotlib as mpl
+
+    expected = drawn(tmp_path / "usual")
+    with mpl.rc_context(ODD[odd]):
+        before = mpl.rcParams.copy()
+        assert drawn(tmp_path / "odd") == expected
+        assert mpl.rcParams == before

@@ -26,6 +26,7 @@ from tactile_bayes.cli.sensitivity import sensitivity
 from tactile_bayes.cli.streams import accept_every_text
 from tactile_bayes.cli.trust import trust
 from tactile_bayes.cli.watching import watch
+from tactile_bayes.matplotlib_defaults import ignore_user_settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -142,6 +143,7 @@ app.add_typer(dataset, name="dataset")
 def main() -> None:
     """Run the command line."""
     os.environ["MPLBACKEND"] = "agg"  # figures go to files, also without a screen
+    ignore_user_settings()
     accept_every_text()
     app()
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["pairs", "trace"]
 
 _CHAINS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-_MOST_DRAWS = 2000
+_MOST_DRAWS = 500
 _INTERVAL = 0.95
 _REGIONS = (0.95, 0.5)
 _ROWS = "rows are parameters"
@@ -45,7 +45,7 @@ def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = 
     Returns
     -------
     ndarray of Axes, shape (parameters, 2)
-        The left Axes hold the draws in their order, thinned to at most 2000 a chain; the right ones a histogram for
+        The left Axes hold the draws in their order, thinned to at most 500 a chain; the right ones a histogram for
         each chain.
 
     Raises
@@ -111,6 +111,7 @@ def pairs(
         True values by name of the parameter, in its unit; drawn as dashed lines.
     axes : array_like of Axes, shape (parameters, parameters), optional
         One for each pair of parameters; a variable with further dimensions is one parameter for each of its elements.
+        Above the diagonal None will do.
 
     Returns
     -------
@@ -147,7 +148,8 @@ def pairs(
     for row, column in np.ndindex(size, size):
         ax: Axes = grid.item(row, column)
         if column > row:
-            ax.set_axis_off()
+            if ax is not None:
+                ax.set_axis_off()
             continue
         across = parameters[column]
         if row == column:

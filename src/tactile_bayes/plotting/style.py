@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Mapping
-from contextlib import chdir, contextmanager
-from importlib.util import find_spec
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -103,28 +102,12 @@ def style(name: Style = "print") -> Iterator[None]:
 
 @contextmanager
 def own_style(name: Style = "screen") -> Iterator[None]:
-    """Give figures of commands one look, whatever the user's settings of Matplotlib are, even if they cannot be read.
-
-    They are restored after it.
-    """
-    _import_matplotlib()
+    """Give figures of commands one look, whatever the user's settings of Matplotlib are; they are restored after it."""
     import matplotlib as mpl
 
     settings: Any = {key: value for key, value in mpl.rcParamsDefault.items() if key != "backend"}
     with mpl.rc_context(settings), style(name):
         yield
-
-
-def _import_matplotlib() -> None:
-    """Import Matplotlib; if it fails over a file of settings, do so where its own file of defaults is found first."""
-    try:
-        import matplotlib
-    except (OSError, ValueError):
-        spec = find_spec("matplotlib")
-        assert spec is not None
-        assert spec.origin is not None
-        with chdir(Path(spec.origin).parent / "mpl-data"):
-            import matplotlib  # noqa: F401
 
 
 def save_figure(figure: Figure, path: Path, form: str, **options: Any) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes import plotting
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
@@ -41,6 +42,9 @@ from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 __all__ = ["ContourRun", "RunFolder", "analyse", "complete", "file_of", "origin_of"]
 
 _POSTERIOR = "posterior.nc"
+
+_MOST_PARAMETERS = 5
+"""Largest number of parameters in a figure, unless a contour has more."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +105,15 @@ class RunFolder(Folder):
     @property
     def messages(self) -> tuple[str, ...]:
         """A message for each part that is left out."""
-        return tuple(
-            f"Left out: {what}. {error}"
-            if isinstance(error, TactileBayesError)
-            else f"Left out: {what}. Unexpected error, {type(error).__name__}: {str(error) or 'no message'}"
-            for what, error in self.left_out.items()
-        )
+        return tuple(f"Left out: {what}. {_said(error)}" for what, error in self.left_out.items())
+
+
+def _said(error: Exception) -> str:
+    if isinstance(error, TactileBayesError):
+        return str(error)
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return f"Unexpected error, {type(error).__name__}: {str(error) or 'no message'}"
 
 
 def analyse(
@@ -239,7 +246,7 @@ def _written(
 
     write_summary()
     before = len(folder.left_out)
-    _draw(_Figures(measured, result, contacts, band, edges, truth), folder)
+    _draw(_Figures(measured, result, contacts, band, edges, numbers, truth), folder)
     if len(folder.left_out) > before:
         write_summary()
     return ContourRun(result, contacts, band, numbers, (*found, *folder.messages), folder.files, folder.left_out)
@@ -279,6 +286,7 @@ class _Figures:
     contacts: xr.Dataset | None
     band: xr.Dataset | None
     edges: xr.Dataset | None
+    numbers: xr.Dataset
     truth: Contour | None
 
     @cached_property
@@ -290,6 +298,11 @@ class _Figures:
         """Parameters that have a meaning by themselves."""
         mute = family_named(self.result.attrs["family"]).roughness
         return [str(name) for name in self.draws.data_vars if name not in mute]
+
+    @cached_property
+    def of_contour(self) -> list[str]:
+        """Those of them that are the contour's."""
+        return [name for name in family_named(self.result.attrs["family"]).parameters if name in self.names]
 
     @cached_property
     def directions(self) -> list[Literal["forward", "backward"]]:
@@ -316,11 +329,15 @@ class _Figures:
         return scan(contour, direction=direction, base=self.base, rod=rod, friction=friction)
 
     def observables(self) -> Any:
-        axes = panels(3, 1, 7.0, 5.4, sharex=True)
-        return plotting.observables(self.measured, events=self.fitted.events, axes=axes[:, 0])
+        axes = _plain_panels(3, 1, 7.0, 5.4, 0.55, above=0.65, left=1.1, hspace=0.12)
+        _share_x(axes)
+        plotting.observables(self.measured, events=self.fitted.events, axes=axes[:, 0])
+        axes[0, 0].figure.align_ylabels(axes[:, 0])
+        return axes
 
     def predictive(self) -> Any:
-        axes = panels(6, 1, 7.0, 8.4, sharex=True, height_ratios=3 * (2.0, 1.0))
+        axes = _plain_panels(6, 1, 7.0, 8.4, 0.55, above=0.65, left=1.1, hspace=0.14, height_ratios=3 * (2.0, 1.0))
+        _share_x(axes)
         probability = float(self.result.attrs["probability"])
         interval = predictive_interval(self.result, probability)
         label = f"{100 * probability:.6g} % predictive"
@@ -357,10 +374,63 @@ class _Figures:
         return plotting.gap(self.edges, truth=self.truth, ax=panels(1, 1, 7.0, 3.6)[0, 0])
 
     def trace(self) -> Any:
-        axes = panels(len(self.names), 2, 7.0, 1.6 * len(self.names))
-        return plotting.trace(self.result, names=self.names, axes=axes)
+        """Return the traces of the contour's parameters, and of those with the fewest effective draws."""
+        draws = self.numbers["ess_bulk"].sel(quantity=self.names).values
+        names = self._with_the_contour(draws)
+        axes = _plain_panels(len(names), 2, 7.5, 1.25 * len(names), 0.85, hspace=0.75, width_ratios=(2.0, 1.0))
+        plotting.trace(self.result, names=names, axes=axes)
+        axes[0, 0].figure.align_ylabels(list(axes[:, 0]))
+        return axes
 
     def pairs(self) -> Any:
-        count = len(self.names)
-        axes = panels(count, count, 1.6 * count + 0.6, 1.6 * count + 0.6)
-        return plotting.pairs(self.result, names=self.names, axes=axes)
+        """Return the marginals of the contour's parameters, and of those most correlated with them."""
+        found = np.stack([self.draws[name].values.ravel() for name in self.names])
+        shape = [self.names.index(name) for name in self.of_contour]
+        with np.errstate(invalid="ignore"):
+            alike = np.abs(np.atleast_2d(np.corrcoef(found))[shape]).max(axis=0)
+        names = self._with_the_contour(-np.nan_to_num(alike))
+        side = 1.5 + 1.15 * len(names)
+        axes = _plain_panels(len(names), len(names), side, side, 1.35, lower=True, hspace=0.08, wspace=0.08)
+        plotting.pairs(self.result, names=names, axes=axes)
+        axes[0, 0].figure.align_labels(list(axes[:, 0]) + list(axes[-1]))
+        return axes
+
+    def _with_the_contour(self, rank: Floats) -> list[str]:
+        """Return the contour's parameters, and those of least rank among the others, in their order."""
+        others = [self.names[k] for k in np.argsort(rank, kind="stable") if self.names[k] not in self.of_contour]
+        chosen = {*self.of_contour, *others[: max(0, _MOST_PARAMETERS - len(self.of_contour))]}
+        return [name for name in self.names if name in chosen]
+
+
+def _share_x(axes: Any) -> None:
+    """Give Axes in one column the scale of the last one, which alone has labels."""
+    for ax in axes[:-1, 0]:
+        ax.sharex(axes[-1, 0])
+        ax.tick_params(labelbottom=False)
+
+
+def _plain_panels(
+    rows: int,
+    columns: int,
+    width: float,
+    height: float,
+    below: float,
+    *,
+    above: float = 0.1,
+    left: float = 1.35,
+    lower: bool = False,
+    **grid: Any,
+) -> Any:
+    """Return Axes of a new figure with given margins [inches]: to fit those of many Axes takes longer than to draw.
+
+    With `lower` there are none above the diagonal.
+    """
+    from matplotlib.figure import Figure
+
+    grid |= {"left": left / width, "right": 1.0 - 0.15 / width, "bottom": below / height, "top": 1.0 - above / height}
+    figure = Figure(figsize=(width, height))
+    places, axes = figure.add_gridspec(rows, columns, **grid), np.full((rows, columns), None)
+    for row, column in np.ndindex(rows, columns):
+        if not (lower and column > row):
+            axes[row, column] = figure.add_subplot(places[row, column])
+    return axes

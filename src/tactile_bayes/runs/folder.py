@@ -15,7 +15,7 @@ import xarray as xr
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.plotting.style import own_style, save_figure
 from tactile_bayes.record.netcdf import write_netcdf
-from tactile_bayes.tasks import replace_together
+from tactile_bayes.tasks import errors_of, replace_together
 
 __all__ = ["Folder", "Run", "panels", "posterior_in"]
 
@@ -81,7 +81,8 @@ class Folder:
         """Yield a temporary path to write to; the file is listed once the block has succeeded."""
         if name not in self.names:
             raise ValueError(f"{name} is not among the files of this folder: {', '.join(self.names)}")
-        yield self._new / name
+        with errors_of(self.path / name):
+            yield self._new / name
         self.files[what] = self.path / name
 
     def write_lines(self, what: str, name: str, lines: Iterable[str]) -> None:

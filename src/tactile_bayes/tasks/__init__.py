@@ -1,6 +1,13 @@
 """Independent tasks, here or on a Dask cluster; the results store, from which a stopped run resumes; atomic files."""
 
-from tactile_bayes.tasks.files import alone_in, is_temporary, refuse_replacing, replace_together, write_atomically
+from tactile_bayes.tasks.files import (
+    alone_in,
+    errors_of,
+    is_temporary,
+    refuse_replacing,
+    replace_together,
+    write_atomically,
+)
 from tactile_bayes.tasks.results_store import Kind, ResultsStore, TaskProgress, keep_outcomes, open_results_store
 from tactile_bayes.tasks.threads import in_parts, one_thread
 from tactile_bayes.tasks.workers import run_tasks
@@ -10,6 +17,7 @@ __all__ = [
     "ResultsStore",
     "TaskProgress",
     "alone_in",
+    "errors_of",
     "in_parts",
     "is_temporary",
     "keep_outcomes",

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["alone_in", "is_temporary", "refuse_replacing", "replace_together", "write_atomically"]
+__all__ = ["alone_in", "errors_of", "is_temporary", "refuse_replacing", "replace_together", "write_atomically"]
 
 _HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 _TEMPORARY = re.compile(r"\.tactile-bayes-(?P<host>[0-9a-f]{8})-[0-9a-f]{16}\.tmp")
@@ -75,8 +75,9 @@ def replace_together(folder: Path, names: Sequence[str]) -> Iterator[Path]:
 
     Names of which the block writes no file are removed from `folder`. If the block raises, or a file cannot be
     replaced, `folder` stays as it was. While the files are moved there are never old ones beside new ones: the old ones
-    go first, and the first name is the first to go and the last to come. A single new file replaces the old one at
-    once. So a folder in which a process was killed holds the old files, or the new ones, or lacks the first name.
+    go first, and the first name is the first to go and the last to come. A single new file that is not the first
+    replaces the old one at once. So a folder in which a process was killed holds the old files, or the new ones, or
+    lacks the first name.
 
     Parameters
     ----------
@@ -103,11 +104,10 @@ def _exchange(folder: Path, temporary: Path, names: Sequence[str], new: Sequence
     """Move the files of these names away, then the new ones to their places; undo all of it if a step fails."""
     former = temporary / secrets.token_hex(8)
     former.mkdir()
-    away = [
-        (folder / name, former / str(number))
-        for number, name in enumerate(names)
-        if os.path.lexists(folder / name) and [name] != new
-    ]
+    old = [name for name in names if os.path.lexists(folder / name)]
+    at_once = len(new) == 1 and (new[0] != names[0] or set(old) <= set(new))
+    gone = [name for name in old if not (at_once and name in new)]
+    away = [(folder / name, former / str(number)) for number, name in enumerate(gone)]
     if folders := [path for path in (folder / name for name in names) if path.is_dir()]:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folders[0]))
     moved = list[tuple[Path, Path]]()
@@ -156,9 +156,15 @@ def _beside(parent: Path, target: Path) -> Iterator[Path]:
     if not parent.is_dir():  # else the refusal would name the temporary file
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(parent))
     _remove_leftovers(parent)
+    with errors_of(target), _hidden_folder(parent) as folder:
+        yield folder
+
+
+@contextmanager
+def errors_of(target: Path) -> Iterator[None]:
+    """Have errors of the system in a block, which name no file or a temporary one, name the file that is written."""
     try:
-        with _hidden_folder(parent) as folder:
-            yield folder
+        yield
     except OSError as error:
         if error.errno is None or not (error.filename is None or _in_hidden_folder(error.filename)):
             raise

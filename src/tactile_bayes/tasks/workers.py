@@ -19,6 +19,7 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.checks import check_optional, check_whole_number
 from tactile_bayes.errors import ParameterError, TaskError
+from tactile_bayes.matplotlib_defaults import ignore_user_settings
 from tactile_bayes.tasks.threads import cores, one_thread
 
 __all__ = ["check_pool", "run_tasks"]
@@ -208,6 +209,7 @@ def _termination_held() -> Iterator[None]:
 
 def _work(function: Callable[[Any], Any], connection: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_user_settings()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         connection.send((True, None))
