@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.csv_end import without_cut_row
 from tactile_bayes.record.csv_header import (
     FORMAT,
     KINDS,
@@ -106,6 +107,7 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     for name in unnamed:
         described[name] = "text"
     layout = Layout(places, header.delimiter, last, meant, described)
+    text, note = without_cut_row(text, header, last)
     values, lines = read_rows(text, layout, Source(called))
     for name, place in unnamed.items():
         _refuse_content(values.pop(name), place, lines, header.line, source)
@@ -114,11 +116,16 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     }
     for name, unit in units.items():
         attrs[name]["units"] = unit
-    return Table(
-        {name: (array, attrs[name]) for name, array in values.items()},
-        header.attrs,
-        Source(called, lines, source.heads, names=names, stated=header.stated),
+    source = Source(
+        called,
+        lines,
+        source.heads,
+        names=names,
+        stated=header.stated,
+        remarks=header.remarks,
+        notes=[note] if note else [],
     )
+    return Table({name: (array, attrs[name]) for name, array in values.items()}, header.attrs, source)
 
 
 def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Mapping[str, str], source: Source) -> None:

@@ -174,7 +174,7 @@ def _refuse_stray(remarks: Mapping[int, str], stated: Mapping[str, int], source:
                 "the kind being integer, number or text",
             )
         found = stray_attribute(text)
-        if found is not None and found[0] not in stated:
+        if found is not None and (found[0] not in stated or text.startswith(found[0])):  # else words about it
             raise source.line_error(line, f"{text!r} looks like the attribute {found[0]!r}, but {found[1]}")
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
-from tactile_bayes.record.encoding import WITH_NUL, not_utf8
+from tactile_bayes.record.encoding import CUT_BY_NUL, WITH_NUL, not_utf8
 from tactile_bayes.record.parsing import text_array
 from tactile_bayes.record.schema import Kind
 from tactile_bayes.record.storable import LONGEST_CELL
@@ -281,8 +281,9 @@ def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:
         line = above + 1 + chunk.count(b"\n", 0, error.start)
         raise source.row_error(line, not_utf8(error)) from error
     if "\0" in text:
-        line = above + 1 + text.count("\n", 0, text.index("\0"))
-        raise source.row_error(line, WITH_NUL)
+        begin = text.index("\0")
+        is_lost = not text[begin:].strip("\0\r\n")
+        raise source.row_error(above + 1 + text.count("\n", 0, begin), CUT_BY_NUL if is_lost else WITH_NUL)
     return io.StringIO(text, newline="").readlines()
 
 

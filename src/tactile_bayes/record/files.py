@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 import xarray as xr
 
 from tactile_bayes.checks import check_choice, check_kind, check_mapping, check_optional, check_path, check_switch
-from tactile_bayes.errors import RecordError
+from tactile_bayes.errors import RecordError, RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.bag import is_bag, read_bag_table
 from tactile_bayes.record.construction import completed_record
@@ -21,7 +22,7 @@ from tactile_bayes.record.origin import renamed
 from tactile_bayes.record.schema import FRAMES, Frame
 from tactile_bayes.record.sweep_segments import split_at_turns
 from tactile_bayes.record.table import Table
-from tactile_bayes.record.units import in_units_of_record
+from tactile_bayes.record.units import assumed_units, in_units_of_record
 from tactile_bayes.record.validation import validate
 
 __all__ = ["read_record", "record_in", "write_record"]
@@ -96,6 +97,12 @@ def read_record(
     ParameterError
         If a key of `columns` is not a column of a record, or a value is invalid.
 
+    Warns
+    -----
+    RecordWarning
+        If the record is SI and nobody states the unit of a measured column, or if the last line of a CSV file has no
+        end: it may be cut. Its row is left out if its last number stands out from those above.
+
     Examples
     --------
     A rig with names, units and signs of its own, and semicolons:
@@ -137,7 +144,10 @@ def read_record(
     if path.is_dir() and not is_bag(path):
         raise RecordError(f"{path} is a folder: give the record itself, a .csv or a .nc file, or a bag")
     table = (read_bag_table if is_bag(path) else _READERS[_suffix(path)])(path, columns)
-    return record_in(table, columns, split_sweeps, rod, missing, load_cell_frame)
+    record = record_in(table, columns, split_sweeps, rod, missing, load_cell_frame)
+    for note in record.encoding["notes"]:
+        warnings.warn(f"{path}: {note}", RecordWarning, stacklevel=2)
+    return record
 
 
 def record_in(
@@ -148,7 +158,10 @@ def record_in(
     missing: Collection[str],
     load_cell_frame: Frame | None,
 ) -> xr.Dataset:
-    """Return the record in a table as it was read; arguments are those of `read_record`."""
+    """Return the record in a table as it was read; arguments are those of `read_record`.
+
+    Its encoding has "notes", what was assumed or left out, and "remarks", commented lines without a meaning.
+    """
     if "drive_angle" in table.attrs and "drive_angle" not in {*columns, *table.columns}:
         columns = {**columns, "drive_angle": str(table.attrs["drive_angle"])}
         attrs = {name: value for name, value in table.attrs.items() if name != "drive_angle"}
@@ -160,6 +173,8 @@ def record_in(
     record = completed_record(table, rod, missing, load_cell_frame)
     if rod is None and "units" not in table.attrs:
         record.attrs["units_source"] = "assumed"
+    notes = [*table.source.notes, assumed_units(table) if record.attrs["units"] == "SI" else ""]
+    record.encoding = {"notes": [note for note in notes if note], "remarks": [*table.source.remarks]}
     return record
 
 
