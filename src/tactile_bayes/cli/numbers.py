@@ -22,9 +22,10 @@ def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
         If there are more or fewer, or one is no number.
     """
     from tactile_bayes.errors import ParameterError
+    from tactile_bayes.record.spelling import plain_number
 
     try:
-        numbers = tuple(float(part) for part in text.split(","))
+        numbers = tuple(float(plain_number(part)) for part in text.split(","))
     except ValueError:
         numbers = ()
     if len(numbers) != count:

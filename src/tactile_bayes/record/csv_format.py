@@ -27,7 +27,7 @@ from tactile_bayes.record.csv_header import (
 from tactile_bayes.record.csv_rows import Layout, read_rows
 from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
 from tactile_bayes.record.origin import any_meant, meant_kinds, origins_of
-from tactile_bayes.record.quantity import Unit, unit_of
+from tactile_bayes.record.quantity import Unit, unit_of, units_disagree
 from tactile_bayes.record.schema import MEASURED, Kind
 from tactile_bayes.record.table import Source, Table
 from tactile_bayes.tasks import write_atomically
@@ -215,7 +215,7 @@ def _refuse_unit(
             "--column 'force_x=Fx[mN]'",
         )
     stated = header.descriptions.get(name, {}).get("units")
-    if stated is not None and unit is not None and unit_of(stated) not in (None, unit):
+    if stated is not None and (is_measured or None not in (unit, unit_of(stated))) and units_disagree(stated, text):
         raise source.line_error(
             number,
             f"column {name!r} is in [{text}] here, and in [{stated}] in line {header.heads[name]}: leave out the one "

@@ -16,6 +16,7 @@ from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
 from tactile_bayes.record.encoding import WITH_NUL, not_utf8
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
+from tactile_bayes.record.spelling import visible
 from tactile_bayes.record.table import Source
 from tactile_bayes.tasks.documents import read_json
 
@@ -124,7 +125,7 @@ def read_header(file: BinaryIO, source: Source) -> Header:
         if not line.startswith("#"):
             if line.strip(_DELIMITERS + " \r\n"):
                 delimiter = delimiter or _delimiter_of(line, lines_below(file))
-                names = cells_in(line, delimiter)
+                names = list(map(visible, cells_in(line, delimiter)))
                 _refuse_equal(names, number, source)
                 heads = dict.fromkeys(names, number) | heads
                 lines = {name: line for name, (line, _) in stated.items()}
@@ -186,7 +187,7 @@ def _lines(file: BinaryIO, source: Source) -> Iterator[str]:
             raise source.line_error(number, not_utf8(error)) from error
         if "\0" in text:
             raise source.line_error(number, WITH_NUL)
-        yield text
+        yield text.lstrip("\ufeff\u200b")
 
 
 def _is_number(stated: tuple[int, str] | None) -> bool:

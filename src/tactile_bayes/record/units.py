@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import shlex
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -189,6 +190,9 @@ def in_units_of_record(table: Table, rod: Rod | None) -> Table:
     if units not in UNITS:  # refused later, with the other attributes
         return table
     columns: dict[str, Cells] = {}
+    source = replace(
+        table.source, units={name: str(of["units"]) for name, (_, of) in table.columns.items() if "units" in of}
+    )
     for name, (values, of_column) in table.columns.items():
         column = column_of(name)
         if column is None or "units" not in of_column:
@@ -209,7 +213,7 @@ def in_units_of_record(table: Table, rod: Rod | None) -> Table:
         if stated != wanted:
             values = converted(parsed_column(name, values, table.source), stated, wanted)
         columns[name] = (values, {**of_column, "units": expected})
-    return Table(columns, attrs, table.source)
+    return Table(columns, attrs, source)
 
 
 def assumed_units(table: Table) -> str:
