@@ -8,7 +8,7 @@ import xarray as xr
 
 from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
-from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.errors import ParameterError, RecordError, RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import make_record, read_record, rod_of, write_record
 from tactile_bayes.record.origin import Origin, origins_of
@@ -180,7 +180,8 @@ def test_units_in_the_header_are_converted_for_columns_and_attributes(tmp_path):
         "0,forward,1250,0.5,125,0.25,130,293\n",
         encoding="utf-8",
     )
-    record = read_record(path)
+    with pytest.warns(RecordWarning, match="no unit is stated for holding_moment and force_y: taken as N m and N"):
+        record = read_record(path)
     assert (record.attrs["units"], rod_of(record)) == ("SI", Rod(0.2, 2.4e-3, 0.7e-3))
     assert record.attrs["load_cell_force_noise"] == 3e-3
     assert [record[name].item() for name in ("drive_angle", "force_x", "truth_force_x")] == [1.25, 0.125, 0.13]
@@ -256,7 +257,7 @@ def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
             "line 1, column 'holding_moment' ('Moment' in the file) is in [N], but takes N m, N mm, mN m, µN m or mN",
         ),
         ({}, {"base_y": "12[deg]"}, "column 'base_y' is in [deg], but takes m, cm, mm or µm"),
-        ({}, {"force_x": "Fx (mN)[N]"}, "column 'Fx (mN)' has its unit in its name, but [N] is given for it"),
+        ({}, {"force_x": "Fx (mN)[N]"}, "column 'Fx (mN)' is in [mN] by its name, but [N] is given for it"),
         ({"Fy": ["1", "2", "x", "4", "5", "6"]}, {}, "line 4, column 'Fy': 'x' is not a number"),
         (
             {"Fy": ["1", "2", "", "4", "5", "6"]},

@@ -42,12 +42,13 @@ def without_cut_row(file: BinaryIO, header: Header, line: int) -> tuple[BinaryIO
     if not last.strip(b",;\t \r") or last.endswith((b"\r", b'"')):
         return file, ""
     rows = [cells_in(line.decode("utf-8", "replace"), header.delimiter) for line in above[-_COMPARED:]]
-    ends = [row[-1] for row in rows if len(row) == len(header.names)]
+    ends = [row[-1] for row in rows if len(row) == len(header.names) and row[-1]]
     cells = cells_in(last.decode("utf-8", "replace"), header.delimiter)
     number = line + 1 + file.read().count(b"\n")
     file.seek(begin)
     note = f"line {number}, the last one, has no end: was the file copied whole?"
-    if len(cells) != len(header.names) or not _stands_out(cells[-1], ends):
+    is_text = header.descriptions.get(header.names[-1], {}).get("kind") == "text"
+    if is_text or len(cells) != len(header.names) or not _stands_out(cells[-1], ends):
         return file, note
     return io.BytesIO(file.read(size - len(last) - begin)), (
         f"{note} Its last number, {cells[-1]!r}, is unlike those above it, and the row is left out"
@@ -59,9 +60,9 @@ def _stands_out(text: str, above: Sequence[str]) -> bool:
     numbers = [(_number_in(cell), cell) for cell in above]
     values = [value for value, _ in numbers if value is not None]
     number = _number_in(text)
-    if number is None or len(values) < _FEWEST:
+    if number is None or len(values) < max(_FEWEST, len(above)):  # a column of text
         return False
-    notations = {_notation(cell) for value, cell in numbers if value is not None}
+    notations = {_notation(cell) for _, cell in numbers}
     if len(values) >= _ENOUGH and len(notations) == 1 and _notation(text) not in notations:
         return True
     steps = [abs(b - a) for a, b in pairwise(values)]

@@ -173,7 +173,9 @@ def record_in(
     record = completed_record(table, rod, missing, load_cell_frame)
     if rod is None and "units" not in table.attrs:
         record.attrs["units_source"] = "assumed"
-    notes = [*table.source.notes, assumed_units(table) if record.attrs["units"] == "SI" else ""]
+    notes = [*table.source.notes]
+    if record.attrs["units"] == "SI" and not is_bag(Path(table.source.name)):  # messages of ROS are SI
+        notes.append(assumed_units(table))
     record.encoding = {"notes": [note for note in notes if note], "remarks": [*table.source.remarks]}
     return record
 

@@ -68,46 +68,11 @@ _LARGEST = 10**100
 """Largest number of characters of a unit, and its largest size in SI."""
 
 OTHER_UNITS = frozenset(
-    [
-        "kg",
-        "mg",
-        "lb",
-        "lbs",
-        "lbf",
-        "kgf",
-        "kp",
-        "oz",
-        "ozf",
-        "dyn",
-        "dyne",
-        "mV",
-        "µV",
-        "kV",
-        "mA",
-        "Pa",
-        "kPa",
-        "MPa",
-        "hPa",
-        "bar",
-        "mbar",
-        "psi",
-        "°C",
-        "°F",
-        "Hz",
-        "kHz",
-        "inch",
-        "inches",
-        "ft",
-        "count",
-        "counts",
-        "digits",
-        "LSB",
-        "turns",
-        "rev",
-        "%",
-        "gon",
-        "grad",
-    ]
+    (
+        *("kg", "mg", "lb", "lbs", "lbf", "kgf", "kp", "oz", "ozf", "dyn", "dyne", "inch", "inches", "ft"),
+        *("mV", "µV", "kV", "mA", "Pa", "kPa", "MPa", "hPa", "bar", "mbar", "psi", "°C", "°F", "Hz", "kHz"),
+        *("count", "counts", "digits", "LSB", "turns", "rev", "%", "gon", "grad"),
+    )
 )
 """Units that are often stated with a column, and are none of its quantity, or not known here."""
 
