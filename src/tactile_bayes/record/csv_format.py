@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -26,9 +27,10 @@ from tactile_bayes.record.csv_header import (
 )
 from tactile_bayes.record.csv_rows import Layout, read_rows
 from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
-from tactile_bayes.record.origin import any_meant, meant_kinds, origins_of
+from tactile_bayes.record.origin import any_meant, found_column, meant_kinds, origins_of
 from tactile_bayes.record.quantity import Unit, unit_of, units_disagree
 from tactile_bayes.record.schema import MEASURED, Kind
+from tactile_bayes.record.spelling import is_misspelling
 from tactile_bayes.record.table import Source, Table
 from tactile_bayes.tasks import write_atomically
 
@@ -93,6 +95,7 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     header = read_header(text, source)
     source = Source(called, heads=header.heads)
     names = [name for name in header.names if name]
+    header = _with_found_names(header, names, source)
     _refuse_title(text, header, names, columns, source)
     origins = origins_of(columns, names, source)
     meant = meant_kinds(origins, names)
@@ -126,6 +129,24 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
         notes=[note] if note else [],
     )
     return Table({name: (array, attrs[name]) for name, array in values.items()}, header.attrs, source)
+
+
+def _with_found_names(header: Header, names: list[str], source: Source) -> Header:
+    """Return a header whose descriptions name columns of the file; they may leave out a unit in its name."""
+    descriptions, heads = dict(header.descriptions), dict(header.heads)
+    for described in header.descriptions:
+        if described in names:
+            continue
+        found = found_column(described, names)
+        if found is not None and found not in descriptions:
+            descriptions[found], heads[found] = descriptions.pop(described), heads.pop(described)
+        elif near := next((name for name in names if is_misspelling(described.lower(), name.lower())), found):
+            raise source.line_error(
+                heads[described],
+                f"there is no column {described!r}, which this line describes, but {near!r}: name that one, or remove "
+                "the line",
+            )
+    return replace(header, descriptions=descriptions, heads=heads)
 
 
 def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Mapping[str, str], source: Source) -> None:

@@ -37,7 +37,7 @@ _COLUMN_LINE = re.compile(
     rf"column\s+(?P<name>{_NAME}|{_QUOTED})\s*:\s*+(?P<kind>\w++)\s*+"
     rf"(?:\[\s*(?P<units>{_QUOTED}|{_UNIT})\s*\])?\s*+(?P<long_name>.*)"
 )
-_STRAY_COLUMN = re.compile(rf"column\s+(?:{_NAME}|{_QUOTED})\s*[:=]")
+_STRAY_COLUMN = re.compile(rf"column\s+(?:{_NAME}|{_QUOTED})\s*[:=]|column\s[^:]*:\s*+(?:integer|number|text)\b")
 _QUANTITY = re.compile(r"(?P<number>[^\[\]]+)(?:\[(?P<unit>[^\]]*)\])?")
 
 
@@ -160,6 +160,10 @@ def read_header(file: BinaryIO, source: Source) -> Header:
             if key in stated:
                 raise source.line_error(number, f"{key!r} is stated a second time: keep one of the lines")
             stated[key] = (number, match["value"])
+        elif (seen := visible(content)) != content and (_COLUMN_LINE.fullmatch(seen) or _HEADER_LINE.fullmatch(seen)):
+            raise source.line_error(
+                number, f"{content!r} has characters that cannot be seen, or odd blanks: write {seen!r}"
+            )
         else:
             remarks[number] = content
     raise source.error(f"there is no line of column names: add one, {','.join(MEASURED)}")
@@ -172,7 +176,7 @@ def _refuse_stray(remarks: Mapping[int, str], stated: Mapping[str, int], source:
             raise source.line_error(
                 line,
                 f"{text!r} describes a column in a form that is not read: write '# column NAME: KIND [UNIT] TEXT', "
-                "the kind being integer, number or text",
+                "the kind being integer, number or text, with a name in quotation marks if it has blanks or brackets",
             )
         found = stray_attribute(text)
         if found is not None and (found[0] not in stated or text.startswith(found[0])):  # else words about it

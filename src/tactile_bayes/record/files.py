@@ -42,11 +42,11 @@ def read_record(
 ) -> xr.Dataset:
     """Read a record from a CSV or a NetCDF file, or a bag of ROS, with columns of any name, unit, sign and zero.
 
-    A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per
-    sample; `write_record` shows the format. The header is optional: without it the numbers are dimensionless, or SI if
-    a column states a unit or `rod` is given, with a warning. The line `# load_cell_frame: turning` states a load cell
-    that turns with the drive. Semicolons or tabs may separate columns, and decimals may then have commas; text is in
-    UTF-8 or Windows-1252. In a NetCDF file every variable has one common dimension, "sample" or any other. In a bag columns are
+    A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per sample;
+    `write_record` shows the format. The header is optional: without it the numbers are dimensionless, or SI if a column
+    states a unit or `rod` is given, with a warning. The line `# load_cell_frame: turning` states a load cell that turns
+    with the drive. Semicolons or tabs may separate columns, and decimals may then have commas; text is in UTF-8 or
+    Windows-1252. In a NetCDF file every variable has one common dimension, "sample" or any other. In a bag columns are
     fields of messages, like "/wrench.wrench.force.x" (see `tactile_bayes.record.bag`); it takes the package rosbags.
 
     Units are those of the record (SI, or those of the rod; angles in radians). Other units are converted if they are

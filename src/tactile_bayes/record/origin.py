@@ -17,7 +17,7 @@ from tactile_bayes.record.spelling import look_alikes, nearest, plain
 from tactile_bayes.record.storable import storable
 from tactile_bayes.record.table import Cells, Source, Table
 
-__all__ = ["Origin", "any_meant", "meant_kinds", "origins_of", "renamed"]
+__all__ = ["Origin", "any_meant", "found_column", "meant_kinds", "origins_of", "renamed"]
 
 CONSTANTS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 """Columns for which a single value can be given."""
@@ -111,7 +111,7 @@ def any_meant(columns: Mapping[str, str], names: Iterable[str]) -> bool:
     texts = [plain(str(text)).strip() for text in columns.values()]
     named = [text for text in texts if not (_VALUE.fullmatch(text) or text in DIRECTIONS)]
     readings = [origin for text in named for origin in _readings(text)]
-    return any(origin.column is not None and _found(origin.column, names) is not None for origin in readings)
+    return any(origin.column is not None and found_column(origin.column, names) is not None for origin in readings)
 
 
 def meant_kinds(origins: Mapping[str, Origin], names: Iterable[str]) -> dict[str, Kind]:
@@ -189,7 +189,7 @@ def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
     if plain(text) != text:
         readings += _readings(plain(text))
     for origin in readings:
-        name = None if origin.column is None else _found(origin.column, names)
+        name = None if origin.column is None else found_column(origin.column, names)
         if name is not None:
             is_whole = _compact(name) == _compact(origin.column or "")
             return _checked(target, column, replace(origin, column=name), is_whole, text, source)
@@ -229,7 +229,7 @@ def _with_and_without_trail(text: str) -> Iterator[tuple[str, str]]:
         yield match["sign"] + match["offset"], match["rest"]
 
 
-def _found(text: str, names: list[str]) -> str | None:
+def found_column(text: str, names: list[str]) -> str | None:
     """Find the column that a text names, regardless of blanks; a unit in its name may be left out."""
     if text in names:
         return text
