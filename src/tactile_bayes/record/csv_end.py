@@ -24,6 +24,9 @@ _COMPARED, _FEWEST, _ENOUGH = 50, 3, 10
 _WIDTHS = 8.0
 """Usual steps from row to row by which a cut number is off."""
 
+_INTEGER = (None, None)
+"""Notation of a number without decimals and exponent, which is the same if digits are cut off."""
+
 _NOTATION = re.compile(r"[+-]?[0-9]*(?:[.,](?P<decimals>[0-9]*))?(?:[eE][+-]?(?P<power>[0-9]*))?")
 
 
@@ -63,8 +66,8 @@ def _stands_out(text: str, above: Sequence[str]) -> bool:
     if number is None or len(values) < max(_FEWEST, len(above)):  # a column of text
         return False
     notations = {_notation(cell) for _, cell in numbers}
-    if len(values) >= _ENOUGH and len(notations) == 1 and _notation(text) not in notations:
-        return True
+    if len(values) >= _ENOUGH and len(notations) == 1 and notations != {_INTEGER}:
+        return _notation(text) not in notations
     steps = [abs(b - a) for a, b in pairwise(values)]
     usual = DEVIATION_OVER_MEDIAN * median(steps) or mean(steps)
     return abs(number - values[-1]) > _WIDTHS * usual
