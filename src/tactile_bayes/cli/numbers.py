@@ -39,11 +39,11 @@ def as_typed(word: str) -> str:
 
     Programs for texts turn -- into a dash, and a hyphen before a digit into a minus sign.
     """
+    if word.isascii():
+        return word
     from tactile_bayes.record.cell import number_in
     from tactile_bayes.record.spelling import plain, plain_number
 
-    if word.isascii():
-        return word
     option = word.lstrip("-\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}")
     if option != word and not word.startswith("-") and option[:1].isalpha():
         return f"{'-' if len(option) == 1 else '--'}{option}"

@@ -30,7 +30,6 @@ from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
 from tactile_bayes.record.origin import any_meant, found_column, meant_kinds, origins_of
 from tactile_bayes.record.quantity import Unit, unit_of, units_disagree
 from tactile_bayes.record.schema import MEASURED, Kind
-from tactile_bayes.record.spelling import is_misspelling
 from tactile_bayes.record.table import Source, Table
 from tactile_bayes.tasks import write_atomically
 
@@ -135,17 +134,15 @@ def _with_found_names(header: Header, names: list[str], source: Source) -> Heade
     """Return a header whose descriptions name columns of the file; they may leave out a unit in its name."""
     descriptions, heads = dict(header.descriptions), dict(header.heads)
     for described in header.descriptions:
-        if described in names:
+        found = None if described in names else found_column(described, names)
+        if found is None:  # of a column that was removed
             continue
-        found = found_column(described, names)
-        if found is not None and found not in descriptions:
-            descriptions[found], heads[found] = descriptions.pop(described), heads.pop(described)
-        elif near := next((name for name in names if is_misspelling(described.lower(), name.lower())), found):
+        if found in header.descriptions:
             raise source.line_error(
                 heads[described],
-                f"there is no column {described!r}, which this line describes, but {near!r}: name that one, or remove "
-                "the line",
+                f"it describes the column {found!r} as line {heads[found]} does: keep one of the lines",
             )
+        descriptions[found], heads[found] = descriptions.pop(described), heads.pop(described)
     return replace(header, descriptions=descriptions, heads=heads)
 
 
