@@ -9,6 +9,7 @@ __all__ = [
     "ParameterError",
     "ReachError",
     "RecordError",
+    "RecordWarning",
     "SpecificationError",
     "StrainWarning",
     "StudyError",
@@ -76,6 +77,10 @@ class ClearanceWarning(TactileBayesWarning):
 
 class DriftWarning(TactileBayesWarning):
     """The zero of a load cell moved during a record."""
+
+
+class RecordWarning(TactileBayesWarning):
+    """A file is read with units that it does not state, or may be cut short."""
 
 
 class StrainWarning(TactileBayesWarning):

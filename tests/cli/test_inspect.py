@@ -309,3 +309,19 @@ def test_a_laboratorys_path_ends_at_the_truth(inspected, tmp_path):
     for name, truth in {"a": 2.5, "q": 0.1, "x_c": 0.0, "force_x_bias": 4e-3}.items():
         lower, upper = rows[name]["lower"], rows[name]["upper"]
         assert abs(truth - 0.5 * (lower + upper)) < upper - lower
+
+
+def test_inspect_lists_what_was_assumed_and_what_has_no_meaning(rig, tmp_path):
+    text = rig.read_text(encoding="utf-8").replace("Mz [mN m]", "Mz").replace("Fy [mN]", "Fy")
+    path = tmp_path / "rig.csv"
+    path.write_text("# made on Monday, see log\n# serial: 4711\n" + text.rstrip("\n"), encoding="utf-8")
+    reading = [word.replace("[mN]", "") if isinstance(word, str) else word for word in READING]
+    result = call("inspect", path, *reading, "--json")
+    found = json.loads(result.stdout)
+    assert found["not_used"] == ["serial", "line 1: made on Monday, see log"]
+    end, units = found["reading"]
+    assert "has no end" in end
+    assert "holding_moment, force_x and force_y: taken as N m, N and N" in units
+    said = call("inspect", path, *reading, "-q").stdout
+    assert all(line in said for line in (f"reading     {end}", f"reading     {units}", "not used    serial"))
+    assert "warning" in call("reconstruct", path, *reading, "--out", tmp_path / "contacts", "-q").stderr

@@ -8,7 +8,7 @@ import pytest
 from helpers import commands
 from helpers.record_tables import WIRE
 from helpers.refusals import refused
-from tactile_bayes.errors import RecordError
+from tactile_bayes.errors import RecordError, RecordWarning
 from tactile_bayes.record import read_record, record_hash
 
 NAMES = "Winkel;Mz;Fx;Fy"
@@ -54,7 +54,8 @@ def test_commas_in_names_part_no_columns_where_semicolons_do(tmp_path, plain):
 
 def test_tabs_behind_commas_are_blanks(tmp_path):
     lines = ["sweep,\tdirection,\tdrive_angle,\tholding_moment,\tforce_x,\tforce_y", "3,\tforward,\t1.2,\t0.1,\t1,\t2"]
-    assert read_record_of(tmp_path, *lines)["force_y"].values.tolist() == [2.0]
+    with pytest.warns(RecordWarning, match="no unit is stated for drive_angle, holding_moment, force_x and force_y"):
+        assert read_record_of(tmp_path, *lines)["force_y"].values.tolist() == [2.0]
 
 
 @pytest.mark.parametrize("names", ["Messung 4", "Messung 1,5 mm", "Messung;4"])

@@ -110,7 +110,7 @@ def test_a_column_that_turns_out_to_be_text_is_read_again_from_the_beginning(tmp
     path = tmp_path / "record.csv"
     notes = ["02", "1.50", *["7"] * 100, "no", "8"]
     rows = [f"0,forward,{1 + k / 1000},0.1,0.1,0.1,{note}" for k, note in enumerate(notes)]
-    path.write_text("\n".join(["sweep,direction,drive_angle,holding_moment,force_x,force_y,note", *rows]))
+    path.write_text("\n".join(["sweep,direction,drive_angle,holding_moment,force_x,force_y,note", *rows, ""]))
     assert read_record(path)["note"].values.tolist() == notes
 
 

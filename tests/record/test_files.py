@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as hnp
 
 from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
-from tactile_bayes.errors import RecordError
+from tactile_bayes.errors import RecordError, RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import (
     CHANNELS,
@@ -253,7 +253,8 @@ def test_a_file_without_header_is_assumed_to_be_dimensionless(tmp_path):
 
 
 def test_a_file_without_header_is_si_with_a_rod(tmp_path):
-    record = read_record(write_text(tmp_path / "plain.csv", HEADER, ROW), rod=WIRE)
+    with pytest.warns(RecordWarning, match="force_x and force_y: taken as rad, N m, N and N"):
+        record = read_record(write_text(tmp_path / "plain.csv", HEADER, ROW), rod=WIRE)
     assert record.attrs["units"] == "SI"
     assert rod_of(record) == WIRE
     assert "units_source" not in record.attrs

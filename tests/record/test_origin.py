@@ -8,7 +8,7 @@ import xarray as xr
 
 from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
-from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.errors import ParameterError, RecordError, RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import make_record, read_record, rod_of, write_record
 from tactile_bayes.record.origin import Origin, origins_of
@@ -27,6 +27,12 @@ from tactile_bayes.record.table import Source
         ("-90+Fx[mN]", ["Fx"], Origin("Fx", "mN", 1, -90.0)),
         ("Fx[mN]+1.5", ["Fx"], Origin("Fx", "mN", 1, 1.5)),
         ("-Fx[mN]-1e-3", ["Fx"], Origin("Fx", "mN", -1, -1e-3)),
+        ("Fx-360[mN]", ["Fx"], Origin("Fx", "mN", 1, -360.0)),
+        ("90-Fx - 360 [mN]", ["Fx"], Origin("Fx", "mN", -1, -270.0)),
+        ("Fx [mN]+360[mN]", ["Fx [mN]"], Origin("Fx [mN]", "mN", 1, 360.0)),
+        ("Fx-1[mN]", ["Fx-1", "Fx"], Origin("Fx-1", "mN")),
+        ("Fx_mN", ["Fx_mN"], Origin("Fx_mN", "mN")),
+        ("Fx_mm", ["Fx_mm"], Origin("Fx_mm")),
         ("Fx", ["Fx [mN]"], Origin("Fx [mN]", "mN")),
         ("Fx[mN]", ["Fx [mN]"], Origin("Fx [mN]", "mN")),
         ("-Fx", ["Fx (mN)"], Origin("Fx (mN)", "mN", -1)),
@@ -170,6 +176,56 @@ def test_units_in_names_are_read_without_being_told(tmp_path):
     assert len(record) == 8
 
 
+@pytest.mark.parametrize(
+    ("lead", "unit", "turn", "advice"),
+    [("", "deg", 0, "Angle-360[deg]"), ("", "°", 2, "Angle-1080[°]"), ("-", "deg", -3, "-Angle-720[deg]")],
+)
+def test_an_angle_that_counts_on_is_refused_with_what_to_subtract(tmp_path, lead, unit, turn, advice):
+    path = tmp_path / "rig.csv"
+    angles = np.arange(393.7, 403.0) + 360 * turn
+    path.write_text("\n".join(["Angle,Mz,Fx,Fy", *(f"{angle:.1f},1,2,3" for angle in angles), ""]), encoding="utf-8")
+    given = {"drive_angle": f"{lead}Angle[{unit}]", "holding_moment": "Mz[Nm]", "force_x": "Fx[N]", "force_y": "Fy[N]"}
+    with refused(RecordError, "line 2", "beyond a turn", f"--column 'drive_angle={advice}'"):
+        read_record(path, columns=given, split_sweeps=True, rod=WIRE)
+    angle = read_record(path, columns={**given, "drive_angle": advice}, split_sweeps=True, rod=WIRE).drive_angle
+    assert np.abs(angle).max() <= 2.0 * np.pi
+    np.testing.assert_allclose(np.cos(angle), np.cos(np.radians(angles)), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("names", "below", "given"),
+    [
+        ("A,Mz,Fx [kg],Fy", "deg,N mm,mN,mN", {}),
+        ("A,Mz,Fx (kg),Fy", "deg,N mm,mN,mN", {}),
+        ("A,Mz,Fx / kg,Fy", "deg,N mm,mN,mN", {}),
+        ("A,Mz,Fx [N],Fy", "deg,N mm,mN,mN", {}),
+        ("A,Mz,Fx,Fy", "deg,N mm,mN,mN", {"force_x": "Fx[N]"}),
+        ("A,Mz,Fx [kg],Fy", "deg,N mm,,mN", {"force_x": "Fx[mN]"}),
+        ("A,Mz,Fx_mN,Fy", "deg,N mm,,mN", {"force_x": "Fx_mN[N]"}),
+        ("A,Mz,Fx_mN,Fy", "deg,N mm,N,mN", {"force_x": "Fx_mN"}),
+    ],
+)
+def test_two_units_that_contradict_each_other_are_refused(tmp_path, names, below, given):
+    path = tmp_path / "rig.csv"
+    path.write_text(f"{names}\n{below}\n60,1,2,3\n61,1,2,3\n", encoding="utf-8")
+    columns = {"drive_angle": "A", "holding_moment": "Mz", "force_x": "Fx", "force_y": "Fy", **given}
+    first = given.get("force_x", names.split(",")[2])
+    units = {unit for unit in ("kg", "mN", "N") if re.search(rf"\b{unit}\b|_{unit}", f"{first} {below.split(',')[2]}")}
+    with refused(RecordError, *units):
+        read_record(path, columns=columns, split_sweeps=True, rod=WIRE)
+
+
+def test_a_description_may_leave_out_the_unit_in_the_name(tmp_path):
+    path = tmp_path / "rig.csv"
+    text = "# column Fx: number [N]\nA,Mz,Fx [mN],Fy\n60,1,2,3\n61,1,2,3\n"
+    columns = {"drive_angle": "A[deg]", "holding_moment": "Mz[N m]", "force_x": "Fx", "force_y": "Fy[N]"}
+    path.write_text(text, encoding="utf-8")
+    with refused(RecordError, "[N]", "[mN]"):
+        read_record(path, columns=columns, split_sweeps=True, rod=WIRE)
+    path.write_text(text.replace("[N]", "[mN]"), encoding="utf-8")
+    assert read_record(path, columns=columns, split_sweeps=True, rod=WIRE).force_x[0] == 2e-3
+
+
 def test_units_in_the_header_are_converted_for_columns_and_attributes(tmp_path):
     path = tmp_path / "rig.csv"
     path.write_text(
@@ -180,7 +236,8 @@ def test_units_in_the_header_are_converted_for_columns_and_attributes(tmp_path):
         "0,forward,1250,0.5,125,0.25,130,293\n",
         encoding="utf-8",
     )
-    record = read_record(path)
+    with pytest.warns(RecordWarning, match="no unit is stated for holding_moment and force_y: taken as N m and N"):
+        record = read_record(path)
     assert (record.attrs["units"], rod_of(record)) == ("SI", Rod(0.2, 2.4e-3, 0.7e-3))
     assert record.attrs["load_cell_force_noise"] == 3e-3
     assert [record[name].item() for name in ("drive_angle", "force_x", "truth_force_x")] == [1.25, 0.125, 0.13]
@@ -256,7 +313,7 @@ def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
             "line 1, column 'holding_moment' ('Moment' in the file) is in [N], but takes N m, N mm, mN m, µN m or mN",
         ),
         ({}, {"base_y": "12[deg]"}, "column 'base_y' is in [deg], but takes m, cm, mm or µm"),
-        ({}, {"force_x": "Fx (mN)[N]"}, "column 'Fx (mN)' has its unit in its name, but [N] is given for it"),
+        ({}, {"force_x": "Fx (mN)[N]"}, "column 'Fx (mN)' is in [mN] by its name, but [N] is given for it"),
         ({"Fy": ["1", "2", "x", "4", "5", "6"]}, {}, "line 4, column 'Fy': 'x' is not a number"),
         (
             {"Fy": ["1", "2", "", "4", "5", "6"]},

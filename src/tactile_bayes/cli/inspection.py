@@ -51,18 +51,24 @@ def inspect(
     It takes the options of infer that say how a file is read; the last line is the next command.
     """
     with step_bar(output.is_silent) as show:
-        from tactile_bayes.diagnostics.inspection import inspect_record
+        import warnings
 
-        measured, cell = reading.read(record)
+        from tactile_bayes.diagnostics.inspection import inspect_record
+        from tactile_bayes.errors import RecordWarning
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RecordWarning)  # they are among the contents
+            measured, cell = reading.read(record)
         found = inspect_record(measured, load_cell=cell, friction=friction, progress=show)
-        contents = _contents(found, reading.origins)
+        beside = _beside(measured)
+        contents = [*_contents(found, reading.origins), *(f"{name:<12}{text}" for name, text in beside)]
         files: Mapping[str, Path] = {}
         if out is not None:
             from tactile_bayes.runs.inspection import write_inspection
 
             files = write_inspection(found, out, text=["", *contents])
     again = f"tactile-bayes infer {shlex.quote(str(record))}{_as_options(reading, friction)} --out run/"
-    return Answer(_words(found, contents, again, files), lambda: _numbers(found, again, files))
+    return Answer(_words(found, contents, again, files), lambda: _numbers(found, again, files) | _texts(beside))
 
 
 def _words(found: Inspection, contents: list[str], again: str, files: Mapping[str, Path]) -> Iterator[Any]:
@@ -74,6 +80,20 @@ def _words(found: Inspection, contents: list[str], again: str, files: Mapping[st
     if files:
         yield from ("", files)
     yield from ("", f"{'Once that is corrected' if found.is_suspect else 'Next'}: {again}")
+
+
+def _beside(record: xr.Dataset) -> list[tuple[str, str]]:
+    """Return what was assumed as the file was read, and what of it has no meaning here."""
+    from tactile_bayes.record.attribute_names import unused
+
+    notes = [("reading", note) for note in record.encoding["notes"]]
+    return notes + [
+        ("not used", text) for text in [", ".join(unused(record.attrs)), *record.encoding["remarks"]] if text
+    ]
+
+
+def _texts(beside: list[tuple[str, str]]) -> dict[str, list[str]]:
+    return {key: [text for name, text in beside if name == key.replace("_", " ")] for key in ("reading", "not_used")}
 
 
 def _as_options(reading: RecordOptions, friction: float) -> str:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from tactile_bayes.arrays import Floats
 
-__all__ = ["assigned", "columns_in", "numbers_asked"]
+__all__ = ["as_typed", "assigned", "columns_in", "numbers_asked"]
 
 
 def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
@@ -22,15 +22,33 @@ def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
         If there are more or fewer, or one is no number.
     """
     from tactile_bayes.errors import ParameterError
+    from tactile_bayes.record.spelling import plain_number
 
     try:
-        numbers = tuple(float(part) for part in text.split(","))
+        numbers = tuple(float(plain_number(part)) for part in text.split(","))
     except ValueError:
         numbers = ()
     if len(numbers) != count:
         wanted = "a number" if count == 1 else f"{count} numbers with commas between them"
         raise ParameterError(f"{option} is {text!r}: give {wanted}")
     return numbers
+
+
+def as_typed(word: str) -> str:
+    """Return a word of a command line as it would be typed: dashes of options, and numbers, in plain characters.
+
+    Programs for texts turn -- into a dash, and a hyphen before a digit into a minus sign.
+    """
+    if word.isascii():
+        return word
+    from tactile_bayes.record.cell import number_in
+    from tactile_bayes.record.spelling import plain, plain_number
+
+    option = word.lstrip("-\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}")
+    if option != word and not word.startswith("-") and option[:1].isalpha():
+        return f"{'-' if len(option) == 1 else '--'}{option}"
+    numbers = plain(plain_number(word))
+    return numbers if all(part and number_in(part) is not None for part in numbers.split(",")) else word
 
 
 def assigned(

@@ -152,7 +152,14 @@ def distribution_of(value: Any, key: str) -> Distribution:
         raise SpecificationError(f"{key}.{kind} has {len(numbers)} numbers: give two")
     if kind in _KINDS and not _KINDS[kind].is_possible(*numbers):
         raise SpecificationError(f"{key}.{kind} is {shown(numbers)}: {_KINDS[kind].rule}")
-    return Distribution(kind, tuple(float(number) for number in numbers), axis)
+    found = Distribution(kind, tuple(float(number) for number in numbers), axis)
+    with np.errstate(all="ignore"):
+        ends = found.at(np.array([0.0, 1.0 - 2.0**-53]), np.zeros(2, dtype=np.intp))
+    if not np.isfinite(ends).all():
+        raise SpecificationError(
+            f"{key}.{kind} is {shown(numbers)}: its draws may be larger than any number, narrow it"
+        )
+    return found
 
 
 def _is_number(value: Any) -> bool:

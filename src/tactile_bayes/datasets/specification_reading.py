@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -30,6 +31,7 @@ from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
+from tactile_bayes.record.spelling import look_alikes
 from tactile_bayes.tasks.documents import LARGEST, read_toml
 
 __all__ = ["read_specification", "read_text", "rule_of"]
@@ -108,7 +110,13 @@ def read_text(text: str) -> Specification:
             raise SpecificationError("it is empty: `tactile-bayes dataset example` prints one to start from")
         return _specification(table, text)
     except ParameterError as error:
-        raise SpecificationError(str(error)) from error
+        raise SpecificationError(f"{error}{_look_alikes_at(str(error), text)}") from error
+
+
+def _look_alikes_at(message: str, text: str) -> str:
+    """Name the characters that look like others in the line that a message of the parser names."""
+    match = re.search(r"at line ([0-9]+)", message)
+    return look_alikes(text.split("\n")[int(match[1]) - 1]) if match else ""
 
 
 def rule_of(error: ContourError) -> str:
@@ -168,8 +176,8 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
     if not isinstance(name, str) or name not in FAMILIES:
         found_is = f"is {name!r}" if "family" in group else "is missing"
         raise SpecificationError(
-            f"{key}.family {found_is}: choose from {', '.join(FLANKS)}, shape-free, or two flanks "
-            f"({' or '.join(FLANKS)} on either side, as in 'parabola/circle')"
+            f"{key}.family {found_is}{look_alikes(str(name))}: choose from {', '.join(FLANKS)}, shape-free, or two "
+            f"flanks ({' or '.join(FLANKS)} on either side, as in 'parabola/circle')"
         )
     family = FAMILIES[name]
     _refuse_replaced(group, name, key)
@@ -399,4 +407,4 @@ def _refuse_unknown(table: Mapping[str, Any], known: Iterable[str], prefix: str)
         else:
             more = " and others: `tactile-bayes dataset example` names all" if len(known) > _MOST_NAMED else ""
             hint = f"there are {', '.join(known[:_MOST_NAMED])}{more}"
-        raise SpecificationError(f"there is no key {prefix + key!r}: {hint}")
+        raise SpecificationError(f"there is no key {prefix + key!r}{look_alikes(key)}: {hint}")

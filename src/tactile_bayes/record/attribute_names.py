@@ -9,7 +9,7 @@ from typing import Any
 
 from tactile_bayes.record.quantity import unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, LOAD_CELL_UNITS, UNITS
-from tactile_bayes.record.spelling import is_misspelling, nearest
+from tactile_bayes.record.spelling import is_misspelling, nearest, plain
 
 __all__ = ["USED", "misspelt", "no_entry", "stray_attribute", "unused"]
 
@@ -65,6 +65,7 @@ def stray_attribute(comment: str) -> tuple[str, str] | None:
     >>> stray_attribute("whisker rig, wire 120 mm x 0.5 mm"), stray_attribute("see rod_taper above")
     (None, None)
     """
+    comment = plain(comment)
     match = _STRAY.fullmatch(comment) or _WORDS.fullmatch(comment)
     if match is None:
         return None

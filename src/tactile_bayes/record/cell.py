@@ -6,6 +6,8 @@ import math
 import re
 from typing import Any
 
+from tactile_bayes.record.spelling import plain_number
+
 __all__ = ["integer_in", "is_integer_text", "number_in"]
 
 
@@ -14,7 +16,7 @@ def number_in(cell: Any) -> float | None:
     if cell is None:
         return math.nan
     if isinstance(cell, str):
-        cell = cell.strip() or "nan"
+        cell = plain_number(cell).strip() or "nan"
         if "_" in cell:  # Python would read 1_0 as ten
             return None
     try:

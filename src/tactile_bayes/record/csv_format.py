@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -13,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.csv_end import without_cut_row
 from tactile_bayes.record.csv_header import (
     FORMAT,
     KINDS,
@@ -25,8 +27,8 @@ from tactile_bayes.record.csv_header import (
 )
 from tactile_bayes.record.csv_rows import Layout, read_rows
 from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
-from tactile_bayes.record.origin import any_meant, meant_kinds, origins_of
-from tactile_bayes.record.quantity import Unit, unit_of
+from tactile_bayes.record.origin import any_meant, found_column, meant_kinds, origins_of
+from tactile_bayes.record.quantity import Unit, unit_of, units_disagree
 from tactile_bayes.record.schema import MEASURED, Kind
 from tactile_bayes.record.table import Source, Table
 from tactile_bayes.tasks import write_atomically
@@ -92,6 +94,7 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     header = read_header(text, source)
     source = Source(called, heads=header.heads)
     names = [name for name in header.names if name]
+    header = _with_found_names(header, names, source)
     _refuse_title(text, header, names, columns, source)
     origins = origins_of(columns, names, source)
     meant = meant_kinds(origins, names)
@@ -106,6 +109,7 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     for name in unnamed:
         described[name] = "text"
     layout = Layout(places, header.delimiter, last, meant, described)
+    text, note = without_cut_row(text, header, last)
     values, lines = read_rows(text, layout, Source(called))
     for name, place in unnamed.items():
         _refuse_content(values.pop(name), place, lines, header.line, source)
@@ -114,11 +118,32 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     }
     for name, unit in units.items():
         attrs[name]["units"] = unit
-    return Table(
-        {name: (array, attrs[name]) for name, array in values.items()},
-        header.attrs,
-        Source(called, lines, source.heads, names=names, stated=header.stated),
+    source = Source(
+        called,
+        lines,
+        source.heads,
+        names=names,
+        stated=header.stated,
+        remarks=header.remarks,
+        notes=[note] if note else [],
     )
+    return Table({name: (array, attrs[name]) for name, array in values.items()}, header.attrs, source)
+
+
+def _with_found_names(header: Header, names: list[str], source: Source) -> Header:
+    """Return a header whose descriptions name columns of the file; they may leave out a unit in its name."""
+    descriptions, heads = dict(header.descriptions), dict(header.heads)
+    for described in header.descriptions:
+        found = None if described in names else found_column(described, names)
+        if found is None:  # of a column that was removed
+            continue
+        if found in header.descriptions:
+            raise source.line_error(
+                heads[described],
+                f"it describes the column {found!r} as line {heads[found]} does: keep one of the lines",
+            )
+        descriptions[found], heads[found] = descriptions.pop(described), heads.pop(described)
+    return replace(header, descriptions=descriptions, heads=heads)
 
 
 def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Mapping[str, str], source: Source) -> None:
@@ -208,7 +233,7 @@ def _refuse_unit(
             "--column 'force_x=Fx[mN]'",
         )
     stated = header.descriptions.get(name, {}).get("units")
-    if stated is not None and unit is not None and unit_of(stated) not in (None, unit):
+    if stated is not None and (is_measured or None not in (unit, unit_of(stated))) and units_disagree(stated, text):
         raise source.line_error(
             number,
             f"column {name!r} is in [{text}] here, and in [{stated}] in line {header.heads[name]}: leave out the one "

@@ -16,6 +16,7 @@ from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
 from tactile_bayes.record.encoding import WITH_NUL, not_utf8
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
+from tactile_bayes.record.spelling import visible
 from tactile_bayes.record.table import Source
 from tactile_bayes.tasks.documents import read_json
 
@@ -36,7 +37,7 @@ _COLUMN_LINE = re.compile(
     rf"column\s+(?P<name>{_NAME}|{_QUOTED})\s*:\s*+(?P<kind>\w++)\s*+"
     rf"(?:\[\s*(?P<units>{_QUOTED}|{_UNIT})\s*\])?\s*+(?P<long_name>.*)"
 )
-_STRAY_COLUMN = re.compile(rf"column\s+(?:{_NAME}|{_QUOTED})\s*[:=]")
+_STRAY_COLUMN = re.compile(rf"column\s+(?:{_NAME}|{_QUOTED})\s*[:=]|column\s[^:]*:\s*+(?:integer|number|text)\b")
 _QUANTITY = re.compile(r"(?P<number>[^\[\]]+)(?:\[(?P<unit>[^\]]*)\])?")
 
 
@@ -124,7 +125,7 @@ def read_header(file: BinaryIO, source: Source) -> Header:
         if not line.startswith("#"):
             if line.strip(_DELIMITERS + " \r\n"):
                 delimiter = delimiter or _delimiter_of(line, lines_below(file))
-                names = cells_in(line, delimiter)
+                names = list(map(visible, cells_in(line, delimiter)))
                 _refuse_equal(names, number, source)
                 heads = dict.fromkeys(names, number) | heads
                 lines = {name: line for name, (line, _) in stated.items()}
@@ -159,6 +160,10 @@ def read_header(file: BinaryIO, source: Source) -> Header:
             if key in stated:
                 raise source.line_error(number, f"{key!r} is stated a second time: keep one of the lines")
             stated[key] = (number, match["value"])
+        elif (seen := visible(content)) != content and (_COLUMN_LINE.fullmatch(seen) or _HEADER_LINE.fullmatch(seen)):
+            raise source.line_error(
+                number, f"{content!r} has characters that cannot be seen, or odd blanks: write {seen!r}"
+            )
         else:
             remarks[number] = content
     raise source.error(f"there is no line of column names: add one, {','.join(MEASURED)}")
@@ -171,10 +176,10 @@ def _refuse_stray(remarks: Mapping[int, str], stated: Mapping[str, int], source:
             raise source.line_error(
                 line,
                 f"{text!r} describes a column in a form that is not read: write '# column NAME: KIND [UNIT] TEXT', "
-                "the kind being integer, number or text",
+                "the kind being integer, number or text, with a name in quotation marks if it has blanks or brackets",
             )
         found = stray_attribute(text)
-        if found is not None and found[0] not in stated:
+        if found is not None and (found[0] not in stated or text.startswith(found[0])):  # else words about it
             raise source.line_error(line, f"{text!r} looks like the attribute {found[0]!r}, but {found[1]}")
 
 
@@ -186,7 +191,7 @@ def _lines(file: BinaryIO, source: Source) -> Iterator[str]:
             raise source.line_error(number, not_utf8(error)) from error
         if "\0" in text:
             raise source.line_error(number, WITH_NUL)
-        yield text
+        yield text.lstrip("\ufeff\u200b")
 
 
 def _is_number(stated: tuple[int, str] | None) -> bool:

@@ -14,9 +14,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
-from tactile_bayes.record.encoding import WITH_NUL, not_utf8
+from tactile_bayes.record.encoding import CUT_BY_NUL, WITH_NUL, not_utf8
 from tactile_bayes.record.parsing import text_array
 from tactile_bayes.record.schema import Kind
+from tactile_bayes.record.spelling import look_alikes, plain_number
 from tactile_bayes.record.storable import LONGEST_CELL
 from tactile_bayes.record.table import Source
 
@@ -281,8 +282,9 @@ def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:
         line = above + 1 + chunk.count(b"\n", 0, error.start)
         raise source.row_error(line, not_utf8(error)) from error
     if "\0" in text:
-        line = above + 1 + text.count("\n", 0, text.index("\0"))
-        raise source.row_error(line, WITH_NUL)
+        begin = text.index("\0")
+        is_lost = not text[begin:].strip("\0\r\n")
+        raise source.row_error(above + 1 + text.count("\n", 0, begin), CUT_BY_NUL if is_lost else WITH_NUL)
     return io.StringIO(text, newline="").readlines()
 
 
@@ -308,6 +310,7 @@ def _column_values(name: str, texts: list[str], layout: Layout, source: Source) 
 
 def _number_in(text: str, layout: Layout) -> float | None:
     """Parse the number in a cell; the first one with decimals determines the decimal separator."""
+    text = plain_number(text)
     if layout.delimiter != "," and ("," in text or "." in text):
         sign = "," if "," in text else "."
         number = number_in(text.replace(",", ".")) if layout.decimal in (None, sign) else None
@@ -341,4 +344,4 @@ def _refuse_cell(
                 what += "; where decimals have commas, write ; between columns"
         elif layout.decimal and ("," if layout.decimal == "." else ".") in texts[sample]:
             what += f"; decimals are separated by {layout.decimal!r} in this file, and thousands by nothing"
-    raise source.cell_error(np.array(samples), name, f"{texts[sample]!r} {what}")
+    raise source.cell_error(np.array(samples), name, f"{texts[sample]!r}{look_alikes(texts[sample])} {what}")

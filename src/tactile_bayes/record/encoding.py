@@ -9,8 +9,12 @@ from typing import BinaryIO
 
 from tactile_bayes.record.table import Source
 
-__all__ = ["WITH_NUL", "in_utf8", "not_utf8", "refuse_other_kinds"]
+__all__ = ["CUT_BY_NUL", "WITH_NUL", "in_utf8", "not_utf8", "refuse_other_kinds"]
 
+CUT_BY_NUL = (
+    "from here on there are NUL characters (0x00) alone, as a power failure leaves them: remove them, and the row that "
+    "they cut short"
+)
 WITH_NUL = "there is a NUL character (0x00), which is no text: remove it"
 _CHUNK = 1 << 21
 _SAVE = "save it as CSV in UTF-8"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 import xarray as xr
 
 from tactile_bayes.checks import check_choice, check_kind, check_mapping, check_optional, check_path, check_switch
-from tactile_bayes.errors import RecordError
+from tactile_bayes.errors import RecordError, RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.bag import is_bag, read_bag_table
 from tactile_bayes.record.construction import completed_record
@@ -21,10 +22,10 @@ from tactile_bayes.record.origin import renamed
 from tactile_bayes.record.schema import FRAMES, Frame
 from tactile_bayes.record.sweep_segments import split_at_turns
 from tactile_bayes.record.table import Table
-from tactile_bayes.record.units import in_units_of_record
+from tactile_bayes.record.units import assumed_units, in_units_of_record
 from tactile_bayes.record.validation import validate
 
-__all__ = ["read_record", "record_in", "write_record"]
+__all__ = ["read_record", "record_in", "refuse_no_file", "write_record"]
 
 _READERS = {".csv": read_csv, ".nc": read_netcdf_table}
 _WRITERS = {".csv": write_csv, ".nc": write_netcdf_record}
@@ -41,10 +42,10 @@ def read_record(
 ) -> xr.Dataset:
     """Read a record from a CSV or a NetCDF file, or a bag of ROS, with columns of any name, unit, sign and zero.
 
-    A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per
-    sample; `write_record` shows the format. The header is optional: without it the numbers are dimensionless, or SI if
-    `rod` is given or a column states a unit. The line `# load_cell_frame: turning` states a load cell that turns with
-    the drive. Semicolons or tabs may separate columns, and decimals may then have commas; text is in UTF-8 or
+    A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per sample;
+    `write_record` shows the format. The header is optional: without it the numbers are dimensionless, or SI if a column
+    states a unit or `rod` is given, with a warning. The line `# load_cell_frame: turning` states a load cell that turns
+    with the drive. Semicolons or tabs may separate columns, and decimals may then have commas; text is in UTF-8 or
     Windows-1252. In a NetCDF file every variable has one common dimension, "sample" or any other. In a bag columns are
     fields of messages, like "/wrench.wrench.force.x" (see `tactile_bayes.record.bag`); it takes the package rosbags.
 
@@ -90,11 +91,17 @@ def read_record(
         If the content is not a record, see `validate` (the message names line and column); if the file is SI and no rod
         is stated; if it states another rod than `rod`, or another frame than `load_cell_frame`; if a column has the
         unit of another quantity, or its source in `columns` does not exist; if the file to be split has sweeps already,
-        or its drive angle jumps by about a turn; if the path is a folder, or has another suffix.
+        or its drive angle jumps by about a turn; if the path is a folder, a pipe or a device, or has another suffix.
     FileNotFoundError
         If there is no such file.
     ParameterError
         If a key of `columns` is not a column of a record, or a value is invalid.
+
+    Warns
+    -----
+    RecordWarning
+        If the record is SI and nobody states the unit of a measured column, or if the last line of a CSV file has no
+        end: it may be cut. Its row is left out if its last number stands out from those above.
 
     Examples
     --------
@@ -118,7 +125,7 @@ def read_record(
 
     >>> with tempfile.TemporaryDirectory() as directory:
     ...     path = Path(directory) / "moment_only.csv"
-    ...     _ = path.write_text("sweep,direction,drive_angle,holding_moment\\n0,forward,1.2,6e-5\\n")
+    ...     _ = path.write_text("sweep,direction,drive_angle [deg],holding_moment [N m]\\n0,forward,69,6e-5\\n")
     ...     record = read_record(path, rod=Rod(0.1, 1.2e-5), missing=("force_x", "force_y"))
     >>> record.attrs["units"]
     'SI'
@@ -134,10 +141,24 @@ def read_record(
     if not path.exists():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     columns = columns or {}
-    if path.is_dir() and not is_bag(path):
-        raise RecordError(f"{path} is a folder: give the record itself, a .csv or a .nc file, or a bag")
+    if not is_bag(path):
+        refuse_no_file(path)
     table = (read_bag_table if is_bag(path) else _READERS[_suffix(path)])(path, columns)
-    return record_in(table, columns, split_sweeps, rod, missing, load_cell_frame)
+    record = record_in(table, columns, split_sweeps, rod, missing, load_cell_frame)
+    for note in record.encoding["notes"]:
+        warnings.warn(f"{path}: {note}", RecordWarning, stacklevel=2)
+    return record
+
+
+def refuse_no_file(path: Path) -> None:
+    """Refuse a folder, and a pipe or a device, which could only be read once or without an end."""
+    if path.is_dir():
+        raise RecordError(f"{path} is a folder: give the record itself, a .csv or a .nc file, or a bag")
+    if path.exists() and not path.is_file():
+        raise RecordError(
+            f"{path} is a pipe or a device, and a record is read several times: write it to a file first, as in "
+            "zcat record.csv.gz > record.csv"
+        )
 
 
 def record_in(
@@ -148,7 +169,10 @@ def record_in(
     missing: Collection[str],
     load_cell_frame: Frame | None,
 ) -> xr.Dataset:
-    """Return the record in a table as it was read; arguments are those of `read_record`."""
+    """Return the record in a table as it was read; arguments are those of `read_record`.
+
+    Its encoding has "notes", what was assumed or left out, and "remarks", commented lines without a meaning.
+    """
     if "drive_angle" in table.attrs and "drive_angle" not in {*columns, *table.columns}:
         columns = {**columns, "drive_angle": str(table.attrs["drive_angle"])}
         attrs = {name: value for name, value in table.attrs.items() if name != "drive_angle"}
@@ -160,6 +184,10 @@ def record_in(
     record = completed_record(table, rod, missing, load_cell_frame)
     if rod is None and "units" not in table.attrs:
         record.attrs["units_source"] = "assumed"
+    notes = [*table.source.notes]
+    if record.attrs["units"] == "SI" and not is_bag(Path(table.source.name)):  # messages of ROS are SI
+        notes.append(assumed_units(table))
+    record.encoding = {"notes": [note for note in notes if note], "remarks": [*table.source.remarks]}
     return record
 
 

@@ -18,7 +18,7 @@ from tactile_bayes.errors import RecordError
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record.csv_format import read_csv_content
-from tactile_bayes.record.files import record_in
+from tactile_bayes.record.files import record_in, refuse_no_file
 from tactile_bayes.record.schema import Frame
 from tactile_bayes.record.sweep import carried_sweeps
 
@@ -96,8 +96,7 @@ class GrowingRecord:
         load_cell_frame: Frame | None = None,
     ) -> None:
         self._path = check_path("path", path)
-        if self._path.is_dir():
-            raise RecordError(f"{self._path} is a folder: give the record itself, a .csv file")
+        refuse_no_file(self._path)
         if self._path.suffix.lower() != ".csv":
             raise RecordError(f"{self._path}: only a .csv file can be followed while it grows")
         self._columns = {} if columns is None else columns
@@ -106,6 +105,7 @@ class GrowingRecord:
         self._content = b""
         self._left_out: set[int] = set()
         self._behind: set[int] = set()
+        self._noted: list[str] = []
 
     def poll(self) -> Growth | None:
         """Return the record if the file has whole lines that it did not have before, or other ones; else None.
@@ -117,6 +117,7 @@ class GrowingRecord:
         OSError
             If the file is there and cannot be opened.
         """
+        refuse_no_file(self._path)  # opening a pipe would wait
         try:
             with open(self._path, "rb") as file:
                 stat = os.fstat(file.fileno())
@@ -168,6 +169,8 @@ class GrowingRecord:
                 messages.append(_with_others(str(error), wrong))
                 if len(self._left_out) > max(_FEWEST, len(lines) // 2):
                     raise
+        messages += [f"{self._path}: {note}" for note in record.encoding["notes"] if note not in self._noted]
+        self._noted = record.encoding["notes"]
         assert table.source.lines is not None
         at = np.asarray(table.source.lines)
         behind = _behind(record)

@@ -11,13 +11,13 @@ import numpy as np
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.parsing import parsed_column
-from tactile_bayes.record.quantity import accepted_units, unit_of
+from tactile_bayes.record.quantity import OTHER_UNITS, accepted_units, unit_of, units_disagree
 from tactile_bayes.record.schema import COLUMNS, DIRECTIONS, MEASURED, Column, Kind, column_of
-from tactile_bayes.record.spelling import nearest
+from tactile_bayes.record.spelling import look_alikes, nearest, plain
 from tactile_bayes.record.storable import storable
 from tactile_bayes.record.table import Cells, Source, Table
 
-__all__ = ["Origin", "any_meant", "meant_kinds", "origins_of", "renamed"]
+__all__ = ["Origin", "any_meant", "found_column", "meant_kinds", "origins_of", "renamed"]
 
 CONSTANTS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 """Columns for which a single value can be given."""
@@ -108,10 +108,10 @@ def any_meant(columns: Mapping[str, str], names: Iterable[str]) -> bool:
     names = list(names)
     if any(_stem_and_unit(name)[0] in MEASURED for name in names):
         return True
-    texts = [str(text).strip() for text in columns.values()]
+    texts = [plain(str(text)).strip() for text in columns.values()]
     named = [text for text in texts if not (_VALUE.fullmatch(text) or text in DIRECTIONS)]
     readings = [origin for text in named for origin in _readings(text)]
-    return any(origin.column is not None and _found(origin.column, names) is not None for origin in readings)
+    return any(origin.column is not None and found_column(origin.column, names) is not None for origin in readings)
 
 
 def meant_kinds(origins: Mapping[str, Origin], names: Iterable[str]) -> dict[str, Kind]:
@@ -167,13 +167,13 @@ def _cells(target: str, origin: Origin, found: Cells, is_shared: bool, source: S
         unit = origin.unit
     else:
         unit = str(stated)
-        of_origin, of_file = unit_of(origin.unit) if origin.unit is not None else None, unit_of(unit)
-        if of_origin is not None and of_origin != of_file:
-            raise source.column_error(
-                target, f"is in [{unit}], but [{origin.unit}] is given for it: leave out the one that is wrong"
+        if origin.unit is not None and units_disagree(origin.unit, unit):
+            what = (
+                f"is in [{unit}], but [{origin.unit}] is given for it, or in its name: leave out the one that is wrong"
             )
-        if of_file is None and origin.unit is not None:
-            unit = origin.unit
+            if unit_of(origin.unit) is None:
+                what += f"; if [{origin.unit}] is no unit, give {f'{origin.column}[{unit}]'!r} for {target!r}"
+            raise source.column_error(target, what)
     attrs = {name: value for name, value in attrs.items() if name != "units"}
     return values, attrs if unit is None else {"units": unit, **attrs}
 
@@ -186,11 +186,14 @@ def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
         raise ParameterError(f"columns: {target!r} is no column of a record: {hint}")
     text = text.strip()
     readings = list(_readings(text))
+    if plain(text) != text:
+        readings += _readings(plain(text))
     for origin in readings:
-        name = None if origin.column is None else _found(origin.column, names)
+        name = None if origin.column is None else found_column(origin.column, names)
         if name is not None:
-            return _checked(target, column, replace(origin, column=name), text, source)
-    value = _value(target, text)
+            is_whole = _compact(name) == _compact(origin.column or "")
+            return _checked(target, column, replace(origin, column=name), is_whole, text, source)
+    value = _value(target, plain(text))
     if value is not None:
         return value
     wanted = readings[-1].column or text
@@ -199,7 +202,8 @@ def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
     if target in CONSTANTS:
         hint += f" (or one value for all samples, like {_example(column)})"
     raise source.error(
-        f"there is no column {wanted!r}, which is given for {target!r} (columns: {', '.join(names)}): {hint}"
+        f"there is no column {wanted!r}{look_alikes(wanted)}, which is given for {target!r} (columns: "
+        f"{', '.join(names)}): {hint}"
     )
 
 
@@ -209,17 +213,23 @@ def _readings(text: str) -> Iterator[Origin]:
     if match := _LEAD.fullmatch(text):
         starts.append((match["offset"] or "", -1 if match["sign"] == "-" else 1, match["rest"]))
     for lead, sign, rest in starts:
-        ends = [("", rest)]
-        if match := _TRAIL.fullmatch(rest):
-            ends.append((match["sign"] + match["offset"], match["rest"]))
-        for trail, name in ends:
+        for trail, name in _with_and_without_trail(rest):
             offset = float(lead or 0) + float(trail or 0)
             yield Origin(name, None, sign, offset)
             if match := _BRACKETS.fullmatch(name):
-                yield Origin(match["rest"], match["unit"].strip(), sign, offset)
+                unit = match["unit"].strip()
+                for shift, stem in _with_and_without_trail(match["rest"]):
+                    yield Origin(stem, unit, sign, offset + float(shift or 0))
 
 
-def _found(text: str, names: list[str]) -> str | None:
+def _with_and_without_trail(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the text as a name, and a name with a number that is added to it."""
+    yield "", text
+    if match := _TRAIL.fullmatch(text):
+        yield match["sign"] + match["offset"], match["rest"]
+
+
+def found_column(text: str, names: list[str]) -> str | None:
     """Find the column that a text names, regardless of blanks; a unit in its name may be left out."""
     if text in names:
         return text
@@ -231,11 +241,14 @@ def _found(text: str, names: list[str]) -> str | None:
 
 
 def _compact(text: str) -> str:
-    return re.sub(r"\s", "", text)
+    return re.sub(r"\s", "", plain(text))
 
 
-def _checked(target: str, column: Column, origin: Origin, text: str, source: Source) -> Origin:
-    """Complete an origin by the unit in the column's name, or refuse a contradiction."""
+def _checked(target: str, column: Column, origin: Origin, is_whole: bool, text: str, source: Source) -> Origin:
+    """Complete an origin by the unit in the column's name, or refuse a contradiction.
+
+    Brackets that are no unit may be part of a name that is given as a whole.
+    """
     if column.kind != "number":
         if origin.unit is not None or origin.sign < 0 or origin.offset:
             raise ParameterError(
@@ -244,20 +257,31 @@ def _checked(target: str, column: Column, origin: Origin, text: str, source: Sou
         return origin
     assert origin.column is not None
     _, in_name = _stem_and_unit(origin.column)
+    if in_name is None:
+        in_name = _ending(origin.column, column)
     if origin.unit is None:
         return replace(origin, unit=in_name)
-    given, named = unit_of(origin.unit), None if in_name is None else unit_of(in_name)
-    if given is None:
+    if unit_of(origin.unit) is None:
         raise ParameterError(
             f"columns: {text!r} is given for {target!r}, but {origin.unit!r} is no unit of it: it takes "
             f"{accepted_units(column.unit)}"
         )
-    if named is not None and named != given:
+    if in_name is None or (is_whole and unit_of(in_name) is None):
+        return origin
+    if units_disagree(origin.unit, in_name):
         raise source.error(
-            f"column {origin.column!r} has its unit in its name, but [{origin.unit}] is given for it: leave out the "
-            "one that is wrong"
+            f"column {origin.column!r} is in [{in_name}] by its name, but [{origin.unit}] is given for it: leave out "
+            "the one that is wrong"
         )
     return origin
+
+
+def _ending(name: str, column: Column) -> str | None:
+    """Return a unit of the column's quantity at the end of a name, as in Fx_mN."""
+    ending = name.rpartition("_")[2]
+    unit, expected = unit_of(ending), unit_of(column.unit)
+    is_unit = unit is not None and expected is not None and unit.dimension == expected.dimension
+    return ending if is_unit and ending != name else None
 
 
 def _stem_and_unit(name: str) -> tuple[str, str | None]:
@@ -266,7 +290,7 @@ def _stem_and_unit(name: str) -> tuple[str, str | None]:
     if match is None:
         return name, None
     unit = match["square"] if match["square"] is not None else match["round"] or match["slash"] or ""
-    is_unit = match["square"] is not None or unit_of(unit) is not None
+    is_unit = match["square"] is not None or unit_of(unit) is not None or unit.strip() in OTHER_UNITS
     return (match["stem"], unit.strip()) if is_unit else (name, None)
 
 

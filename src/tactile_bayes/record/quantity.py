@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Unit", "accepted_units", "converted", "unit_of"]
+from tactile_bayes.record.spelling import plain
+
+__all__ = ["OTHER_UNITS", "Unit", "accepted_units", "converted", "unit_of", "units_disagree"]
 
 Dimension = tuple[int, int, int, int]
 """Powers of length, force, time and angle."""
@@ -64,6 +66,15 @@ _COMMON = {
 _LONGEST = 100
 _LARGEST = 10**100
 """Largest number of characters of a unit, and its largest size in SI."""
+
+OTHER_UNITS = frozenset(
+    (
+        *("kg", "mg", "lb", "lbs", "lbf", "kgf", "kp", "oz", "ozf", "dyn", "dyne", "inch", "inches", "ft"),
+        *("mV", "µV", "kV", "mA", "Pa", "kPa", "MPa", "hPa", "bar", "mbar", "psi", "°C", "°F", "Hz", "kHz"),
+        *("count", "counts", "digits", "LSB", "turns", "rev", "%", "gon", "grad"),
+    )
+)
+"""Units that are often stated with a column, and are none of its quantity, or not known here."""
 
 _SYMBOL = re.compile(
     rf"(?P<prefix>{'|'.join(sorted(_PREFIXES, key=len, reverse=True))})"
@@ -127,7 +138,7 @@ def unit_of(text: str) -> Unit | None:
     """
     if len(text) > _LONGEST:
         return None
-    text = unicodedata.normalize("NFKC", text).strip()
+    text = unicodedata.normalize("NFKC", plain(text)).strip()
     text = _WORDS.get(text.lower(), text)
     scale, dimension = Fraction(1), (0, 0, 0, 0)
     for index, part in enumerate(text.split("/")):
@@ -143,6 +154,20 @@ def unit_of(text: str) -> Unit | None:
                 )
                 dimension = (length, force, time, angle)
     return Unit(scale, dimension) if max(scale, 1 / scale) < _LARGEST else None
+
+
+def units_disagree(one: str, other: str) -> bool:
+    """Return whether two texts are not the same unit in other spelling; an unknown unit agrees with itself alone.
+
+    Examples
+    --------
+    >>> units_disagree("N mm", "mN·m"), units_disagree("mN", "N"), units_disagree("kg", "mN")
+    (False, True, True)
+    """
+    first, second = unit_of(one), unit_of(other)
+    if first is None and second is None:
+        return plain(one).split() != plain(other).split()
+    return first != second
 
 
 def _factors(piece: str) -> tuple[Unit, ...] | None:

@@ -14,6 +14,8 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.record.spelling import plain
+
 __all__ = [
     "ATTRIBUTE_UNITS",
     "CHANNELS",
@@ -218,7 +220,7 @@ def same_unit(one: str, other: str) -> bool:
 
 
 def _plain(unit: str) -> str:
-    return re.sub(r"[\s^·⋅*]", "", unicodedata.normalize("NFKC", unit))
+    return re.sub(r"[\s^·*]", "", unicodedata.normalize("NFKC", plain(unit)))
 
 
 def present_channels(record: xr.Dataset) -> tuple[str, ...]:

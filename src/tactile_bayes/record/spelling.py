@@ -1,12 +1,29 @@
-"""Suggestions for misspelt names."""
+"""Misspelt names, and characters that look like others."""
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable
 from difflib import SequenceMatcher
 
-__all__ = ["is_misspelling", "nearest"]
+__all__ = ["is_misspelling", "look_alikes", "nearest", "plain", "plain_number", "visible"]
+
+_STAND_FOR = {
+    **dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2015\u2212\ufe63\uff0d", "-"),
+    **dict.fromkeys("\u00ba\u02da\u2218", "°"),
+    **dict.fromkeys("\u00d7\u2022\u2027\u2219\u22c5", "·"),
+    **dict.fromkeys("\u201c\u201d\u201e\u201f\u2033", '"'),
+    **dict.fromkeys("\u2018\u2019\u201a\u201b\u2032", "'"),
+    **dict.fromkeys("\u2044\u2215", "/"),
+    "\u066b": ".",
+    "\u00b5": "μ",
+}
+"""What characters stand for; beside them are those of full width, and digits of any script."""
+
+_FULL_WIDTH, _TO_ASCII = range(0xFF01, 0xFF5F), 0xFEE0
+_THOUSANDS = re.compile(r"(?<=[0-9])[\u00a0\u2007\u2009\u202f\u066c\u2019](?=[0-9]{3}(?![0-9]))")
+"""Separators of thousands that are used for nothing else; a blank or a comma may separate columns."""
 
 _LONGEST = 200
 """Largest number of characters of a name that is compared."""
@@ -33,6 +50,73 @@ def nearest(name: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | 
     """
     found = max(candidates, key=lambda candidate: _likeness(name, candidate), default=None)
     return found if found is not None and _likeness(name, found) >= cutoff else None
+
+
+def plain(text: str) -> str:
+    """Replace characters by those that they look like and stand for; those without a width are removed.
+
+    These are minus signs, degrees, dots, quotation marks, blanks, full-width characters, and digits of any script.
+
+    Examples
+    --------
+    >>> plain("90\N{MINUS SIGN}Angle[\N{MASCULINE ORDINAL INDICATOR}]"), plain("1\N{NO-BREAK SPACE}mN")
+    ('90-Angle[°]', '1 mN')
+    """
+    return text if text.isascii() else "".join(map(_meant, text))
+
+
+def visible(text: str) -> str:
+    """Remove characters without a width, and replace blanks of any width by usual ones.
+
+    Examples
+    --------
+    >>> visible("\N{ZERO WIDTH NO-BREAK SPACE}Fx\N{NO-BREAK SPACE}[mN]")
+    'Fx [mN]'
+    """
+    return text if text.isascii() else "".join(_meant(sign) if _meant(sign) in ("", " ") else sign for sign in text)
+
+
+def plain_number(text: str) -> str:
+    """Return the text of a number in plain characters, without separators of thousands that stand for nothing else.
+
+    Examples
+    --------
+    >>> plain_number("\N{MINUS SIGN}1\N{NARROW NO-BREAK SPACE}234.5"), plain_number("1\N{NARROW NO-BREAK SPACE}23")
+    ('-1234.5', '1 23')
+    """
+    if text.isascii():
+        return text
+    digits = "".join(sign if (value := unicodedata.decimal(sign, None)) is None else str(value) for sign in text)
+    return plain(_THOUSANDS.sub("", digits)).strip()
+
+
+def look_alikes(text: str) -> str:
+    """Name the characters that look like others, for messages; "" without.
+
+    Examples
+    --------
+    >>> look_alikes("\N{EN DASH}1"), look_alikes("-1")
+    (" (U+2013 EN DASH stands there for '-')", '')
+    """
+    odd = [sign for sign in dict.fromkeys(text) if not sign.isascii() and _meant(sign) != sign and sign not in "\u00b5"]
+    named = [f"U+{ord(sign):04X} {unicodedata.name(sign, 'without a name')}" for sign in odd[:3]]
+    meant = [f"stands there for {_meant(sign)!r}" if _meant(sign) else "cannot be seen" for sign in odd[:3]]
+    words = ", ".join(f"{name} {what}" for name, what in zip(named, meant, strict=True))
+    return f" ({words})" if words else ""
+
+
+def _meant(sign: str) -> str:
+    """Return the character that a character stands for, "" for one without a width."""
+    if sign in _STAND_FOR:
+        return _STAND_FOR[sign]
+    if ord(sign) in _FULL_WIDTH:
+        return chr(ord(sign) - _TO_ASCII)
+    category = unicodedata.category(sign)
+    if category == "Zs":
+        return " "
+    if category == "Cf":
+        return ""
+    return str(unicodedata.decimal(sign)) if category == "Nd" else sign
 
 
 def is_misspelling(name: str, meant: str) -> bool:

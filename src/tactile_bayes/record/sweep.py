@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.record.quantity import unit_of
 from tactile_bayes.record.schema import DIRECTIONS, LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source
 
@@ -36,17 +37,7 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
         )
     beyond = (angle > LARGEST_DRIVE_ANGLE) | (angle < -LARGEST_DRIVE_ANGLE)
     if beyond.any():
-        sample = int(np.argmax(beyond))
-        what = (
-            f"{float(angle[sample])!r} is more than a turn (2π), so the angles look like degrees: convert the column "
-            "to radians, with numpy.radians or times 0.017453292519943295"
-        )
-        if source.names:
-            origin = f"{source.origins.get('drive_angle', 'drive_angle')}[deg]"
-            what += (
-                f", or state its unit, as in columns={{'drive_angle': {origin!r}}} of read_record, on the command line "
-                f"--column {shlex.quote(f'drive_angle={origin}')}"
-            )
+        what = _beyond_a_turn(angle, int(np.argmax(beyond)), source)
         raise source.cell_error(np.flatnonzero(beyond), "drive_angle", what)
     for rows in _sweeps(values["sweep"]):
         first, last = _ends(rows)
@@ -73,6 +64,44 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
                 f"to {float(angle[last])!r} rad ({source.row(last)}): label it {DIRECTIONS[sense > 0]!r}, or put its "
                 "samples in the order in which they were measured"
             )
+
+
+def _beyond_a_turn(angle: Floats, sample: int, source: Source) -> str:
+    """Return a message on an angle beyond a turn: it is in degrees without saying so, or it counts on."""
+    stated = source.units.get("drive_angle", "")
+    unit = unit_of(stated) if stated else None
+    if unit is not None and unit.scale != 1:
+        return _counted_on(angle, sample, stated, float(unit.scale), source)
+    what = (
+        f"{float(angle[sample])!r} is more than a turn (2π), so the angles look like degrees: convert the column "
+        "to radians, with numpy.radians or times 0.017453292519943295"
+    )
+    if unit is not None:
+        return f"{what}; or, as it is stated in [{stated}], {_counted_on(angle, sample, stated, 1.0, source)}"
+    if not source.names:
+        return what
+    origin = source.origins.get("drive_angle", "drive_angle")
+    return f"{what}, or state its unit, as in {_given(f'{origin}[deg]')}"
+
+
+def _counted_on(angle: Floats, sample: int, stated: str, scale: float, source: Source) -> str:
+    """Return a message on angles that count on beyond a turn, in the unit that is stated for them."""
+    turn, values = 2.0 * math.pi / scale, angle / scale
+    turns = round(float(values.min() + values.max()) / 2.0 / turn) or (1 if values[sample] > 0.0 else -1)
+    what = f"{float(values[sample]):.6g} {stated} is beyond a turn"
+    if np.abs(angle - 2.0 * math.pi * turns).max() > LARGEST_DRIVE_ANGLE:
+        return f"{what}, and the angles span two turns or more: count them from zero again in each sweep"
+    origin = source.origins.get("drive_angle", "drive_angle")
+    if "drive_angle" in source.origins and "drive_angle" not in source.aliases:  # one value for all samples
+        return f"{what}: give {values[sample] - turns * turn:.6g}[{stated}]"
+    shift = f"{origin}{-turns * turn:+.15g}[{stated}]"
+    return f"{what}: {'subtract' if turns > 0 else 'add'} {abs(turns) * turn:.15g}, {_given(shift)}"
+
+
+def _given(origin: str) -> str:
+    """Return the origin of a drive angle as an argument and as an option."""
+    option = shlex.quote(f"drive_angle={origin}")
+    return f"columns={{'drive_angle': {origin!r}}} of read_record, on the command line --column {option}"
 
 
 def carried_sweeps(record: xr.Dataset) -> tuple[int, ...]:

@@ -42,6 +42,12 @@ class Source:
         Origins of columns, with sign and zero, in the form that `read_record` takes, without the unit.
     stated : mapping of str to int, optional
         Line of each attribute.
+    units : mapping of str to str, optional
+        Unit that is stated for a column, before conversion.
+    remarks : sequence of str, optional
+        Commented lines without a meaning.
+    notes : sequence of str, optional
+        What was assumed or left out as the file was read.
     """
 
     name: str = ""
@@ -51,6 +57,9 @@ class Source:
     names: Sequence[str] = ()
     origins: Mapping[str, str] = field(default_factory=dict)
     stated: Mapping[str, int] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    remarks: Sequence[str] = ()
+    notes: Sequence[str] = ()
 
     def row(self, sample: int) -> str:
         """Return the name of a sample in messages."""

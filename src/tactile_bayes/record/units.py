@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import operator
+import shlex
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +17,11 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod, without_rod
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
-from tactile_bayes.record.schema import LOAD_CELL_UNITS, UNITS, column_of
+from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED, UNITS, column_of
 from tactile_bayes.record.table import Cells, Source, Table
 from tactile_bayes.record.validation import validate
 
-__all__ = ["in_units_of_record", "rod_of", "to_dimensionless", "to_si", "with_rod"]
+__all__ = ["assumed_units", "in_units_of_record", "rod_of", "to_dimensionless", "to_si", "with_rod"]
 
 
 def rod_of(record: xr.Dataset) -> Rod:
@@ -187,6 +190,9 @@ def in_units_of_record(table: Table, rod: Rod | None) -> Table:
     if units not in UNITS:  # refused later, with the other attributes
         return table
     columns: dict[str, Cells] = {}
+    source = replace(
+        table.source, units={name: str(of["units"]) for name, (_, of) in table.columns.items() if "units" in of}
+    )
     for name, (values, of_column) in table.columns.items():
         column = column_of(name)
         if column is None or "units" not in of_column:
@@ -207,7 +213,30 @@ def in_units_of_record(table: Table, rod: Rod | None) -> Table:
         if stated != wanted:
             values = converted(parsed_column(name, values, table.source), stated, wanted)
         columns[name] = (values, {**of_column, "units": expected})
-    return Table(columns, attrs, table.source)
+    return Table(columns, attrs, source)
+
+
+def assumed_units(table: Table) -> str:
+    """Return a note on the measured columns of an SI record whose unit nobody states; "" if there are none.
+
+    The table has units of a record, see `in_units_of_record`.
+    """
+    if "units" in table.source.stated or (not table.source.stated and "units" in table.attrs):
+        return ""
+    taken = {
+        name: COLUMNS[name].unit
+        for name, (values, attrs) in table.columns.items()
+        if name in MEASURED and COLUMNS[name].kind == "number" and "units" not in attrs and np.any(values != 0.0)
+    }
+    if not taken:
+        return ""
+    name = next(iter(taken))
+    origin = shlex.quote(f"{name}={table.source.origins.get(name, name)}[{taken[name]}]")
+    return f"no unit is stated for {_and(taken)}: taken as {_and(taken.values())}. State them, as in --column {origin}"
+
+
+def _and(words: Iterable[str]) -> str:
+    return " and ".join(filter(None, (", ".join([*words][:-1]), [*words][-1])))
 
 
 def _is_physical(name: str, cells: Cells) -> bool:

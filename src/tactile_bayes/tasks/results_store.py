@@ -155,7 +155,7 @@ def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]
         outcomes = {int(row["number"]): kind.decode(row) for row in table[kind.what]}
     except kind.error:
         raise
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise kind.error(f"{file} holds no {kind.what} that can be read ({error}): {correction}") from error
     differ = [name for name in {**there, **identity} if there.get(name) != identity.get(name)]
     if outcomes and differ:

@@ -137,7 +137,7 @@ class Checkpoint:
                 )
             identity = {name: str(value) for name, value in table["identity"].items()}
             judged = int(table["judged"])
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
             raise InferenceError(
                 f"{path} is not the description of a checkpoint, or damaged ({error!r}): put a copy of it back, or "
                 "give another folder"

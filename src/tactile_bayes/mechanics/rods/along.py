@@ -36,6 +36,9 @@ _MOST_CELLS = 256
 _SAME = 1e-9
 """Share of the length that counts as zero."""
 
+_LARGEST = 1e100
+"""Largest number in the text of polynomials."""
+
 
 @dataclass(frozen=True)
 class Along:
@@ -156,6 +159,8 @@ def _read(name: str, text: str) -> Along:
         raise ParameterError(f"{name} has {len(edges)} edges and {len(rows)} cells: its text is incomplete")
     if edges[0] != 0.0 or not np.all(np.diff(edges) > 0.0):
         raise ParameterError(f"{name} has the edges {edges[:4]}: they increase from 0, the base")
+    if np.abs(whole).max() > _LARGEST:
+        raise ParameterError(f"{name} has the number {whole[np.abs(whole).argmax()]}, which no rod can have")
     return Along(edges, rows)
 
 

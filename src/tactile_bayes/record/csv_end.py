@@ -1,0 +1,84 @@
+"""The end of a CSV file: a last line without an end may be cut within its last number."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Sequence
+from itertools import pairwise
+from statistics import mean, median
+from typing import BinaryIO
+
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
+from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.csv_header import Header, cells_in
+
+__all__ = ["without_cut_row"]
+
+_TAIL = 1 << 16
+"""Bytes of the end of a file in which rows are compared with the last one."""
+
+_COMPARED, _FEWEST, _ENOUGH = 50, 3, 10
+"""Largest number of rows that are compared; smallest numbers for a comparison of values, and of notations."""
+
+_WIDTHS = 8.0
+"""Usual steps from row to row by which a cut number is off."""
+
+_INTEGER = (None, None)
+"""Notation of a number without decimals and exponent, which is the same if digits are cut off."""
+
+_NOTATION = re.compile(r"[+-]?[0-9]*(?:[.,](?P<decimals>[0-9]*))?(?:[eE][+-]?(?P<power>[0-9]*))?")
+
+
+def without_cut_row(file: BinaryIO, header: Header, line: int) -> tuple[BinaryIO, str]:
+    """Return a file from its position after a line on, without a last row that is cut, and a note on what is wrong.
+
+    The row is left out if its last number stands out from those above, in its notation or its value. Without reason for
+    a note, the file is returned unchanged, at the same position, with an empty note.
+    """
+    begin = file.tell()
+    size = file.seek(0, io.SEEK_END)
+    start = max(begin, size - _TAIL)
+    file.seek(start)
+    *above, last = file.read().split(b"\n")
+    file.seek(begin)
+    if not last.strip(b",;\t \r") or last.endswith((b"\r", b'"')):
+        return file, ""
+    rows = [cells_in(line.decode("utf-8", "replace"), header.delimiter) for line in above[-_COMPARED:]]
+    ends = [row[-1] for row in rows if len(row) == len(header.names) and row[-1]]
+    cells = cells_in(last.decode("utf-8", "replace"), header.delimiter)
+    number = line + 1 + file.read().count(b"\n")
+    file.seek(begin)
+    note = f"line {number}, the last one, has no end: was the file copied whole?"
+    is_text = header.descriptions.get(header.names[-1], {}).get("kind") == "text"
+    if is_text or len(cells) != len(header.names) or not _stands_out(cells[-1], ends):
+        return file, note
+    return io.BytesIO(file.read(size - len(last) - begin)), (
+        f"{note} Its last number, {cells[-1]!r}, is unlike those above it, and the row is left out"
+    )
+
+
+def _stands_out(text: str, above: Sequence[str]) -> bool:
+    """Return whether a number differs from those above it in its notation, or by much more than they from another."""
+    numbers = [(_number_in(cell), cell) for cell in above]
+    values = [value for value, _ in numbers if value is not None]
+    number = _number_in(text)
+    if number is None or len(values) < max(_FEWEST, len(above)):  # a column of text
+        return False
+    notations = {_notation(cell) for _, cell in numbers}
+    if len(values) >= _ENOUGH and len(notations) == 1 and notations != {_INTEGER}:
+        return _notation(text) not in notations
+    steps = [abs(b - a) for a, b in pairwise(values)]
+    usual = DEVIATION_OVER_MEDIAN * median(steps) or mean(steps)
+    return abs(number - values[-1]) > _WIDTHS * usual
+
+
+def _number_in(text: str) -> float | None:
+    number = number_in(text.replace(",", ".")) if text else None
+    return None if number is None or number != number else number
+
+
+def _notation(text: str) -> tuple[int | None, ...]:
+    """Return the numbers of digits of decimals and exponent, None without."""
+    match = _NOTATION.fullmatch(text)
+    return () if match is None else tuple(None if part is None else len(part) for part in match.groups())

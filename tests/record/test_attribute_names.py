@@ -1,0 +1,116 @@
+"""Names of attributes: misspelt ones are refused in every kind of record, foreign ones are kept."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.record_tables import WIRE, columns
+from helpers.refusals import refused
+from tactile_bayes.errors import RecordError
+from tactile_bayes.record import make_record, read_record, write_record
+from tactile_bayes.record.attribute_names import misspelt, stray_attribute, unused
+
+WRONG = [
+    ("rod_tapper", 0.4, "taper"),
+    ("rod_rest_curvatur", "5 [1/m]", "rest_curvature"),
+    ("rod_rest_curvatur", '{"edges": [0, 1], "coefficients": [[1]]}', "rest_curvature"),
+    ("rod_tapre", "slight", "taper"),
+    ("rod_EI", 2e-4, "rod_"),
+    ("load_cell_frame_", "turning", "frame"),
+    ("load_cell_axes", "turning", "load_cell_"),
+    ("loadcell_force_noise", "1 [mN]", "load_cell_force_noise"),
+    ("Rod-Taper", 0.4, "rod_taper"),
+    ("roddiameter", 1e-3, "rod_diameter"),
+    ("RodRestCurvature", 1.0, "rod_rest_curvature"),
+    ("rod length", "see below", "rod_length"),
+    ("unit", "SI", "units"),
+    ("Units", "si", "units"),
+]
+FOREIGN = [
+    ("rodent", 7),
+    ("serial", 4711),
+    ("serial_number", "FT-4711"),
+    ("rod_material", "nitinol"),
+    ("load_cell_model", "ATI Nano17"),
+    ("record_length", 12.0),
+    ("period_length", 2.0),
+    ("product", "rod"),
+    ("force", 1.0),
+    ("unit", "m"),
+    ("length", 3),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "meant"), WRONG)
+def test_a_misspelt_attribute_is_refused_in_memory_and_in_files(tmp_path, name, value, meant):
+    with refused(RecordError, f"attribute '{name}'", meant):
+        make_record(columns(), rod=WIRE, attrs={name: value})
+    record = make_record(columns(), rod=WIRE)
+    for suffix in (".csv", ".nc"):
+        write_record(record, tmp_path / f"record{suffix}")
+    text = (tmp_path / "record.csv").read_text(encoding="utf-8")
+    key = f'"{name}"' if " " in name else name
+    (tmp_path / "record.csv").write_text(text.replace("\n", f"\n# {key}: {value}\n", 1), encoding="utf-8")
+    with refused(RecordError, "line 2", name, meant):
+        read_record(tmp_path / "record.csv")
+    other = xr.load_dataset(tmp_path / "record.nc", engine="h5netcdf")
+    other.attrs[name] = value
+    other.to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+    with refused(RecordError, name, meant):
+        read_record(tmp_path / "other.nc")
+
+
+@pytest.mark.parametrize(("name", "value"), FOREIGN)
+def test_a_foreign_attribute_is_kept_and_known_as_such(name, value):
+    assert misspelt(name, value) is None
+    record = make_record(columns(), rod=WIRE, attrs={name: value})
+    assert (record.attrs[name], unused(record.attrs)) == (value, [name])
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("rod_taper = 0.4", "rod_taper"),
+        ("rod_taper 0.4", "rod_taper"),
+        ("rod_taper,0.4", "rod_taper"),
+        ("rod taper: 0.4", "rod_taper"),
+        ("Rod-Diameter = 0.5 mm", "rod_diameter"),
+        ("load_cell_frame = turning", "load_cell_frame"),
+        ("rod_tapper; 0.4", "rod_taper"),
+        ("units = SI", "units"),
+        ("rod_length\N{FULLWIDTH COLON} 0.1 [m]", "rod_length"),
+    ],
+)
+def test_an_attribute_in_another_form_is_refused(tmp_path, line, name):
+    assert stray_attribute(line)[0] == name
+    path = tmp_path / "record.csv"
+    path.write_text(f"# {line}\nsweep,direction,drive_angle,holding_moment,force_x,force_y\n0,forward,1,0,0,0\n")
+    with refused(RecordError, "line 1", name):
+        read_record(path, rod=WIRE)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["whisker rig, wire 120 mm x 0.5 mm", "see rod_taper above", "Units, mN and mm", "a = b", "rods: three", "12:30 x"],
+)
+def test_words_are_no_attributes(line):
+    assert stray_attribute(line) is None
+
+
+def test_words_about_a_stated_attribute_are_kept_for_inspection(tmp_path):
+    path = tmp_path / "record.csv"
+    write_record(make_record(columns(), rod=WIRE, attrs={"operator": "me"}), path)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("\n", "\n# rod length = 20 cm, see log\n", 1), encoding="utf-8")
+    record = read_record(path)
+    assert record.encoding["remarks"] == ["line 2: rod length = 20 cm, see log"]
+    assert np.array_equal(record.force_x, columns()["force_x"])
+
+
+@pytest.mark.parametrize("line", ["column force_x: [mN]", "column force_x = number [mN]", "column Fx [mN]: number [N]"])
+def test_a_description_of_a_column_in_another_form_is_refused(tmp_path, line):
+    path = tmp_path / "record.csv"
+    write_record(make_record(columns(), rod=WIRE), path)
+    path.write_text(f"# {line}\n" + path.read_text(encoding="utf-8"), encoding="utf-8")
+    with refused(RecordError, "line 1", "'# column NAME: KIND [UNIT] TEXT'"):
+        read_record(path)
