@@ -49,7 +49,7 @@ _PLAIN = (h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING, h5py.h5t.ENUM)
 _OF_DIMENSIONS = ("DIMENSION_LIST", "REFERENCE_LIST")
 """Attributes of references, by which variables have their dimensions."""
 
-_NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"
+_NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable."
 """Beginning of the attribute NAME of a dimension that is no variable."""
 
 _SECONDS, _RATE, _PATIENCE = 10, 10_000_000, 12
@@ -69,6 +69,14 @@ class Group(NamedTuple):
     variables: Mapping[str, tuple[tuple[str, ...], NDArray[Any], Mapping[str, Any]]]
     """Dimensions, values as stored, and attributes, by name."""
     attrs: Mapping[str, Any]
+
+
+def is_cut_short(content: bytes) -> bool:
+    """Return whether a file has no beginning of HDF5, or fewer bytes than it states there."""
+    if not content.startswith(b"\x89HDF\r\n\x1a\n"):
+        return content.find(b"\x89HDF\r\n\x1a\n", 512, 1 << 20) < 0  # other bytes may come before it
+    begin = {0: 40, 1: 44, 2: 28, 3: 28}.get(content[8] if len(content) > 8 else -1)
+    return begin is not None and int.from_bytes(content[begin : begin + 8], "little") > len(content)
 
 
 def content_of(content: bytes, with_groups: bool) -> dict[str, Group]:
