@@ -38,7 +38,7 @@ _DEPTH, _OBJECTS = 32, 10_000
 _RATIO, _SLACK = 1032, 1 << 20
 """Largest ratio of a variable to its bytes in the file, which is that of deflate, beyond a size that is always read."""
 
-_LARGEST = 1 << 30
+_LARGEST = 1 << 28
 """Content [bytes] that is always allowed."""
 
 _FILTERS = (1, 2, 3, 4, 5, 6, 32000)
@@ -50,7 +50,7 @@ _OF_DIMENSIONS = ("DIMENSION_LIST", "REFERENCE_LIST")
 """Attributes of references, by which variables have their dimensions."""
 
 _NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable."
-"""Beginning of the attribute NAME of a dimension that is no variable."""
+"""Part of the attribute NAME of a dimension that is no variable."""
 
 _SECONDS, _RATE, _PATIENCE = 10, 10_000_000, 12
 """Time of the processor [s], bytes that are read in each second more, and the whole time over that of the processor."""
@@ -170,7 +170,8 @@ def _size_of(variable: h5py.Dataset, size: int) -> int:
     kind = variable.id.get_type()
     if kind.get_class() not in _PLAIN:
         raise UnsafeError(f"{path} is neither of numbers nor of text")
-    if bytes(variable.attrs.get("NAME", b"")).startswith(_NO_VARIABLE):
+    name = variable.attrs.get("NAME", b"")
+    if _NO_VARIABLE in (name.encode() if isinstance(name, str) else name):
         return 0  # it has no values, and is not read
     stated, stored = math.prod(variable.shape or (0,)) * kind.get_size(), variable.id.get_storage_size()
     chunk = math.prod(variable.chunks or (0,)) * kind.get_size()
