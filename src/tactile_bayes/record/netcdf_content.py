@@ -52,7 +52,7 @@ _OF_DIMENSIONS = ("DIMENSION_LIST", "REFERENCE_LIST")
 _NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable."
 """Part of the attribute NAME of a dimension that is no variable."""
 
-_SECONDS, _RATE, _PATIENCE = 10, 10_000_000, 12
+_SECONDS, _RATE, _PATIENCE = 5, 10_000_000, 12
 """Time of the processor [s], bytes that are read in each second more, and the whole time over that of the processor."""
 
 _WORKSPACE = 1 << 28
