@@ -232,8 +232,12 @@ def huge_in_little(file, other):
             note.id.write_direct_chunk((begin,), nothing)
 
 
+def huge_text(file, other):
+    file.create_dataset("note", (), dtype=f"S{2**30}")
+
+
 HOSTILE = (external, linked, link_to_nothing, soft_link, virtual, in_group, twice, in_itself, deep, plugin, references,
-           compound, ragged, attribute_of_references, huge, huge_in_little)  # fmt: skip
+           compound, ragged, attribute_of_references, huge, huge_in_little, huge_text)  # fmt: skip
 
 
 @pytest.mark.parametrize("is_sealed", [False, True], ids=["foreign", "with checksum"])

@@ -35,11 +35,8 @@ __all__ = [
 _DEPTH, _OBJECTS = 32, 10_000
 """Largest depth of groups, and number of groups and variables."""
 
-_RATIO, _SLACK = 1032, 1 << 20
-"""Largest ratio of a variable to its bytes in the file, which is that of deflate, beyond a size that is always read."""
-
-_LARGEST = 1 << 28
-"""Content [bytes] that is always allowed."""
+_LARGEST, _RATIO = 1 << 28, 8
+"""Content [bytes] that any file may have, and that of a larger one in its own sizes."""
 
 _FILTERS = (1, 2, 3, 4, 5, 6, 32000)
 """Filters that come with HDF5 and h5py; others are in plugins, which are programs."""
@@ -148,7 +145,7 @@ def _part_of(group: h5py.Group, name: str) -> h5py.HLObject:
 
 def largest_content(size: int) -> int:
     """Return the largest content of a file of this size that is read [bytes]."""
-    return max(_LARGEST, 4 * size)
+    return max(_LARGEST, _RATIO * size)
 
 
 def _address(part: h5py.HLObject) -> tuple[int, int]:
@@ -173,12 +170,10 @@ def _size_of(variable: h5py.Dataset, size: int) -> int:
     name = variable.attrs.get("NAME", b"")
     if _NO_VARIABLE in (name.encode() if isinstance(name, str) else name):
         return 0  # it has no values, and is not read
-    stated, stored = math.prod(variable.shape or (0,)) * kind.get_size(), variable.id.get_storage_size()
+    stated = 0 if variable.shape is None else math.prod(variable.shape) * kind.get_size()
     chunk = math.prod(variable.chunks or (0,)) * kind.get_size()
-    if stored > size or max(stated, chunk) > _SLACK + _RATIO * stored:
-        raise UnsafeError(
-            f"{path} is said to have {stated:,} bytes in chunks of {chunk:,}, of which {stored:,} are stored"
-        )
+    if (stored := variable.id.get_storage_size()) > size or chunk > largest_content(size):
+        raise UnsafeError(f"{path} is said to have {stored:,} bytes in the file, in pieces of {chunk:,}")
     return stated
 
 
