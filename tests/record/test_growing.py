@@ -81,6 +81,18 @@ def test_a_file_that_is_replaced_or_cut_short_is_told(path, lines):
     assert growing.poll() is None
 
 
+def test_a_change_of_the_same_size_at_the_same_time_is_seen(path, lines):
+    head, rows = lines
+    growing = GrowingRecord(write(path, head, rows[:10]))
+    before, stat = growing.poll(), path.stat()
+    write(path, head, [row.replace("0.", "1.", 1) for row in rows[:10]])
+    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    assert path.stat().st_size == stat.st_size
+    now = growing.poll()
+    assert now.is_other
+    assert now.sha256 != before.sha256
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import time
 from collections.abc import Collection, Mapping
 from itertools import pairwise
 from statistics import median
@@ -35,6 +36,10 @@ _STRAY = 2
 
 _WIDTHS = 6.0
 """Scatters of the encoder by which a drive angle may be behind."""
+
+
+_TICK = 2.0
+"""Longest time between two changes to which a file system may give the same time [s]."""
 
 
 class Growth(NamedTuple):
@@ -128,7 +133,8 @@ class GrowingRecord:
         except FileNotFoundError:
             return None
         content = content[: content.rfind(b"\n") + 1]
-        self._seen, before, self._content = seen, self._content, content
+        is_old = time.time() - stat.st_mtime > _TICK  # else it may change again, and have the same time
+        self._seen, before, self._content = seen if is_old else None, self._content, content
         if content == before:
             return None
         messages: list[str] = []

@@ -35,11 +35,8 @@ __all__ = [
 _DEPTH, _OBJECTS = 32, 10_000
 """Largest depth of groups, and number of groups and variables."""
 
-_RATIO, _SLACK = 1032, 1 << 20
-"""Largest ratio of a variable to its bytes in the file, which is that of deflate, beyond a size that is always read."""
-
-_LARGEST = 1 << 30
-"""Content [bytes] that is always allowed."""
+_LARGEST, _RATIO = 1 << 28, 8
+"""Content [bytes] that any file may have, and that of a larger one in its own sizes."""
 
 _FILTERS = (1, 2, 3, 4, 5, 6, 32000)
 """Filters that come with HDF5 and h5py; others are in plugins, which are programs."""
@@ -49,10 +46,10 @@ _PLAIN = (h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING, h5py.h5t.ENUM)
 _OF_DIMENSIONS = ("DIMENSION_LIST", "REFERENCE_LIST")
 """Attributes of references, by which variables have their dimensions."""
 
-_NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"
-"""Beginning of the attribute NAME of a dimension that is no variable."""
+_NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable."
+"""Part of the attribute NAME of a dimension that is no variable."""
 
-_SECONDS, _RATE, _PATIENCE = 10, 10_000_000, 12
+_SECONDS, _RATE, _PATIENCE = 5, 10_000_000, 12
 """Time of the processor [s], bytes that are read in each second more, and the whole time over that of the processor."""
 
 _WORKSPACE = 1 << 28
@@ -69,6 +66,14 @@ class Group(NamedTuple):
     variables: Mapping[str, tuple[tuple[str, ...], NDArray[Any], Mapping[str, Any]]]
     """Dimensions, values as stored, and attributes, by name."""
     attrs: Mapping[str, Any]
+
+
+def is_cut_short(content: bytes) -> bool:
+    """Return whether a file has no beginning of HDF5, or fewer bytes than it states there."""
+    if not content.startswith(b"\x89HDF\r\n\x1a\n"):
+        return content.find(b"\x89HDF\r\n\x1a\n", 512, 1 << 20) < 0  # other bytes may come before it
+    begin = {0: 40, 1: 44, 2: 28, 3: 28}.get(content[8] if len(content) > 8 else -1)
+    return begin is not None and int.from_bytes(content[begin : begin + 8], "little") > len(content)
 
 
 def content_of(content: bytes, with_groups: bool) -> dict[str, Group]:
@@ -140,7 +145,7 @@ def _part_of(group: h5py.Group, name: str) -> h5py.HLObject:
 
 def largest_content(size: int) -> int:
     """Return the largest content of a file of this size that is read [bytes]."""
-    return max(_LARGEST, 4 * size)
+    return max(_LARGEST, _RATIO * size)
 
 
 def _address(part: h5py.HLObject) -> tuple[int, int]:
@@ -162,14 +167,13 @@ def _size_of(variable: h5py.Dataset, size: int) -> int:
     kind = variable.id.get_type()
     if kind.get_class() not in _PLAIN:
         raise UnsafeError(f"{path} is neither of numbers nor of text")
-    if bytes(variable.attrs.get("NAME", b"")).startswith(_NO_VARIABLE):
+    name = variable.attrs.get("NAME", b"")
+    if _NO_VARIABLE in (name.encode() if isinstance(name, str) else name):
         return 0  # it has no values, and is not read
-    stated, stored = math.prod(variable.shape or (0,)) * kind.get_size(), variable.id.get_storage_size()
+    stated = 0 if variable.shape is None else math.prod(variable.shape) * kind.get_size()
     chunk = math.prod(variable.chunks or (0,)) * kind.get_size()
-    if stored > size or max(stated, chunk) > _SLACK + _RATIO * stored:
-        raise UnsafeError(
-            f"{path} is said to have {stated:,} bytes in chunks of {chunk:,}, of which {stored:,} are stored"
-        )
+    if (stored := variable.id.get_storage_size()) > size or chunk > largest_content(size):
+        raise UnsafeError(f"{path} is said to have {stored:,} bytes in the file, in pieces of {chunk:,}")
     return stated
 
 

@@ -9,7 +9,7 @@ import sys
 from signal import Signals
 
 from tactile_bayes.record import netcdf_content
-from tactile_bayes.record.netcdf_content import Group, UnsafeError, received, time_limit
+from tactile_bayes.record.netcdf_content import Group, UnsafeError, is_cut_short, received, time_limit
 
 __all__ = ["content_elsewhere"]
 
@@ -29,6 +29,8 @@ def content_elsewhere(content: bytes, with_groups: bool) -> dict[str, Group]:
     OSError
         If no process can be started.
     """
+    if is_cut_short(content):
+        raise ValueError("it is no HDF5, or has fewer bytes than it states")
     if not sys.executable or getattr(sys, "frozen", False):
         raise OSError("a file without its checksum is read by a Python of its own, and there is none here")
     seconds, patience = time_limit(len(content))
@@ -48,7 +50,7 @@ def content_elsewhere(content: bytes, with_groups: bool) -> dict[str, Group]:
     if process.returncode == 0 and kind in (b"unsafe\n", b"damaged\n"):
         error = UnsafeError if kind == b"unsafe\n" else ValueError
         raise error(answer.read().decode("utf-8", "replace"))
-    if process.returncode < 0 and Signals(-process.returncode).name == "SIGXCPU":
-        raise ValueError(f"HDF5 takes more than {seconds} s over it")
+    if process.returncode < 0 and Signals(-process.returncode).name in ("SIGXCPU", "SIGKILL"):
+        raise ValueError(f"HDF5 takes more than {seconds} s over it, or all memory")
     said = process.stderr.decode("utf-8", "replace").strip().splitlines()
     raise ValueError(f"HDF5 ends over it with {process.returncode}" + (f": {said[-1]}" if said else ""))

@@ -1,0 +1,102 @@
+"""Mutated NetCDF files, with and without their checksum: read as they were, or refused, within limits."""
+
+import sys
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from time import monotonic
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.record_tables import WIRE, columns
+from tactile_bayes.errors import TactileBayesError
+from tactile_bayes.inference.result import read_result, write_result
+from tactile_bayes.record import make_record, read_record, write_record
+
+SEALED, FOREIGN = 100, 4
+"""Number of files with a checksum, and of those without, whose reading takes half a second, each of two kinds."""
+
+SEAL = b"\ntactile_bayes: SHA-256"
+"""Beginning of the last line of a file with a checksum."""
+
+SECONDS, BYTES = 200.0, 1e9
+"""Longest time for a small file on a machine that does other work, and most memory of all processes."""
+
+
+@pytest.fixture(scope="module")
+def originals(tmp_path_factory):
+    """A record and a posterior: how each is read, what is in it, and its bytes."""
+    folder, rng = tmp_path_factory.mktemp("originals"), np.random.default_rng(1)
+    record = make_record(columns(note=["", "a", "bc", "ß", "", "d"]), rod=WIRE, attrs={"run": 5})
+    write_record(record, folder / "record.nc")
+    draws = xr.Dataset(
+        {name: (("chain", "draw"), rng.normal(size=(2, 20))) for name in ("a", "q")}, attrs={"made": "now"}
+    )
+    stats = xr.Dataset({"r_hat": ("parameter", [1.0, 1.01]), "seconds": 3.5}, {"parameter": ["a", "quite long"]})
+    tree = {"/": xr.Dataset(attrs={"family": "parabola", "limits": [1.0, 2.0]}), "posterior": draws, "stats": stats}
+    write_result(xr.DataTree.from_dict(tree), folder / "posterior.nc")
+    readers = {"record.nc": read_record, "posterior.nc": read_result}
+    return [(read, read(folder / name), (folder / name).read_bytes()) for name, read in readers.items()]
+
+
+def mutated(content, rng):
+    """The content with bits flipped, or bytes zeroed, exchanged, copied over others, left out, or cut off."""
+    at, size = int(rng.integers(len(content))), int(2 ** rng.uniform(0, 11))
+    piece, rest = content[at : at + size], content[at + size :]
+    match int(rng.integers(8)):
+        case 0 | 1 | 2:
+            flipped = bytearray(content)
+            for place in rng.integers(len(content), size=int(rng.integers(1, 5))):
+                flipped[place] ^= 1 << int(rng.integers(8))
+            return bytes(flipped)
+        case 3:
+            return content[:at] + bytes(len(piece)) + rest
+        case 4:
+            return content[:at] + rng.bytes(len(piece)) + rest
+        case 5:
+            begin = int(rng.integers(len(content) - len(piece) + 1))
+            return content[:at] + content[begin : begin + len(piece)] + rest
+        case 6:
+            return content[:at] + rest
+        case _:
+            return content[:at]
+
+
+def outcome(path, content, read, whole):
+    """What becomes of a file: "refused", "as it was" or "otherwise"; any other error is none of ours."""
+    path.write_bytes(content)
+    began = monotonic()
+    try:
+        found = "as it was" if read(path).identical(whole) else "otherwise"
+    except TactileBayesError as error:
+        found = "refused" if str(error).startswith(str(path)) else str(error)
+    assert monotonic() - began < SECONDS
+    return found
+
+
+def test_files_with_a_checksum_are_refused_or_read_as_they_were(tmp_path, originals, fuzz_seed):
+    rng, found = np.random.default_rng(fuzz_seed), Counter()
+    for read, whole, content in originals:
+        for _ in range(SEALED // 2):
+            found[outcome(tmp_path / "a.nc", mutated(content, rng), read, whole)] += 1
+    assert set(found) <= {"refused", "as it was"}
+    assert found["refused"] > 0.8 * SEALED
+
+
+def test_files_without_a_checksum_are_refused_or_read_within_limits(tmp_path, originals, fuzz_seed):
+    """A changed name or unit cannot be noticed, so that they may be read otherwise."""
+    rng, tasks = np.random.default_rng([fuzz_seed, 1]), []
+    for read, whole, content in originals:
+        content = content[: content.rindex(SEAL)]
+        assert outcome(tmp_path / "whole.nc", content, read, whole) == "as it was"
+        for _ in range(FOREIGN):
+            path = tmp_path / f"{len(tasks)}.nc"
+            tasks.append((path, mutated(content, rng), read, whole))
+    with ThreadPoolExecutor(2) as pool:
+        found = Counter(pool.map(lambda task: outcome(*task), tasks))
+    assert set(found) <= {"refused", "as it was", "otherwise"}
+    if sys.platform == "linux":
+        import resource
+
+        assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 < BYTES
