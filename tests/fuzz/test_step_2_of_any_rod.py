@@ -93,15 +93,3 @@ def test_step_2_returns_the_contacts_of_a_scan(fuzz_seed):
         miss = np.hypot(x - float(row.truth_contact_x), y - float(row.truth_contact_y))
         assert max(miss, abs(moment)) < 1e-6 * (1.0 + float(np.hypot(row.force_x, row.force_y)))
     assert not missed
-
-
-@pytest.mark.parametrize("curvature", [2.0, -2.0])
-def test_a_tip_beyond_the_normal_is_a_second_branch_of_the_posterior(curvature):
-    """Whether a sweep is forward or backward, one of them presses the rod against its curvature."""
-    rod = tb.Rod(rest_curvature=curvature)
-    record = tb.scan(
-        tb.contours.Parabola(0.5, 0.55), rod=rod, direction="forward" if curvature < 0 else "backward", drive_step=0.05
-    ).record
-    turn = np.abs(record.truth_tip_angle - record.truth_slope_angle).values
-    over = np.flatnonzero(np.abs(turn - np.pi / 2) < np.pi / 2)
-    assert over.size
