@@ -170,3 +170,19 @@ def test_a_released_rod_is_clear_however_its_last_touch_is_rounded(k):
     found = tb.scan(contour, drive=carried, drive_step=0.01, rod=tb.Rod(rest_curvature=0.4), friction=0.0177)
     assert found.events["backward"].snap_off.kind == "release"
     assert found.record.sizes["sample"] == 181
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("taper", [0.0, 0.5, 0.7, 0.8])
+def test_a_tip_that_is_dragged_touches_with_the_side_to_which_it_is_turned(taper, side):
+    """Until that side lies along the contour: the tip never folds into the object."""
+    heading, angle = (0.05, 1.0) if side > 0.0 else (np.pi - 0.05, np.pi - 1.0)
+    drive = tb.Translation(base=(-0.87 * side, -0.06), heading=heading, drive_angle=angle, travel=2.5)
+    contour = tb.contours.Parabola(1.0, 0.65, 0.24 * side)
+    scan = tb.scan(contour, drive=drive, rod=tb.Rod(taper=taper))
+    assert scan.sweeps[0].direction == ("backward" if side > 0.0 else "forward")
+    turn = (scan.record.truth_tip_angle - scan.record.truth_slope_angle).values
+    turn = turn[np.isfinite(turn)]
+    assert turn.size > 10
+    assert turn.min() > -1e-9
+    assert turn.max() < np.pi + 1e-9

@@ -354,7 +354,8 @@ def contact_from_wrench(
 
     Equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945, gives the direction of the force. Slope and curvature
     at the pivot then determine the elastica, and the contact is its first point of zero curvature (equation 27), or of
-    the rest curvature.
+    the rest curvature. A rod that is not straight or not uniform may have the rest curvature at two points: the contact
+    is the second one if the rod ends there, or lies along the contour, and does neither at the first.
 
     Parameters
     ----------

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.contacts.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, contact_workspace
 from tactile_bayes.mechanics.contacts.fits import ContactFit, RawFit, Reading, SheetFit
-from tactile_bayes.mechanics.elastica import forward_contacts
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.rods.profile import Rods, rods_of
 
@@ -38,6 +37,9 @@ _STARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
 _LEAST_MOMENT = 0.1
 """Least moment of a start, in its standard deviations."""
 
+_SAME = 1e-4
+"""Difference of coordinates of one and the same optimum."""
+
 
 def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike = 0.0) -> RawFit:
     """Contacts of n samples by Step 2, with friction angles and rods, or rest curvatures of arcs, of shape (n,)."""
@@ -45,8 +47,9 @@ def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike = 0.0) 
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
     count = delta.size
-    fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
-    workspace = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3)), np.empty((3, 3))
+    place, tip_angle, covariance = np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4))
+    fit = RawFit(place, tip_angle, covariance, np.empty(count), np.empty(count), np.empty((count, 4)), np.empty(count))
+    workspace = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 5)), np.empty((3, 3)), np.empty((3, 3))
     curvature, profile, stem = rods_of(rods, count)
     known = plain(reading), np.array(delta), curvature, varied_of(profile), stem
     raw_fits(*known, fit, *workspace, contact_workspace())
@@ -75,38 +78,59 @@ def fit_contacts(reading: Reading, friction_angle: Floats, rods: Rods | ArrayLik
 
 def _fit_block(reading: Reading, delta: Floats, rods: Rods) -> ContactFit:
     target = _Target(reading, delta, rods)
-    tip, lying = _Descent(target, TIP), _Descent(target, TANGENTIAL)
+    sheets = [(TANGENTIAL, False), (TIP, False)] + ([] if rods.are_straight else [(TIP, True)])
+    descents = [_Descent(target, *sheet) for sheet in sheets]
     everyone = np.arange(delta.size)
-    for descent in (tip, lying):
+    for descent in descents:
         descent.go(everyone, _COARSE, _COARSE_STEPS)
-    tip_misfit, lying_misfit = tip.misfit_before(delta), lying.misfit_before(delta)
-    for descent, own, other in ((tip, tip_misfit, lying_misfit), (lying, lying_misfit, tip_misfit)):
-        descent.go(np.flatnonzero((own <= _OUTDONE[0] * other + _OUTDONE[1]) | np.isinf(other)), _SETTLED, _MOST_STEPS)
-    tip_misfit, lying_misfit = tip.misfit_before(delta), lying.misfit_before(delta)
+    misfits = np.stack([descent.misfit_before(delta) for descent in descents])
+    for k, descent in enumerate(descents):
+        others = np.delete(misfits, k, axis=0).min(axis=0)
+        descent.go(
+            np.flatnonzero((misfits[k] <= _OUTDONE[0] * others + _OUTDONE[1]) | np.isinf(others)), _SETTLED, _MOST_STEPS
+        )
+    misfits = np.stack([descent.misfit_before(delta) for descent in descents])
 
-    ends = tip_misfit < lying_misfit
-    at_edge = np.isinf(np.minimum(tip_misfit, lying_misfit))
+    best = misfits.argmin(axis=0)
+    at_edge = np.isinf(misfits.min(axis=0))
     # A contact on the edge takes its variance from the sheet with the smaller misfit.
-    ends[at_edge] = tip.misfit[at_edge] < lying.misfit[at_edge]
-    coordinates = np.where(ends[:, None], tip.z, lying.z)
-    covariance = np.where(ends[:, None, None], tip.covariance(), lying.covariance())
-    misfit = np.where(ends, tip.misfit, lying.misfit)
+    best[at_edge] = descents[1].misfit[at_edge] < descents[0].misfit[at_edge]
+    z, covariances = np.stack([d.z for d in descents]), np.stack([d.covariance() for d in descents])
+    coordinates, covariance = z[best, everyone], covariances[best, everyone]
+    misfit = np.stack([d.misfit for d in descents])[best, everyone]
+    ends = best > 0
     free = np.where(ends, PSI1, ARCLENGTH)[:, None]
     spread = np.sqrt(np.take_along_axis(np.diagonal(covariance, axis1=1, axis2=2), free, axis=1)[:, 0])
+    turn = coordinates[:, PSI1] + delta
     with np.errstate(divide="ignore", invalid="ignore"):
-        clearance = np.where(ends, coordinates[:, PSI1] + delta, 1.0 - coordinates[:, ARCLENGTH]) / spread
+        clearance = np.where(ends, np.minimum(turn, np.pi - turn), 1.0 - coordinates[:, ARCLENGTH]) / spread
     where = np.flatnonzero(at_edge)
     if where.size:
         edge = _Descent(_Target(reading.take(where), delta[where], rods.take(where)), None)
         edge.go(np.arange(where.size), _SETTLED, _MOST_STEPS)
         coordinates[where], misfit[where], clearance[where] = edge.z, edge.misfit, 0.0
-    phase = np.where(ends, np.int8(TIP), np.int8(TANGENTIAL))
+    same = ends & (np.arange(len(descents))[:, None] > 0) & (np.abs(z - coordinates).max(axis=2) < _SAME)
     with np.errstate(invalid="ignore"):
-        rival = np.where(at_edge, np.inf, np.maximum(tip_misfit, lying_misfit) - misfit)
-    return ContactFit(coordinates, covariance, misfit, phase, at_edge, clearance, rival)
+        excess = np.where(at_edge | same, np.inf, misfits - misfit)
+    excess[best, everyone] = np.inf
+    next_best = excess.argmin(axis=0)
+    phases = np.array([phase for phase, _ in sheets], dtype=np.int8)
+    return ContactFit(
+        coordinates,
+        covariance,
+        misfit,
+        phases[best],
+        at_edge,
+        clearance,
+        excess[next_best, everyone],
+        z[next_best, everyone],
+        phases[next_best],
+    )
 
 
-def fit_sheet(reading: Reading, delta: Floats, phase: int | None, rods: Rods | ArrayLike = 0.0) -> SheetFit:
+def fit_sheet(
+    reading: Reading, delta: Floats, phase: int | None, rods: Rods | ArrayLike = 0.0, is_over: bool = False
+) -> SheetFit:
     """Find the best contact of one phase, beyond its edge too, or on the edge (None).
 
     Parameters
@@ -118,8 +142,10 @@ def fit_sheet(reading: Reading, delta: Floats, phase: int | None, rods: Rods | A
     phase : TIP, TANGENTIAL or None
     rods : Rods or array_like, shape (n,)
         As in `fit_contacts`.
+    is_over : bool
+        Whether to start from a tip that is turned beyond the normal of the contour.
     """
-    descent = _Descent(_Target(reading, delta, rods_of(rods, delta.size)), phase)
+    descent = _Descent(_Target(reading, delta, rods_of(rods, delta.size)), phase, is_over)
     descent.go(np.arange(delta.size), _SETTLED, _MOST_STEPS)
     return SheetFit(descent.z, descent.covariance(), descent.misfit)
 
@@ -127,9 +153,10 @@ def fit_sheet(reading: Reading, delta: Floats, phase: int | None, rods: Rods | A
 class _Descent:
     """The Levenberg–Marquardt method on one sheet, for many samples."""
 
-    def __init__(self, target: _Target, phase: int | None) -> None:
+    def __init__(self, target: _Target, phase: int | None, is_over: bool = False) -> None:
         self._target = target
         self._phase = phase
+        self._is_over = is_over
         self._free = _FREE[phase] if target.is_exact else (*_FREE[phase], DRIVE_ANGLE)
         self.z = np.full((target.delta.size, 4), np.nan)
         count = len(self.z)
@@ -143,16 +170,17 @@ class _Descent:
         reading, delta, phase = self._target.reading, self._target.delta, self._phase
         force = np.hypot(reading.loads[:, 1], reading.loads[:, 2])
         z = np.stack([force, -delta, np.ones(force.size), reading.drive_angle], axis=1)
+        raw: list[Floats] = []
         if phase is None:
             coordinate, options = FORCE, [force * share for share in (1.0, 0.5, 2.0)]
+        elif phase == TIP:
+            low, high = (0.5 * np.pi, np.pi - delta) if self._is_over else (-delta, 0.5 * np.pi)
+            most = high if self._is_over else 1.4
+            raw = [np.clip(psi1, low, most) for _, psi1 in self._raw_starts()]
+            coordinate, options = PSI1, [*raw, *(np.asarray(low + share * (high - low)) for share in _STARTS)]
         else:
-            arclength, psi1 = _raw_start(reading, delta, self._target.rods)
-            if phase == TIP:
-                spread = [share * (0.5 * np.pi + delta) - delta for share in _STARTS]
-                coordinate, options = PSI1, [np.clip(psi1, -delta, 1.4), *spread]
-            else:
-                spread = [np.full(force.size, share) for share in _STARTS]
-                coordinate, options = ARCLENGTH, [np.clip(arclength, 0.02, 1.0), *spread]
+            raw = [np.clip(arclength, 0.02, 1.0) for arclength, _ in self._raw_starts()]
+            coordinate, options = ARCLENGTH, [*raw, *(np.full(force.size, share) for share in _STARTS)]
         left = np.arange(force.size)
         best, found = np.full(force.size, np.inf), self.z
         for number, values in enumerate(options):
@@ -161,14 +189,27 @@ class _Descent:
             self.go(left, 0.0, 0)
             better = left[self.misfit[left] < best[left]]
             best[better], found[better] = self.misfit[better], self.z[better]
-            if number == 0 and phase is not None:
+            if number == len(raw) - 1:
                 left = np.flatnonzero(np.isinf(best))
                 if not left.size:
                     break
         self.z = found
-        if phase is None or left.size:
+        if len(raw) != 1 or left.size:
             self.go(np.arange(force.size), 0.0, 0)
         self._hardness[:] = 1e-3
+
+    def _raw_starts(self) -> list[tuple[Floats, Floats]]:
+        """Arc lengths and ψ1 by raw Step 2; where the moment has the wrong sign, with a small one of the right sign.
+
+        Unless all rods are straight and uniform, they follow from the wrong sign too: such rods may be bent both ways.
+        """
+        reading, rods = self._target.reading, self._target.rods
+        moment, least = reading.loads[:, 0], _LEAST_MOMENT * np.sqrt(reading.covariance[:, 0, 0])
+        moments = [np.maximum(moment, least)]
+        if not rods.are_straight and np.any(moment < least):
+            moments.append(moment)
+        pairs = [contact_pairs(reading, one, self._target.delta, rods) for one in moments]
+        return [(pair[:, int(self._is_over), 0], pair[:, int(self._is_over), 1]) for pair in pairs]
 
     def go(self, who: Index, gain: float, most_steps: int) -> None:
         """Descend with the samples `who` until the gain that the next step promises is small."""
@@ -183,7 +224,8 @@ class _Descent:
 
     def misfit_before(self, delta: Floats) -> Floats:
         """Sum of squares; infinite for contacts beyond the edge."""
-        beyond = self.z[:, PSI1] < -delta if self._phase == TIP else self.z[:, ARCLENGTH] > 1.0
+        turn = self.z[:, PSI1] + delta
+        beyond = (turn < 0.0) | (turn > np.pi) if self._phase == TIP else self.z[:, ARCLENGTH] > 1.0
         return np.where(beyond, np.inf, self.misfit)
 
     def covariance(self) -> Floats:
@@ -223,10 +265,12 @@ def plain(reading: Reading) -> Reading:
     return Reading(*(np.array(column, dtype=float, order="C") for column in reading))
 
 
-def _raw_start(reading: Reading, delta: Floats, rods: Rods) -> tuple[Floats, Floats]:
-    """Arc length and ψ1 by raw Step 2; where the moment has the wrong sign, with a small one of the right sign."""
-    moment, force_x, force_y = reading.loads.T
-    least = _LEAST_MOMENT * np.sqrt(reading.covariance[:, 0, 0])
-    wrenches = np.stack([reading.drive_angle, np.maximum(moment, least), force_x, force_y, delta], axis=-1)
-    _, _, slope_angle, arclength, tip_angle, _ = forward_contacts(wrenches, rods)
-    return arclength, tip_angle - slope_angle - delta
+def contact_pairs(reading: Reading, moment: Floats, delta: Floats, rods: Rods) -> Floats:
+    """Arc lengths and ψ1 of the two points at which a rod may touch by raw Step 2, shape (n, 2, 2)."""
+    from tactile_bayes.mechanics.contacts.states import write_contact_pairs
+    from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
+
+    wrenches = np.column_stack([reading.drive_angle, moment, reading.loads[:, 1:], delta])
+    out = np.empty((delta.size, 2, 2))
+    write_contact_pairs(wrenches, rods.curvature, varied_of(rods.profile), rods.stem, out)
+    return out

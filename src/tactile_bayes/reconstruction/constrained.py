@@ -13,12 +13,14 @@ from tactile_bayes.mechanics.contacts.fits import ContactFit
 from tactile_bayes.mechanics.fitting import fit_contacts
 from tactile_bayes.mechanics.rods.profile import Rods
 from tactile_bayes.reconstruction.estimate import (
+    AMBIGUOUS,
     AT_EDGE,
     EITHER_PHASE,
     NO_FIT,
     NO_ZERO,
     NONLINEAR,
     OK,
+    RIVAL,
     Estimate,
     bends_too_much,
     is_weak,
@@ -34,9 +36,6 @@ _CLEARANCE = 2.0
 _MISFIT = 25.0
 """Sum of squares of one degree of freedom that noise exceeds in less than one of a million samples."""
 
-_RIVAL = 6.0
-"""Difference of the sums of squares below which the other phase is not negligible: a likelihood ratio of 20."""
-
 
 def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     """Most likely contacts, with their covariance on the sheet of possible contacts.
@@ -51,7 +50,7 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     place, covariance = np.full((count, 4), np.nan), np.full((count, 4, 4), np.nan)
     misfit, distance = np.full(count, np.nan), np.full(count, np.nan)
     phase = np.zeros(count, dtype=np.int8)
-    status = unanswered(samples.loaded, samples.cut_off)
+    other, status = np.full((count, 4), np.nan), unanswered(samples.loaded, samples.cut_off)
     with np.errstate(over="ignore"):
         usable = np.isfinite(samples.reading.loads**2).all(axis=1)
     where = np.flatnonzero(samples.loaded & ~samples.cut_off & usable)
@@ -74,9 +73,13 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
             bent |= rod.loads[0] < np.sqrt(reading.covariance[:, 0, 0])
             bent |= np.abs(rod.place[2]) > 0.49 * np.pi
         bent |= bends_too_much(place[where], covariance[where], _aside(fit, *given))
-        kinds = (~found, fit.misfit > _MISFIT, fit.clearance < _CLEARANCE, fit.rival < _RIVAL, bent)
-        status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
-    return Estimate(place, covariance, phase, status, misfit, distance)
+        rivalled = found & (fit.rival < RIVAL)
+        twice = rivalled & (fit.other_phase == fit.phase)
+        kinds = (~found, fit.misfit > _MISFIT, twice, fit.clearance < _CLEARANCE, rivalled, bent)
+        status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AMBIGUOUS, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
+        told = rivalled & ((status[where] == AMBIGUOUS) | (status[where] == EITHER_PHASE))
+        other[where] = np.where(told[:, None], contact_states(fit.other, *given).place.T, np.nan)
+    return Estimate(place, covariance, phase, status, other, misfit, distance)
 
 
 def are_weighed(samples: Samples) -> bool:

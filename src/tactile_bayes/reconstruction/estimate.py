@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Flags, Floats
 
 __all__ = [
+    "AMBIGUOUS",
     "AT_EDGE",
     "BEYOND_TIP",
     "CUT_OFF",
@@ -20,6 +21,7 @@ __all__ = [
     "NO_FIT",
     "NO_ZERO",
     "OK",
+    "RIVAL",
     "STATUSES",
     "Estimate",
     "bends_too_much",
@@ -28,7 +30,7 @@ __all__ = [
     "unanswered",
 ]
 
-NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE, EITHER_PHASE, NO_FIT = range(9)
+NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE, EITHER_PHASE, NO_FIT, AMBIGUOUS = range(10)
 
 STATUSES = (
     "no contact",
@@ -40,11 +42,15 @@ STATUSES = (
     "at the edge",
     "either phase",
     "does not fit",
+    "ambiguous",
 )
 """Statuses of a sample, by code."""
 
 MOST_BEND = 0.5
 """Shift by curvature, in standard deviations, above which a covariance of first order is not valid."""
+
+RIVAL = 6.0
+"""Difference of sums of squares below which another contact is not negligible: a likelihood ratio of 20."""
 
 _WEAK = 10.0
 """Standard deviations of the noise below which a force is weak, so that its direction is uncertain."""
@@ -62,6 +68,8 @@ class Estimate(NamedTuple):
     phase: NDArray[np.int8]
     status: NDArray[np.int8]
     """Code in `STATUSES`."""
+    other: Floats
+    """Place of the other contact that is likely, shape (n, 4); NaN where there is none."""
     misfit: Floats | None = None
     """Residual sum of squared deviations, shape (n,)."""
     edge_distance: Floats | None = None

@@ -4,15 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.mechanics.contacts.fits import RawFit
 from tactile_bayes.mechanics.fitting import raw_contacts
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
-from tactile_bayes.reconstruction.estimate import BEYOND_TIP, MOST_BEND, NONLINEAR, OK, Estimate, is_weak, unanswered
+from tactile_bayes.reconstruction.estimate import (
+    AMBIGUOUS,
+    BEYOND_TIP,
+    MOST_BEND,
+    NONLINEAR,
+    OK,
+    RIVAL,
+    Estimate,
+    is_weak,
+    unanswered,
+)
 from tactile_bayes.reconstruction.samples import Samples
 
 __all__ = ["raw_estimate"]
 
 _ROUNDING = 1e-9
+
+_APART = 2.0, 1e-6
+"""Distance from which two points are different contacts, in standard deviations, or in L without noise."""
 
 
 def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
@@ -25,7 +39,8 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
     covariance = None
     with np.errstate(invalid="ignore"):
         # In tangential contact the rod lies along the contour, in tip contact it ends there: take the nearer case.
-        tip = np.abs(1.0 - arclength) < np.abs(np.sin(fit.tip_angle - slope_angle))
+        turn = fit.tip_angle - slope_angle
+        tip = (np.abs(1.0 - arclength) < np.abs(np.sin(turn))) | (np.cos(turn) < 0.0)
         if samples.has_noise:
             covariance = fit.covariance
             covariance[~found] = np.nan
@@ -33,6 +48,23 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
                 found & (is_weak(samples.reading.loads, samples.reading.covariance) | ~(fit.bend <= MOST_BEND**2))
             ] = NONLINEAR
         status[found & (arclength > 1.0 + _ROUNDING)] = BEYOND_TIP
-    fit.place[~found] = np.nan
+    ambiguous = found & _is_ambiguous(fit, samples.has_noise)
+    status[ambiguous] = AMBIGUOUS
+    fit.place[~found], fit.other[~ambiguous] = np.nan, np.nan
     phase = np.where(found, np.where(tip, TIP, TANGENTIAL), NONE).astype(np.int8)
-    return Estimate(fit.place, covariance, phase, status)
+    return Estimate(fit.place, covariance, phase, status, fit.other)
+
+
+def _is_ambiguous(fit: RawFit, has_noise: bool) -> Flags:
+    """Return where the other point is a contact elsewhere that is at most 20 times less likely.
+
+    Without a noise level, the deviation of the contact that is found stands for one standard deviation.
+    """
+    x, y = (fit.other[:, :2] - fit.place[:, :2]).T
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        if not has_noise:
+            apart = np.hypot(x, y) > _APART[1]
+            return np.asarray(apart & (fit.other_deviation**2 < (1.0 + RIVAL) * (fit.deviation + _ROUNDING) ** 2))
+        xx, yy, xy = fit.covariance[:, 0, 0], fit.covariance[:, 1, 1], fit.covariance[:, 0, 1]
+        squared = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
+        return np.asarray((squared > _APART[0] ** 2) & (fit.other_deviation**2 < fit.deviation**2 + RIVAL))

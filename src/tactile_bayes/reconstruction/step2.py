@@ -53,10 +53,12 @@ def reconstruct(
     """Reconstruct contact point, arc length, slope and phase from every sample of a record, with their uncertainty.
 
     The raw method takes drive angle, holding moment and forces as they are: equation 26 of Merker et al. 2018, doi
-    10.1155/2018/1613945, gives the direction of the force, and the contact is the first point of zero curvature
-    (equation 27). These are four numbers, and a contact has three degrees of freedom: the constrained method returns
-    the most likely of the possible contacts, at the tip (arc length 1) or along the rod. A bad sample does not affect
-    the others; `status` describes the result of each.
+    10.1155/2018/1613945, gives the direction of the force, and the contact is the first point without moment (equation
+    27). A rod that is not straight or not uniform may be bent both ways: then it is the first or the second such point,
+    whichever is nearer to a contact, at the tip or with the rod along the contour. These are four numbers, and a
+    contact has three degrees of freedom: the constrained method returns the most likely of the possible contacts, at
+    the tip (arc length 1) or along the rod. A bad sample does not affect the others; `status` describes the result of
+    each.
 
     Parameters
     ----------
@@ -85,6 +87,8 @@ def reconstruct(
         errors of load cell and encoder (NaN without any noise level): contact_x_sd, contact_y_sd with
         contact_xy_correlation, slope_angle_sd, contact_arclength_sd, and tangent_sd and normal_sd, along the contour
         and across it. They include errors that samples share, like an unknown bias, as if they were independent.
+        other_contact_x, other_contact_y and other_contact_arclength are those of a second contact, where status is
+        "ambiguous" or "either phase", else NaN.
 
         With method="constrained" also misfit, the residual sum of squared deviations in standard deviations, and
         edge_distance, the distance of the contact from the change between tip and tangential contact in standard
@@ -126,6 +130,10 @@ def reconstruct(
         either phase
             Tip and tangential contact are both likely, at different points, the one returned at most 20 times as likely
             as the other. `infer_contacts` weights them. With method="constrained" only.
+        ambiguous
+            The moment of a rod that is not straight or not uniform vanishes at two points, and a contact at either is
+            likely, the one returned at most 20 times as likely as the other; without a noise level, neither is nearer
+            to a contact by more than a factor of 2.6. `infer_contacts` weights them.
         does not fit
             No contact gives such loads: the misfit is above 25, which noise exceeds in less than one of a million
             samples. Check the rod and the noise. With method="constrained" only.
@@ -209,7 +217,7 @@ def _in_channels(measured: xr.Dataset, cell: LoadCell) -> xr.Dataset:
 def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> dict[str, tuple[str, object, object]]:
     """Columns of the result, in the laboratory frame and the record's units."""
     rod, side = samples.rod, samples.side
-    place = _in_lab_frame(estimate.place, side, rod.surface)
+    place, other = (_in_lab_frame(one, side, rod.surface) for one in (estimate.place, estimate.other))
     nothing = np.full(side.size, np.nan)
     spread, tangent, normal, correlation = [nothing] * 4, nothing, nothing, nothing
     if estimate.covariance is not None:
@@ -225,6 +233,11 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
         "contact_arclength": place[:, 3] * length,
         "slope_angle": place[:, 2],
     }
+    other_columns = {
+        "contact_x": measured.base_x.values + other[:, 0] * length,
+        "contact_y": measured.base_y.values + other[:, 1] * length,
+        "contact_arclength": other[:, 3] * length,
+    }
     units = measured.attrs["units"]
     unit_of_length = COLUMNS["contact_x"].unit_in(units)
 
@@ -234,6 +247,8 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
     variables: dict[str, tuple[str, object, object]] = {
         name: ("sample", values, column_attributes(name, units)) for name, values in columns.items()
     }
+    for name, values in other_columns.items():
+        variables[f"other_{name}"] = column(values, unit_of_length, f"{COLUMNS[name].long_name} of the other contact")
     variables["contact_phase"] = column(np.array(PHASE_NAMES).take(estimate.phase), "1", "phase of the contact")
     variables["status"] = column(np.array(STATUSES).take(estimate.status), "1", "what became of the sample")
     for k, name in enumerate(PLACE):

@@ -24,8 +24,8 @@ Direction = Literal["forward", "backward"]
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
 _SAME = 1e-9
-"""Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: it is then
-the side to which it is turned less."""
+"""Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: its side
+is then the one to which it is turned less."""
 
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
 """Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
@@ -155,8 +155,8 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
             )
         case Reachability.FOLDS_OVER:
             raise ReachError(
-                f"{sweep} the rod's tip folds over: at {_point(paths)} it lies along the contour with the other side of "
-                "the rod, and contact with both sides in one sweep is not modelled; end the drive before, take a rod "
+                f"{sweep} the rod's tip folds over: at {_point(paths)} the other side of the rod lies along the "
+                "contour, and contact with both sides in one sweep is not modelled; end the drive before, take a rod "
                 "that is stiffer or less curved at its tip, sweep in the other direction, or move the pivot"
             )
         case Reachability.TOUCHES_TWICE:

@@ -252,7 +252,7 @@ def scan(
     Raises
     ------
     ReachError
-        If the rod is too short to touch the contour.
+        If the rod is too short to touch the contour, or its tip folds over until the other side of the rod touches.
     ContourError
         If the pivot is not below the contour or too close to it, the rod would touch beyond an end of it, or a rod that
         is curved toward the contour would touch it twice.

@@ -87,6 +87,17 @@ class ContactDensity:
         """True if the drive angle is uncertain."""
         return bool(np.any(self.samples.reading.angle_deviation))
 
+    @property
+    def ways(self) -> Floats:
+        """Ranges of the way on the branches, shape (branches, 2).
+
+        They are tip contact, tangential contact and, unless all rods are straight and uniform, contact of a tip that is
+        turned beyond the normal of the contour.
+        """
+        normal = 0.5 * np.pi + self.delta
+        branches = [(0.0, normal), (-1.0, 0.0), (normal, np.pi)]
+        return np.array(branches[:2] if self.samples.rods.are_straight else branches)
+
     def take(self, where: Index) -> ContactDensity:
         """Return the density of some of the samples."""
         some, readings, base = self.samples.take(where), self._readings.take(where), self.base[where]
@@ -112,7 +123,8 @@ class ContactDensity:
         with np.errstate(divide="ignore", invalid="ignore"):
             volume = np.log(np.where(tip, rod.volume_tip, rod.volume_tangential))
             facing = np.abs(alpha - self._surface.half_angle) < 0.5 * np.pi
-            possible = (flat[:, PSI1] >= -self.delta) & (arclength <= 1.0) & facing
+            possible = (flat[:, PSI1] >= -self.delta) & (flat[:, PSI1] <= np.pi - self.delta)
+            possible &= (arclength <= 1.0) & facing
             possible &= np.isfinite(volume)
             density = volume.reshape(shape) + self._readings.log_density(loads) + self._log_prior(rod.place, shape)
             if self.has_free_angle:

@@ -27,12 +27,15 @@ _NEGLIGIBLE = 600.0
 """Logarithm of a ratio of weights from which the smaller is negligible."""
 
 _PILOTS = ((600, 0.25), (600, 0.15))
-"""Number of proposals of each pilot run, and the smallest share of the less probable phase in the next run: the edge
-between the phases cuts off narrow layers of the posterior, which need more than one pilot."""
+"""Number of proposals of each pilot run, and the smallest share of a branch in the next run: the edge between the
+phases cuts off narrow layers of the posterior, which need more than one pilot."""
 
 _GOOD_SHARE = 0.4
-"""Effective share of a phase's proposals from which its approximation is final: moments of a truncated posterior would
+"""Effective share of a branch's proposals from which its approximation is final: moments of a truncated posterior would
 not improve it."""
+
+_HOPELESS = 60.0
+"""Excess of the sum of squares from which a tip that is turned beyond the normal is left out."""
 
 
 class ContactWeights(NamedTuple):
@@ -72,11 +75,10 @@ def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequ
     """
     rng = np.random.default_rng(seed)
     approximation = _approximation(density)
-    longest = 0.5 * np.pi + density.delta
     for count, least in _PILOTS:
-        points, _, log_weight = _evaluated(density, ContactProposal(*approximation, longest), count, rng)
-        approximation = _refined(points, log_weight, *approximation, least)
-    proposal = ContactProposal(*approximation, longest)
+        points, _, log_weight = _evaluated(density, ContactProposal(*approximation, density.ways), count, rng)
+        approximation = _refined(points, log_weight, density.ways, *approximation, least)
+    proposal = ContactProposal(*approximation, density.ways)
     points, contact, log_weight = _evaluated(density, proposal, draws, rng)
     with np.errstate(invalid="ignore"):
         log_evidence = logsumexp(log_weight, axis=0) - np.log(draws)
@@ -102,40 +104,47 @@ def _evaluated(
 
 
 def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
-    """Return normal approximations on both sheets: means (2, n, k), covariances, and the share of tip contact."""
+    """Return normal approximations on all branches: means (branches, n, k), covariances, and shares (branches, n)."""
     reading, delta = density.samples.reading, np.full(density.samples.side.size, density.delta)
     rods = density.samples.rods
-    tip, tangential = (fit_sheet(reading, delta, phase, rods) for phase in (TIP, TANGENTIAL))
+    branches = [(TIP, False), (TANGENTIAL, False), (TIP, True)][: len(density.ways)]
     free = [DRIVE_ANGLE] if density.has_free_angle else []
     means, covariances, usable = [], [], []
-    for sheet, way, shift in ((tip, PSI1, density.delta), (tangential, ARCLENGTH, -1.0)):
+    misfits: list[Floats] = []
+    for phase, is_over in branches:
+        sheet = fit_sheet(reading, delta, phase, rods, is_over)
+        way, shift = (PSI1, density.delta) if phase == TIP else (ARCLENGTH, -1.0)
         order = [way, FORCE, *free]
         mean = sheet.coordinates[:, order]
         mean[:, 0] += shift
         covariance = sheet.covariance[:, order][:, :, order]
         good = np.isfinite(mean).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(sheet.misfit)
+        if is_over:
+            good &= sheet.misfit < np.min(misfits, axis=0) + _HOPELESS
         mean[~good], covariance[~good] = 0.1, np.eye(len(order))
         index = np.arange(len(order))
         covariance[:, index, index] *= 1.0 + 1e-9
         means.append(mean)
         covariances.append(covariance)
         usable.append(good)
-    share = np.where(usable[0], np.where(usable[1], 0.5, 1.0), 0.0)
-    return np.stack(means), np.stack(covariances), share
+        misfits.append(sheet.misfit)
+    usable[1] |= ~np.any(usable, axis=0)
+    return np.stack(means), np.stack(covariances), np.stack(usable) / np.sum(usable, axis=0)
 
 
 def _refined(
-    points: Floats, log_weight: Floats, mean: Floats, covariance: Floats, share: Floats, least: float
+    points: Floats, log_weight: Floats, ways: Floats, mean: Floats, covariance: Floats, share: Floats, least: float
 ) -> tuple[Floats, Floats, Floats]:
     """Return the approximation corrected by a pilot run."""
-    mean, covariance, share = mean.copy(), covariance.copy(), share.copy()
+    mean, covariance, masses = mean.copy(), covariance.copy(), []
     with np.errstate(invalid="ignore"):
         weight = np.exp(log_weight - np.max(log_weight, axis=0))
     weight[~np.isfinite(weight)] = 0.0
-    total = weight.sum(axis=0)
-    for phase, mine in ((0, points[..., 0] >= 0.0), (1, points[..., 0] < 0.0)):
+    for branch, (low, high) in enumerate(ways):
+        mine = (points[..., 0] >= low) & (points[..., 0] < high) if low >= 0.0 else points[..., 0] < high
         own = np.where(mine, weight, 0.0)
         mass = own.sum(axis=0)
+        masses.append(mass)
         with np.errstate(divide="ignore", invalid="ignore"):
             effective = mass**2 / (own**2).sum(axis=0)
             own = own / mass
@@ -150,9 +159,15 @@ def _refined(
         trusted &= np.isfinite(scaled).all(axis=(1, 2))
         scaled[~trusted] = np.eye(points.shape[-1])
         trusted &= np.linalg.eigvalsh(scaled)[:, 0] > 1e-9
-        mean[phase][trusted], covariance[phase][trusted] = new[trusted], spread[trusted]
+        mean[branch][trusted], covariance[branch][trusted] = new[trusted], spread[trusted]
+    return mean, covariance, _shares(np.stack(masses), share, least)
+
+
+def _shares(masses: Floats, share: Floats, least: float) -> Floats:
+    """Return the shares of the branches by their masses, but at least `least` for each that has a share."""
+    total = masses.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        tip = np.where(points[..., 0] >= 0.0, weight, 0.0).sum(axis=0) / total
-    both = (share > 0.0) & (share < 1.0) & np.isfinite(tip)
-    share[both] = np.clip(tip[both], least, 1.0 - least)
-    return mean, covariance, share
+        raised = np.where(share > 0.0, np.maximum(masses / total, least), 0.0)
+        room = np.where(share > 0.0, raised - least, 0.0)
+        found = raised - (raised.sum(axis=0) - 1.0) * room / room.sum(axis=0)
+    return np.where((np.count_nonzero(share, axis=0) > 1) & (total > 0.0), found, share)

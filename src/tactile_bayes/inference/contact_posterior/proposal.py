@@ -1,4 +1,4 @@
-"""Proposals for importance sampling of contacts: for each sample and phase, normal densities truncated at the edge."""
+"""Proposals for importance sampling of contacts: for each sample and branch, normal densities truncated at its ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tactile_bayes.arrays import Floats, Index
 __all__ = ["ContactProposal", "Proposed"]
 
 _WIDTHS = np.array([1.15, 3.0])
-"""Widths of the normal densities of a phase, in standard deviations of the posterior's approximation."""
+"""Widths of the normal densities of a branch, in standard deviations of the posterior's approximation."""
 
 _SHARES = np.array([0.75, 0.25])
 
@@ -34,38 +34,37 @@ class ContactProposal:
 
     Parameters
     ----------
-    mean : ndarray, shape (2, n, k)
-        Mean of way, force and, if k is 3, drive angle, in tip (first) and tangential contact.
-    covariance : ndarray, shape (2, n, k, k)
+    mean : ndarray, shape (branches, n, k)
+        Mean of way, force and, if k is 3, drive angle, on each branch.
+    covariance : ndarray, shape (branches, n, k, k)
         Covariance of the same.
-    share : ndarray, shape (n,)
-        Share of tip contact; 0 or 1 if the other phase has no approximation.
-    longest : float
-        Largest way in tip contact [rad]; in tangential contact the way is above −1.
+    share : ndarray, shape (branches, n)
+        Share of each branch; 0 if it has no approximation.
+    ways : ndarray, shape (branches, 2)
+        Least and largest way on each branch.
     """
 
-    def __init__(self, mean: Floats, covariance: Floats, share: Floats, longest: float) -> None:
+    def __init__(self, mean: Floats, covariance: Floats, share: Floats, ways: Floats) -> None:
         self._share = share
         self._root = np.linalg.cholesky(covariance)
         spread = self._root[..., 0, 0]
-        self._low = np.array([0.0, -1.0])[:, None] + 0.0 * share
-        self._high = np.array([longest, 0.0])[:, None] + 0.0 * share
+        self._low, self._high = (end[:, None] + 0.0 * share for end in ways.T)
         self._mean = mean.copy()
         self._mean[..., 0] = np.clip(
             mean[..., 0], self._low - _MAX_DISTANCE * spread, self._high + _MAX_DISTANCE * spread
         )
 
     def draw(self, count: int, rng: np.random.Generator) -> Proposed:
-        """Draw `count` independent points for every sample, with both phases in their shares."""
-        size, k = self._share.size, self._mean.shape[-1]
+        """Draw `count` independent points for every sample, with all branches in their shares."""
+        size, k = self._share.shape[1], self._mean.shape[-1]
         # The draws are stratified: shares are exact to one draw.
         order = (np.arange(count)[:, None] + rng.random((count, size))) / count
-        phase = (order >= self._share).astype(np.intp)
+        branch = sum(order >= until for until in np.cumsum(self._share, axis=0)[:-1]).astype(np.intp)
         wide = (rng.random((count, size)) >= _SHARES[0]).astype(np.intp)
-        who = np.broadcast_to(np.arange(size), phase.shape)
-        mean, root, width = self._mean[phase, who], self._root[phase, who], _WIDTHS[wide]
+        who = np.broadcast_to(np.arange(size), branch.shape)
+        mean, root, width = self._mean[branch, who], self._root[branch, who], _WIDTHS[wide]
         points = np.empty((count, size, k))
-        low, high = self._low[phase, who], self._high[phase, who]
+        low, high = self._low[branch, who], self._high[branch, who]
         scale = width * root[..., 0, 0]
         normal = _between((low - mean[..., 0]) / scale, (high - mean[..., 0]) / scale, rng.random((count, size)))
         points[..., 0] = np.clip(mean[..., 0] + scale * normal, low, high)
@@ -78,10 +77,10 @@ class ContactProposal:
             across = (points[..., 1] - middle) / root[..., 1, 1]
             middle = mean[..., 2] + root[..., 2, 0] * along + root[..., 2, 1] * across
             points[..., 2] = middle + width * root[..., 2, 2] * rng.standard_normal((count, size))
-        return Proposed(points, self._log_density(points, phase, who))
+        return Proposed(points, self._log_density(points, branch, who))
 
-    def _log_density(self, points: Floats, phase: Index, who: Index) -> Floats:
-        mean, root = self._mean[phase, who], self._root[phase, who]
+    def _log_density(self, points: Floats, branch: Index, who: Index) -> Floats:
+        mean, root = self._mean[branch, who], self._root[branch, who]
         k = points.shape[-1]
         along = (points[..., 0] - mean[..., 0]) / root[..., 0, 0]
         middle = mean[..., 1] + root[..., 1, 0] * along
@@ -91,15 +90,15 @@ class ContactProposal:
             last = mean[..., 2] + root[..., 2, 0] * along + root[..., 2, 1] * across
             squares += ((points[..., 2] - last) / root[..., 2, 2]) ** 2
         volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1) + 0.5 * k * np.log(2.0 * np.pi)
-        low, high = self._low[phase, who] - mean[..., 0], self._high[phase, who] - mean[..., 0]
+        low, high = self._low[branch, who] - mean[..., 0], self._high[branch, who] - mean[..., 0]
         parts = []
         for width, share in zip(_WIDTHS, _SHARES, strict=True):
             inside = _log_mass(low / (width * root[..., 0, 0]), high / (width * root[..., 0, 0]))
             inside += log_ndtr(middle / (width * root[..., 1, 1]))
             parts.append(np.log(share) - 0.5 * squares / width**2 - k * np.log(width) - inside)
         with np.errstate(divide="ignore"):
-            of_phase = np.log(np.where(phase == 0, self._share, 1.0 - self._share))
-        return np.asarray(logsumexp(np.stack(parts), axis=0) - volume + of_phase)
+            of_branch = np.log(self._share[branch, who])
+        return np.asarray(logsumexp(np.stack(parts), axis=0) - volume + of_branch)
 
 
 def _between(low: Floats, high: Floats, uniform: Floats) -> Floats:

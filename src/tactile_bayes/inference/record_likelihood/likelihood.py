@@ -39,8 +39,9 @@ _UNFELT = 2e-3
 _LEAST = 1e-10
 """Least tolerance of loads, over the largest load: tables are no more accurate."""
 
-_TABULATED = 5e-6
-"""Least tolerance of loads for which the pose of a rod with a profile comes from a table."""
+_TABULATED = 1e-6
+"""Least tolerance of loads, over the largest load, for which the pose of a rod with a profile comes from a table: its
+errors are shares of the loads, which are large where a rod touches an object near its pivot."""
 
 _LENGTHS_OF_LINE = [0, 1, 3, 4]
 """Columns of a line that are lengths, or changes of lengths."""
@@ -110,9 +111,10 @@ class RecordLikelihood:
     @noise.setter
     def noise(self, deviation: Floats) -> None:
         self._noise = np.asarray(deviation, dtype=float)
-        largest = np.nan_to_num(np.abs(self.measured)).max(axis=0)
+        largest = np.maximum(np.nan_to_num(np.abs(self.measured)).max(axis=0), 1.0)
         share = _UNFELT * math.sqrt(min(1.0, 360.0 / len(self.measured)))
-        self._tolerance = np.maximum(share * self._noise, _LEAST * np.maximum(largest, 1.0))
+        self._tolerance = np.maximum(share * self._noise, _LEAST * largest)
+        self._tolerated_share = float((self._tolerance / largest).min())
 
     def paths(
         self, contours: Contour, rig: Rig | None = None, *, exact: bool = True, drive_angles: Floats | None = None
@@ -182,7 +184,7 @@ class RecordLikelihood:
         from tactile_bayes.mechanics.poses.forward_table import NO_TABLES  # numba takes a second to load
 
         profile = self._profile(rig)
-        if self.exact or profile is None or self._tolerance.min() < _TABULATED:
+        if self.exact or profile is None or self._tolerated_share < _TABULATED:
             return NO_TABLES
         return self._tables.known(profile, rig.taper, rig.rest_curvature, rig.friction, rig.length)
 

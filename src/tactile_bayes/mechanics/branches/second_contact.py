@@ -1,5 +1,5 @@
-"""A second contact: a rod that is curved toward the object may touch it at two points, and a tip that folds over with the
-other side of the rod."""
+"""A second contact: a rod that is curved toward the object may touch it at two points, and one whose tip folds over
+with its other side."""
 
 from __future__ import annotations
 

@@ -16,6 +16,9 @@ Then s1 is an elliptic integral in Carlson's form. Nothing of this is singular w
 parameter m = x/y is one. The contact is the first point at which the bending moment vanishes with κ' = f cos ψ > 0. If
 m0 > 0 the moment vanishes nowhere before. If the line of force has passed the pivot, m0 < 0 and cos ψ0 < 0, as happens
 to rods that are curved at rest as a load curves them, it vanishes once before.
+
+A tip that is turned beyond the normal of the contour, ψ1 > π/2, is a contact with κ' < 0 there: that of the mirrored
+rod from the pivot or, if m0 > 0, from the point at which the moment has risen through zero.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ from typing import NamedTuple
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.pose import pose
 
-__all__ = ["MOST_LOAD", "Found", "arc_contact", "is_moderate"]
+__all__ = ["MOST_LOAD", "NO_CONTACT", "Found", "arc_contact", "arc_zeros", "is_moderate"]
 
 MOST_LOAD = 1e6
 """Largest load f s1² and square of the bend κ0 s1: a rod would make a hundred turns."""
@@ -44,6 +47,9 @@ class Found(NamedTuple):
     arclength: float
     tip_angle: float
     modulus: float
+
+
+NO_CONTACT = Found(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
 @compiled
@@ -135,3 +141,40 @@ def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, 
     u, v = moment / force, here.v
     x, y = (u * fy + v * fx) / force, (v * fy - u * fx) / force
     return Found(x, y, beta - delta, arclength, phi0 - here.turn, modulus)
+
+
+@compiled
+def arc_zeros(phi0: float, moment: float, fx: float, fy: float, delta: float, curvature: float) -> tuple[Found, Found]:
+    """Points at which the moment first rises and first falls through zero; see `zeros_along`."""
+    rising = arc_contact(phi0, moment, fx, fy, delta, curvature)
+    if moment > 0.0:
+        return rising, _mirrored_beyond(rising, fx, fy, curvature)
+    falling = arc_contact(math.pi - phi0, -moment, -fx, fy, -delta, -curvature)
+    falling = Found(
+        -falling.x,
+        falling.y,
+        -falling.slope_angle,
+        falling.arclength,
+        math.pi - falling.tip_angle,
+        falling.modulus,
+    )
+    if math.isnan(rising.arclength):
+        rising = _beyond(falling, fx, fy, curvature)
+    return rising, falling
+
+
+@compiled
+def _beyond(zero: Found, fx: float, fy: float, curvature: float) -> Found:
+    """Point at which the moment rises through zero, beyond one at which it falls."""
+    if not zero.arclength <= 1.0:
+        return NO_CONTACT
+    x, y, _, arclength, tip_angle, modulus = arc_contact(zero.tip_angle, 0.0, fx, fy, 0.0, curvature)
+    return Found(zero.x + x, zero.y + y, zero.slope_angle, zero.arclength + arclength, tip_angle, modulus)
+
+
+@compiled
+def _mirrored_beyond(zero: Found, fx: float, fy: float, curvature: float) -> Found:
+    """Point at which the moment falls through zero, beyond one at which it rises."""
+    mirrored = Found(-zero.x, zero.y, -zero.slope_angle, zero.arclength, math.pi - zero.tip_angle, zero.modulus)
+    x, y, slope_angle, arclength, tip_angle, modulus = _beyond(mirrored, -fx, fy, -curvature)
+    return Found(-x, y, -slope_angle, arclength, math.pi - tip_angle, modulus)

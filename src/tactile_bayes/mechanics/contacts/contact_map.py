@@ -1,8 +1,8 @@
 """One contact from its coordinates, with derivatives: the closed form of `contact_coordinates`, compiled.
 
 The pivot as seen from the contact (`pose`) is turned so that the rod has its drive angle at the pivot. The closed form
-goes on for longer rods, which would wind about the line of force: a contact has a lever u ≥ 0 of the contact force or,
-if the unloaded rod is curved, cos ψ0 < 0 at the pivot.
+goes on for longer rods, which would wind about the line of force: a contact of a straight, uniform rod has a lever
+u ≥ 0 of the contact force and |ψ1| < π/2, and other arcs are shorter than a period.
 """
 
 from __future__ import annotations
@@ -84,13 +84,13 @@ def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> Bend:
     """
     force, psi1, arclength, drive_angle = z[i, 0], z[i, 1], z[i, 2], z[i, 3]
     curvature, is_arc = beam.curvature, beam.varied is None
-    half, load = 0.5 * curvature * arclength, force * arclength * arclength
-    possible = abs(psi1) < 0.5 * math.pi and arclength > 0.0 and force > 0.0
+    half, load, is_straight = 0.5 * curvature * arclength, force * arclength * arclength, is_arc and curvature == 0.0
+    possible = -0.5 * math.pi < psi1 < (0.5 if is_straight else 1.5) * math.pi and arclength > 0.0 and force > 0.0
     if possible and load < (MOST_LOAD if is_arc else _MOST_INTEGRATED) and half * half < MOST_LOAD:
         if is_arc:
             possible = _is_first(half * half + load * math.sin(0.25 * math.pi - 0.5 * psi1) ** 2, load)
         here, by_psi1, longer, by_force = whole_pose(beam, psi1, arclength, force)
-        if possible and (here.u >= 0.0 or (longer.u < 0.0 and is_arc and curvature != 0.0)):
+        if possible and (here.u >= 0.0 or not is_straight):
             bend = Bend(here, by_force, by_psi1, longer)
             here, by_force, by_psi1, longer = from_pivot(bend, psi1, beam.stem)
             beta = drive_angle - psi1 - here.turn
@@ -137,8 +137,8 @@ def moved(
     moment: float,
     fx: float,
     fy: float,
-) -> tuple[float, float, float, float]:
-    """Shift of the place, to first order, for changes of drive angle and loads: the derivatives of Step 2.
+) -> tuple[float, float, float, float, float]:
+    """Shift of the place and of ψ1, to first order, for changes of drive angle and loads: the derivatives of Step 2.
 
     With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945) and the curvature κ = κ0 − m0 at the
     pivot, sin ψ1 = sin ψ0 + (κ0² − κ²)/(2 f). The arc length follows from the changes of ψ0 and of the lever u = m0/f
@@ -173,6 +173,7 @@ def moved(
         by[1, 4] * df + by[2, 4] * shift + by[3, 4] * by_length + by[4, 4] * angle,
         beta,
         by_length,
+        shift,
     )
 
 

@@ -53,7 +53,10 @@ class ContactFit(NamedTuple):
     clearance: Floats
     """Distance from the edge, in standard deviations of the coordinate that leads to it."""
     rival: Floats
-    """Excess of the sum of squares of the other phase's best contact; infinite where it has none."""
+    """Excess of the sum of squares of the next best contact; infinite where there is none."""
+    other: Floats
+    """Coordinates of that contact, shape (n, 4)."""
+    other_phase: NDArray[np.int8]
 
 
 class RawFit(NamedTuple):
@@ -67,3 +70,10 @@ class RawFit(NamedTuple):
     bend: Floats
     """Nonlinearity: squared distance, in the metric of the covariance, from the contact to the mean of two contacts one
     standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,)."""
+    deviation: Floats
+    """Deviation of the contact from one at the tip or along the rod, in its standard deviations, or in L and rad
+    without noise, shape (n,)."""
+    other: Floats
+    """The other point without moment, shape (n, 4); NaN without one."""
+    other_deviation: Floats
+    """Shape (n,)."""

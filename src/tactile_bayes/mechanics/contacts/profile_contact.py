@@ -1,7 +1,7 @@
-"""Step 2 of a rod of any rest curvature and rigidity: the contact that follows from a base wrench.
+"""Step 2 of a rod of any rest curvature and rigidity: the points that may be the contact, from a base wrench.
 
-Slope and moment at the pivot determine the rod. Its contact is the first point at which the bending moment vanishes.
-Beyond its tip a rod is continued with the rest curvature and the rigidity of the tip.
+Slope and moment at the pivot determine the rod, and its moment vanishes at the contact. It may vanish once before, if
+the rod is bent both ways. Beyond its tip a rod is continued with the rest curvature and the rigidity of the tip.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tactile_bayes.mechanics.poses.rises import rise
 from tactile_bayes.mechanics.poses.taylor import FARTHEST, FORWARD, State, advance, begin, moved
 from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = ["ProfileContact", "contact_along"]
+__all__ = ["ProfileContact", "contact_along", "is_exact", "zeros_along"]
 
 
 class ProfileContact(NamedTuple):
@@ -32,28 +32,62 @@ class ProfileContact(NamedTuple):
     """Slope φ(s1) of the rod at the contact [rad]."""
 
 
+_EXACT = 1e-6
+"""Arc length [L] and angle [rad] that count as zero in Step 2 without errors."""
+
+_NONE = ProfileContact(math.nan, math.nan, math.nan, math.nan, math.nan)
+
+
+@compiled
+def zeros_along(
+    profile: Profile, phi0: float, moment: float, fx: float, fy: float, delta: float, work: Floats
+) -> tuple[ProfileContact, ProfileContact]:
+    """First two points without moment, for drive angle, holding moment, support reaction and friction angle.
+
+    The moment rises through zero at one of them and falls at the other, which are returned in this order. There is no
+    second one if the first lies beyond the tip.
+    """
+    force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
+    state, rising, falling = State(phi0 - beta, -moment, 0.0, 0.0), _NONE, _NONE
+    if not (0.0 < force < math.inf and math.isfinite(moment)):
+        return rising, falling
+    # A force without moment passes through the pivot: the rod must bend away from it before it returns.
+    sense = 1.0 if moment > 0.0 or (moment == 0.0 and math.cos(state.psi) < 0.0) else -1.0
+    march = begin(profile, 0.0, FORWARD, state)
+    while march.at < FARTHEST:
+        before = march
+        step, march = advance(profile, before, FORWARD, FARTHEST, force, work)
+        x = rise(before.state, force, step, sense, 0.0, work)
+        if x >= 0.0:
+            end, at = moved(before.state, force, step, x, work), before.at + x * step.length
+            cos, sin = math.cos(beta), math.sin(beta)
+            x, y = end.u * cos - end.v * sin, end.u * sin + end.v * cos
+            if sense > 0.0:
+                rising = ProfileContact(x, y, beta - delta, at, beta + end.psi)
+            else:
+                falling = ProfileContact(x, y, beta - delta, at, beta + end.psi)
+            if at > 1.0 or (rising.arclength > 0.0 and falling.arclength > 0.0):
+                break
+            march, sense = begin(profile, at, FORWARD, State(end.psi, 0.0, end.u, end.v)), -sense
+    return rising, falling
+
+
 @compiled
 def contact_along(
     profile: Profile, phi0: float, moment: float, fx: float, fy: float, delta: float, work: Floats
 ) -> ProfileContact:
-    """Contact for drive angle, holding moment, support reaction and friction angle."""
-    force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
-    start = State(phi0 - beta, -moment, 0.0, 0.0)
-    # A force without moment passes through the pivot: the rod must bend away from it before it returns.
-    if 0.0 < force < math.inf and (moment > 0.0 or (moment == 0.0 and math.cos(start.psi) < 0.0)):
-        march = begin(profile, 0.0, FORWARD, start)
-        while march.at < FARTHEST:
-            before = march
-            step, march = advance(profile, before, FORWARD, FARTHEST, force, work)
-            x = rise(before.state, force, step, True, 0.0, work)
-            if x >= 0.0:
-                end = moved(before.state, force, step, x, work)
-                cos, sin = math.cos(beta), math.sin(beta)
-                return ProfileContact(
-                    end.u * cos - end.v * sin,
-                    end.u * sin + end.v * cos,
-                    beta - delta,
-                    before.at + x * step.length,
-                    beta + end.psi,
-                )
-    return ProfileContact(math.nan, math.nan, math.nan, math.nan, math.nan)
+    """Contact for drive angle, holding moment, support reaction and friction angle, without errors.
+
+    It is the point at which the moment rises through zero, unless the rod ends at the other one."""
+    rising, falling = zeros_along(profile, phi0, moment, fx, fy, delta, work)
+    is_contact = is_exact(rising.arclength, rising.tip_angle - rising.slope_angle)
+    if not is_contact and is_exact(falling.arclength, math.pi):
+        return falling
+    return rising if is_contact or not falling.arclength < rising.arclength else _NONE
+
+
+@compiled
+def is_exact(arclength: float, turn: float) -> bool:
+    """True if a rod ends at a point, or lies along the contour there."""
+    turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+    return abs(arclength - 1.0) < _EXACT or (arclength < 1.0 and abs(turn) < _EXACT)

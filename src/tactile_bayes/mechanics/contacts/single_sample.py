@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, Found
 from tactile_bayes.mechanics.contacts.contact_map import contact_state, moved
 from tactile_bayes.mechanics.contacts.fits import RawFit, Reading
-from tactile_bayes.mechanics.contacts.states import contact_of
+from tactile_bayes.mechanics.contacts.states import contact_pair
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, mirrored_by
 
 __all__ = ["Workspace", "descents", "raw_fits"]
@@ -24,6 +25,11 @@ _BEYOND_ALL = 1e300
 
 _SAME = 1e-9
 """Distance [L] below which two contact points differ by rounding only."""
+
+
+_POSSIBLE, _NEAR = 4.0, 1e-3
+"""Largest deviation of a contact at which the moment does not vanish for the first time, in its standard deviations, or
+in L and rad without noise."""
 
 
 class Workspace(NamedTuple):
@@ -186,41 +192,102 @@ def raw_fits(
         angle, moment = reading.drive_angle[i], reading.loads[i, 0]
         force_x, force_y = reading.loads[i, 1], reading.loads[i, 2]
         beam = mirrored_by(curvature[i], varied, stem)
-        found = contact_of(beam, angle, moment, force_x, force_y, delta[i])
+        rising, falling = contact_pair(beam, angle, moment, force_x, force_y, delta[i])
+        out.bend[i] = math.nan
         for k in range(4):
-            out.place[i, k] = found[k]
+            out.place[i, k], out.other[i, k] = math.nan, math.nan
             for p in range(4):
                 out.covariance[i, k, p] = math.nan
-        out.tip_angle[i], out.bend[i] = found.tip_angle, math.nan
+        _write_errors(reading, i, matrix, axes, errors)
+        out.deviation[i] = _deviation(rising, delta[i], beam, reading, i, z, errors, by, changes)
+        out.other_deviation[i] = _deviation(falling, delta[i], beam, reading, i, z, errors, by, changes)
+        found, other = rising, falling
+        falls = out.other_deviation[i] < out.deviation[i] or math.isnan(rising.arclength)
+        if falls:
+            found, other = falling, rising
+            out.deviation[i], out.other_deviation[i] = out.other_deviation[i], out.deviation[i]
+        is_second = falling.arclength < rising.arclength or math.isnan(rising.arclength)
+        if is_second and not out.deviation[i] < (_POSSIBLE if _is_noisy(errors) else _NEAR):
+            found = NO_CONTACT
+        out.tip_angle[i] = found.tip_angle
+        for k in range(4):
+            out.place[i, k], out.other[i, k] = found[k], other[k]
         if math.isnan(found.arclength):
             continue
-        for a in range(3):
-            for b in range(3):
-                value = reading.covariance[i, a, b]
-                matrix[a, b] = value if math.isfinite(value) else _BEYOND_ALL
-        _principal(matrix, axes)
-        deviation = reading.angle_deviation[i]
-        for k in range(3):
-            errors[k, 0], errors[3, k + 1] = 0.0, deviation * reading.leaning[i, k]
-            for a in range(3):
-                errors[k, a + 1] = axes[a, k]
-        errors[3, 0] = deviation
-        z[0, 0], z[0, 1] = math.hypot(force_x, force_y), found.tip_angle - found.slope_angle - delta[i]
-        z[0, 2], z[0, 3] = found.arclength, angle
-        bend = contact_state(z, 0, beam, by)
-        for k in range(4):
-            change = moved(z, 0, beam, bend, by, errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3])
-            for p in range(4):
-                changes[k, p] = change[p]
+        _deviation(found, delta[i], beam, reading, i, z, errors, by, changes)
         _spread(changes, out.covariance, i)
         out.bend[i] = 0.0
-        for k in range(4 if deviation > 0.0 else 3):
+        for k in range(4 if reading.angle_deviation[i] > 0.0 else 3):
             x_off, y_off = -found.x, -found.y
             for sign in (1.0, -1.0):
                 a, m, fx, fy = sign * errors[k, 0], sign * errors[k, 1], sign * errors[k, 2], sign * errors[k, 3]
-                aside = contact_of(beam, angle + a, moment + m, force_x + fx, force_y + fy, delta[i])
+                pair = contact_pair(beam, angle + a, moment + m, force_x + fx, force_y + fy, delta[i])
+                aside = pair[1] if falls else pair[0]
                 x_off, y_off = x_off + 0.5 * aside.x, y_off + 0.5 * aside.y
             out.bend[i] = _bent(out.bend[i], x_off, y_off, out.covariance, i)
+
+
+@compiled
+def _write_errors(reading: Reading, i: int, matrix: Floats, axes: Floats, errors: Floats) -> None:
+    """Write four independent errors of drive angle and loads, one standard deviation long, in rows."""
+    for a in range(3):
+        for b in range(3):
+            value = reading.covariance[i, a, b]
+            matrix[a, b] = value if math.isfinite(value) else _BEYOND_ALL
+    _principal(matrix, axes)
+    deviation = reading.angle_deviation[i]
+    for k in range(3):
+        errors[k, 0], errors[3, k + 1] = 0.0, deviation * reading.leaning[i, k]
+        for a in range(3):
+            errors[k, a + 1] = axes[a, k]
+    errors[3, 0] = deviation
+
+
+@compiled
+def _is_noisy(errors: Floats) -> bool:
+    """True if any error is not zero."""
+    for k in range(4):
+        for a in range(4):
+            if errors[k, a] != 0.0:
+                return True
+    return False
+
+
+@compiled
+def _deviation(
+    found: Found,
+    delta: float,
+    beam: Beam,
+    reading: Reading,
+    i: int,
+    z: Floats,
+    errors: Floats,
+    by: Floats,
+    changes: Floats,
+) -> float:
+    """Deviation of a point without moment from a contact at the tip or along the rod, in standard deviations, or in L
+    and rad without noise; infinite for no point. Writes the shifts of place and ψ1 by the errors, in rows."""
+    if math.isnan(found.arclength):
+        return math.inf
+    turn = found.tip_angle - found.slope_angle
+    turn -= 2.0 * math.pi * math.floor(0.5 * turn / math.pi + 0.25)
+    z[0, 0], z[0, 1] = math.hypot(reading.loads[i, 1], reading.loads[i, 2]), turn - delta
+    z[0, 2], z[0, 3] = found.arclength, reading.drive_angle[i]
+    bend = contact_state(z, 0, beam, by)
+    length_variance, turn_variance = 0.0, 0.0
+    for k in range(4):
+        change = moved(z, 0, beam, bend, by, errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3])
+        for p in range(5):
+            changes[k, p] = change[p]
+        length_variance += change[3] * change[3]
+        turn_variance += change[4] * change[4]
+    by_length, by_turn = 1.0, 1.0
+    if _is_noisy(errors):
+        by_length = 1.0 / max(math.sqrt(length_variance), _SAME)
+        by_turn = 1.0 / max(math.sqrt(turn_variance), _SAME)
+    ends = math.hypot(by_length * (found.arclength - 1.0), by_turn * max(-turn, turn - math.pi, 0.0))
+    lies = math.hypot(by_turn * turn, by_length * max(found.arclength - 1.0, 0.0))
+    return min(ends, lies)
 
 
 @compiled

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import cached, compiled
-from tactile_bayes.mechanics.contacts.arc_states import Found, arc_contact
+from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, Found, arc_zeros
 from tactile_bayes.mechanics.contacts.continuation import NOWHERE, Start, State, continued_state, unloaded_arc
-from tactile_bayes.mechanics.contacts.profile_contact import contact_along
+from tactile_bayes.mechanics.contacts.profile_contact import is_exact, zeros_along
 from tactile_bayes.mechanics.contacts.tables import (
     AMPLITUDE,
     MOST_FRICTION,
@@ -46,11 +46,13 @@ __all__ = [
     "arc_contacts",
     "contact",
     "contact_of",
+    "contact_pair",
     "contacts",
     "continued_wrenches",
     "profile_contacts",
     "profile_shapes",
     "wrenches",
+    "write_contact_pairs",
 ]
 
 _BEYOND = 1e-12
@@ -250,29 +252,60 @@ def contacts(columns: Floats, out: Floats) -> None:
 
 
 @compiled
-def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
-    """Contact of any rod that follows from a base wrench, as `contact`."""
+def contact_pair(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> tuple[Found, Found]:
+    """Points of any rod that may be its contact: the moment rises through zero at the first, and falls at the second.
+
+    A contact along the rod is of the first kind, and so is that of a tip, unless it is turned beyond the normal of the
+    contour. Straight, uniform rods are past snap-off when they are bent both ways: they have the first kind only.
+    """
     h = beam.stem
     if h == 0.0:
-        return _contact_of(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
+        return _contact_pair(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
     moment -= lever_of_stem(h, phi0, fx, fy)
-    x, y, slope_angle, arclength, tip_angle, modulus = _contact_of(
-        beam.varied, beam.curvature, phi0, moment, fx, fy, delta
-    )
-    x, y = x + h * math.cos(phi0), y + h * math.sin(phi0)
-    return Found(x, y, slope_angle, arclength, tip_angle, modulus)
+    rising, falling = _contact_pair(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
+    return _on_stem(h, phi0, rising), _on_stem(h, phi0, falling)
 
 
 @compiled
-def _contact_of(
+def _on_stem(stem: float, phi0: float, found: Found) -> Found:
+    x, y, slope_angle, arclength, tip_angle, modulus = found
+    return Found(x + stem * math.cos(phi0), y + stem * math.sin(phi0), slope_angle, arclength, tip_angle, modulus)
+
+
+@compiled
+def _contact_pair(
     varied: Varied | None, curvature: float, phi0: float, moment: float, fx: float, fy: float, delta: float
-) -> Found:
+) -> tuple[Found, Found]:
     if varied is None:
         if curvature == 0.0:
-            return contact(phi0, moment, fx, fy, delta)
-        return arc_contact(phi0, moment, fx, fy, delta, curvature)
-    found = contact_along(varied.profile, phi0, moment, fx, fy, delta, varied.work)
-    return Found(found.x, found.y, found.slope_angle, found.arclength, found.tip_angle, math.nan)
+            return contact(phi0, moment, fx, fy, delta), NO_CONTACT
+        return arc_zeros(phi0, moment, fx, fy, delta, curvature)
+    one, other = zeros_along(varied.profile, phi0, moment, fx, fy, delta, varied.work)
+    return (
+        Found(one.x, one.y, one.slope_angle, one.arclength, one.tip_angle, math.nan),
+        Found(other.x, other.y, other.slope_angle, other.arclength, other.tip_angle, math.nan),
+    )
+
+
+@compiled
+def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
+    """Contact of any rod that follows from a base wrench without errors, as in `contact_along`."""
+    rising, falling = contact_pair(beam, phi0, moment, fx, fy, delta)
+    is_contact = is_exact(rising.arclength, rising.tip_angle - rising.slope_angle)
+    if not is_contact and is_exact(falling.arclength, math.pi):
+        return falling
+    is_first = beam.varied is None or not falling.arclength < rising.arclength
+    return rising if is_contact or is_first else NO_CONTACT
+
+
+@cached
+def write_contact_pairs(columns: Floats, curvature: Floats, varied: Varied | None, stem: float, out: Floats) -> None:
+    """Write arc length and ψ1 of both points of `contact_pair`, shape (n, 2, 2), for wrenches as in `contacts`."""
+    for i in range(columns.shape[0]):
+        beam = mirrored_by(curvature[i], varied, stem)
+        pair = contact_pair(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
+        for k in range(2):
+            out[i, k, 0], out[i, k, 1] = pair[k].arclength, pair[k].tip_angle - pair[k].slope_angle - columns[i, 4]
 
 
 @cached
@@ -298,7 +331,7 @@ def profile_shapes(wrenches: Floats, varied: Varied, arclengths: Floats, x: Floa
         phi0, moment, fx, fy = wrenches[i, 0], wrenches[i, 1], wrenches[i, 2], wrenches[i, 3]
         profile, end = with_sign(varied, wrenches[i, 4]).profile, 0.0
         if fx * fx + fy * fy > 0.0 and math.isfinite(moment):
-            end = contact_along(profile, phi0, moment, fx, fy, 0.0, varied.work).arclength
+            end = contact_of(mirrored_by(wrenches[i, 4], varied, 0.0), phi0, moment, fx, fy, 0.0).arclength
         else:
             moment, fx, fy = 0.0, 0.0, 0.0
         shape_along(profile, phi0, moment, fx, fy, end, arclengths, x[i], y[i], varied.work)
@@ -311,7 +344,7 @@ def profile_shapes(wrenches: Floats, varied: Varied, arclengths: Floats, x: Floa
 def arc_contacts(columns: Floats, out: Floats) -> None:
     """Write contacts of arcs as `contacts` does; the rest curvature is the last column."""
     for i in range(columns.shape[0]):
-        wrench = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
-        found = arc_contact(*wrench, columns[i, 4], columns[i, 5])
+        beam = mirrored_by(columns[i, 5], None, 0.0)
+        found = contact_of(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
         for k in range(6):
             out[i, k] = found[k]

@@ -518,7 +518,8 @@ def chord_in(sheet: Floats, mirrored: bool, reach: float, distance: float) -> Re
 def _write_errors(
     profile: Profile, table: ForwardTable, samples: Floats, work: Floats, sheet: Floats, out: Floats
 ) -> None:
-    """Write the errors of the pose at points of all dimensions, given as shares, for contacts before the thrust."""
+    """Write the errors of the pose at points of all dimensions, given as shares, for contacts before the thrust, or of
+    the chord of the rod at rest, if they are larger."""
     box, at = table.box, samples
     for k in range(samples.shape[0]):
         taper = box[0, 0] + at[k, 0] * (box[0, 1] - box[0, 0])
@@ -536,6 +537,12 @@ def _write_errors(
         out[k] = max(out[k], abs(found.turn - exact.turn))
         if exact.u < 0.0:
             out[k] = 0.0
+        reach = rest_along(rod, 0.0, 1.0, work).distance
+        distance = (
+            1.0 - at[k, 5] * at[k, 5]
+        ) * reach  # mostly near the tip, where a curved rod may lie across its chord
+        chord, known = chord_along(rod, 0.0, distance, work), chord_in(sheet, False, reach, distance)
+        out[k] = max(out[k], abs(known.arclength - chord.arclength), abs(known.at_base - chord.bearing))
 
 
 def _errors(profile: Profile, table: ForwardTable) -> Floats:

@@ -116,17 +116,17 @@ def beyond_along(profile: Profile, arclength: float, work: Floats) -> tuple[floa
 def chord_along(profile: Profile, stem: float, distance: float, work: Floats) -> Chord:
     """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
 
-    The rod is continued beyond its tip as in `contact_along`."""
+    The rod is continued beyond its tip as in `zeros_along`."""
     beginning = State(0.0, 0.0, stem, 0.0)
     march = begin(profile, 0.0, FORWARD, beginning)
     found, farthest, at = beginning, 0.0, 0.0
     while march.at < FARTHEST:
         before = march
         step, march = advance(profile, before, FORWARD, FARTHEST, 0.0, work)
-        x = rise(before.state, 0.0, step, False, distance, work)
+        x = rise(before.state, 0.0, step, 0.0, distance, work)
         reaches = x >= 0.0
         if not reaches:
-            x = peak(before.state, 0.0, step, False, work)
+            x = peak(before.state, 0.0, step, 0.0, work)
         end = moved(before.state, 0.0, step, x, work)
         far = math.hypot(end.u, end.v)
         if reaches or far > farthest:

@@ -1,4 +1,4 @@
-"""The point of a step of the rod at which its moment, or its distance from the pivot, rises to a level."""
+"""The point of a step of the rod at which its moment vanishes, or its distance from the pivot rises to a level."""
 
 from __future__ import annotations
 
@@ -22,27 +22,28 @@ _FLAT = 1e-9
 
 @compiled
 def _value_and_slope(
-    start: State, force: float, step: Step, of_load: bool, level: float, x: float, work: Floats
+    start: State, force: float, step: Step, sense: float, level: float, x: float, work: Floats
 ) -> tuple[float, float]:
+    """The moment times its sense, 1 or −1, less the level; with a sense of 0 that of the squared distance."""
     at = moved(start, force, step, x, work)
     cos, sin = math.cos(at.psi), math.sin(at.psi)
-    if of_load:
-        return at.load - level, force * step.length * cos
+    if sense != 0.0:
+        return sense * at.load - level, sense * force * step.length * cos
     return at.u * at.u + at.v * at.v - level * level, 2.0 * step.length * (at.u * cos + at.v * sin)
 
 
 @compiled
-def peak(start: State, force: float, step: Step, of_load: bool, work: Floats) -> float:
-    """Point of a step at which moment or distance are largest: its end, or a maximum."""
+def peak(start: State, force: float, step: Step, sense: float, work: Floats) -> float:
+    """Point of a step at which the moment times its sense, or the distance, is largest: its end, or a maximum."""
     low, high = 0.0, step.share
     if not (
-        _value_and_slope(start, force, step, of_load, 0.0, low, work)[1] > 0.0
-        and _value_and_slope(start, force, step, of_load, 0.0, high, work)[1] < 0.0
+        _value_and_slope(start, force, step, sense, 0.0, low, work)[1] > 0.0
+        and _value_and_slope(start, force, step, sense, 0.0, high, work)[1] < 0.0
     ):
         return high
     while high - low > _FLAT:
         middle = 0.5 * (low + high)
-        if _value_and_slope(start, force, step, of_load, 0.0, middle, work)[1] > 0.0:
+        if _value_and_slope(start, force, step, sense, 0.0, middle, work)[1] > 0.0:
             low = middle
         else:
             high = middle
@@ -50,15 +51,15 @@ def peak(start: State, force: float, step: Step, of_load: bool, work: Floats) ->
 
 
 @compiled
-def rise(start: State, force: float, step: Step, of_load: bool, level: float, work: Floats) -> float:
-    """Point x of a step at which moment or distance rises to a level; NaN if there is none."""
-    top = peak(start, force, step, of_load, work)
-    if not _value_and_slope(start, force, step, of_load, level, top, work)[0] >= 0.0:
+def rise(start: State, force: float, step: Step, sense: float, level: float, work: Floats) -> float:
+    """Point x of a step at which the moment times its sense, or the distance, rises to a level; NaN without one."""
+    top = peak(start, force, step, sense, work)
+    if not _value_and_slope(start, force, step, sense, level, top, work)[0] >= 0.0:
         return math.nan
     # Newton's method for a function that falls through zero.
     x, below, above, before = 0.5 * top, 0.0, top, top
     for _ in range(_MOST_STEPS):
-        value, slope = _value_and_slope(start, force, step, of_load, level, x, work)
+        value, slope = _value_and_slope(start, force, step, sense, level, x, work)
         new, below, above, before = newton_step(x, -value, -slope, below, above, before)
         moved_by = abs(new - x)
         x = new

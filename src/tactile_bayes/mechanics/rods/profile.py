@@ -50,6 +50,11 @@ class Rods(NamedTuple):
     stem: float = 0.0
     """Rigid piece between pivot and rod [L]."""
 
+    @property
+    def are_straight(self) -> bool:
+        """True if all are straight and uniform: in a stable contact they are bent one way."""
+        return self.profile is None and not np.any(self.curvature)
+
     def take(self, where: Index | slice) -> Rods:
         return self._replace(curvature=self.curvature[where])
 
