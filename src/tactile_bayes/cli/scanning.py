@@ -165,6 +165,7 @@ def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
                 "base": sweep.base,
                 "carried": number in carried,
                 "clear": sweep.clear,
+                "touches_again": sweep.touches_again,
                 "largest_strain": sweep.largest_strain,
                 "first_contact": asdict(sweep.first_contact),
                 "transitions": [asdict(change) for change in sweep.transitions],

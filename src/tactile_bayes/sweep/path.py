@@ -23,6 +23,14 @@ Direction = Literal["forward", "backward"]
 
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
+_SLIDING = (
+    "without friction (friction=0) it slides either way; with friction, split a drive that turns back while the rod is "
+    "in contact into drives that go one way, or take another heading or drive angle",
+    "without friction (friction=0) it slides either way; with friction, take a rod that is less curved toward the "
+    "object, the other direction, or another pivot",
+)
+"""What to do where friction would hold a rod that is carried, and one that turns about a pivot."""
+
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
 """Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
 of the object on one side seems to have passed it on the other."""
@@ -49,7 +57,7 @@ def sweep_paths(
             f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
-    paths = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile)
+    paths = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile, asks_sliding=True)
     where = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
     _refuse(paths, contour, rod, direction, where)
     return paths
@@ -95,8 +103,9 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
             )
         case Reachability.STICKS:
             raise ReachError(
-                f"{sweep} friction would hold the contact at {_point(paths)}, where the rod would have to slide the "
-                "other way, and sticking is not modelled: take another heading or drive angle, or less friction"
+                f"{sweep} friction would hold the contact at {_point(paths)}: the rod would have to slide the other "
+                "way there, or would not slide at first, and sticking is not modelled; "
+                f"{_SLIDING[paths.lines is None]}"
             )
         case Reachability.TOO_FAR:
             raise ReachError(
