@@ -124,7 +124,8 @@ def equilibria(
     rod : Rod, optional
         By default the dimensionless rod.
     friction : float
-        Coulomb's coefficient μ of the sliding rod, at most 0.84.
+        Coulomb's coefficient μ of the sliding rod, at most 0.84. It acts as on a straight rod, which slides toward the
+        snap-off.
 
     Returns
     -------
@@ -254,7 +255,9 @@ def scan(
     Raises
     ------
     ReachError
-        If the rod is too short to touch the contour.
+        If the rod is too short to touch the contour, or friction would hold the contact: where a drive turns back while
+        the rod is in contact, where a tip that is carried head-on does not slide at first, and where a curved rod
+        slides outward at first.
     ContourError
         If the pivot is not below the contour or too close to it, the rod would touch beyond an end of it, or a rod that
         is curved toward the contour would touch it twice.
