@@ -44,12 +44,13 @@ def depth(contour: Contour, x: np.ndarray, y: np.ndarray, half: np.ndarray | flo
     half = np.broadcast_to(half, x.shape)
     if deepest > 0.0 or not np.any(half):
         return deepest
-    px = np.linspace(low, high, _CELLS)
-    py = contour.height(px)
-    known = np.isfinite(py)
     near = np.flatnonzero(np.minimum(above, 0.0) > -_NEAR)[::_EVERY]
     if not near.size:
         return deepest
+    low, high = max(low, float(x[near].min()) - _NEAR), min(high, float(x[near].max()) + _NEAR)
+    px = np.linspace(low, high, _CELLS)
+    py = contour.height(px)
+    known = np.isfinite(py)
     gap = np.hypot(x[near, None] - px[known], y[near, None] - py[known]).min(axis=1)
     return float(np.max(half[near] - gap))
 

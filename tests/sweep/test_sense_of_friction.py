@@ -56,10 +56,17 @@ def test_a_tip_that_is_carried_head_on_does_not_slide_at_first(side, heading, fr
 def test_a_rod_that_is_straightened_first_slides_outward(direction):
     sign = 1.0 if direction == "forward" else -1.0
     toward, away = (tb.Rod(rest_curvature=sign * curvature) for curvature in (0.4, -0.4))
-    with refused(ReachError, "friction", "friction=0", "less curved"):
-        tb.scan(PARABOLA, rod=toward, direction=direction, friction=0.3)
-    assert violations(tb.scan(PARABOLA, rod=toward, direction=direction), toward, 0.0) == {}
-    assert violations(tb.scan(PARABOLA, rod=away, direction=direction, friction=0.3), away, 0.3) == {}
+    scan = tb.scan(PARABOLA, rod=toward, direction=direction, friction=0.3, drive_step=0.002)
+    (sweep,), record = scan.sweeps, scan.record
+    stuck = sign * (sweep.slides_from - sweep.first_contact.drive_angle)
+    assert stuck > 0.01
+    step = sign * np.diff(record.drive_angle.values)
+    assert step.max() == pytest.approx(stuck, abs=0.005)
+    assert violations(scan, toward, 0.3) == {}
+    for rod, friction in ((toward, 0.0), (away, 0.3)):
+        scan = tb.scan(PARABOLA, rod=rod, direction=direction, friction=friction)
+        assert scan.sweeps[0].slides_from == scan.sweeps[0].first_contact.drive_angle
+        assert violations(scan, rod, friction) == {}
 
 
 def test_scan_many_says_which_contours_friction_would_hold():

@@ -14,6 +14,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Drive
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.path import Direction
+from tactile_bayes.sweep.sliding import sliding_from
 
 __all__ = ["Event", "SweepEvents", "events_of"]
 
@@ -72,6 +73,10 @@ class SweepEvents:
     clear : bool
         Whether the unloaded rod is clear of the object after snap-off. If it is not, the rod comes to rest in another
         contact, which no sweep reaches.
+    slides_from : float
+        Travel from which friction opposes the slip. It is that of first contact, unless a rod turns about a pivot that
+        is curved toward the object: with friction it sticks there at first, which is not modelled, and no samples of
+        its contact before this travel are recorded.
     touches_again : float
         Travel at which a drive that carries the base brings the rod, clear after snap-off, to the object again
         [length], and beyond which its state is not computed; NaN if it does not.
@@ -85,6 +90,7 @@ class SweepEvents:
     transitions: tuple[Event, ...]
     snap_off: Event
     clear: bool
+    slides_from: float
     touches_again: float
     largest_strain: float
 
@@ -105,6 +111,10 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
     else:
         base, columns["travel"] = drive.base, columns["drive_angle"]
         columns["base_x"], columns["base_y"] = (np.full(index.size, value) for value in base)
+    slides = float(columns["travel"][0])
+    if not isinstance(drive, Carried):
+        way = sliding_from(paths)
+        slides = np.pi - way if direction == "backward" else way
     kinds = [
         phases[0],
         *(f"{before} → {after}" for before, after in pairwise(phases)),
@@ -113,4 +123,4 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]
     found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
     strain = float(paths.largest_curvature[0]) * 0.5 * rod.diameter / rod.length
-    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, again, strain)
+    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, slides, again, strain)

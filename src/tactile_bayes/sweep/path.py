@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried
+from tactile_bayes.sweep.sliding import sliding_from
 
 __all__ = ["Direction", "carried_paths", "friction_angle_of", "sweep_paths", "to_sweep_frame"]
 
@@ -46,7 +48,8 @@ def sweep_paths(
 ) -> Paths:
     """Compute the exact path of one sweep along one contour, or raise an error that says why there is none.
 
-    Parameters and errors are those of `scan`, with one pivot and one direction.
+    Parameters and errors are those of `scan`, with one pivot and one direction. Friction opposes the slip all along the
+    path, or from a travel on: see `sliding_from`.
     """
     rod = Rod() if rod is None else rod
     sweep_frame = to_sweep_frame(contour, base, direction, rod)
@@ -58,6 +61,10 @@ def sweep_paths(
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
     paths = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile, asks_sliding=True)
+    if paths.reach[0] == Reachability.STICKS:
+        assumed = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile)
+        if assumed.reach[0] == Reachability.TOUCHES and np.isfinite(sliding_from(assumed)):
+            paths = assumed
     where = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
     _refuse(paths, contour, rod, direction, where)
     return paths
@@ -75,8 +82,9 @@ def carried_paths(
     base, friction_angle = (float(poses[0, 0]), float(poses[0, 1])), friction_angle_of(friction)
     found: dict[Direction, Paths] = {}
     for direction in _DIRECTIONS:
+        way = float(np.abs(poses[:, 0] - base[0]).max()) / rod.length
         lines = lines_through(poses, rod.length, backward=direction == "backward").lines[None]
-        sweep_frame = to_sweep_frame(contour, base, direction, rod)
+        sweep_frame = replace(to_sweep_frame(contour, base, direction, rod), way=way)
         found[direction] = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile, lines=lines)
 
     def rank(direction: Direction) -> tuple[int, float]:

@@ -236,7 +236,9 @@ def scan(
     rod : Rod, optional
         By default the dimensionless rod, which is straight. A rod with a diameter touches with its surface.
     friction : float
-        Coulomb's coefficient μ of the sliding rod, at most 0.84.
+        Coulomb's coefficient μ of the sliding rod, at most 0.84. With friction, a rod that turns about a pivot and is
+        curved toward the object sticks at first, which is not modelled: these samples are left out
+        (`SweepEvents.slides_from`).
 
     Returns
     -------
@@ -256,8 +258,8 @@ def scan(
     ------
     ReachError
         If the rod is too short to touch the contour, or friction would hold the contact: where a drive turns back while
-        the rod is in contact, where a tip that is carried head-on does not slide at first, and where a curved rod
-        slides outward at first.
+        the rod is in contact, where a tip that is carried head-on does not slide at first, and where the sense of
+        sliding changes along the path.
     ContourError
         If the pivot is not below the contour or too close to it, the rod would touch beyond an end of it, or a rod that
         is curved toward the contour would touch it twice.
@@ -368,6 +370,8 @@ def _angles(grid: Floats | None, step: float | None, sweep: SweepEvents) -> Floa
     if not sweep.clear:
         angles = angles[sense * (sweep.snap_off.drive_angle - angles) >= 0.0]
     angles = _within_a_turn(angles, sense, sweep)
+    touching = sense * (angles - sweep.first_contact.drive_angle) >= 0.0
+    angles = angles[~(touching & (sense * (sweep.slides_from - angles) > 0.0))]
     return angles[:: 1 if forward else -1]
 
 
