@@ -41,6 +41,8 @@ class SweepFrame:
         Taper of the rod.
     stem : float or ndarray, shape (n,)
         Rigid piece between pivot and rod [rod length].
+    way : float or ndarray, shape (n,)
+        Farthest that a drive carries the base to either side of the pivot [rod length].
     """
 
     contour: Contour
@@ -52,6 +54,7 @@ class SweepFrame:
     rest_curvature: Parameter = 0.0
     taper: Parameter = 0.0
     stem: Parameter = 0.0
+    way: Parameter = 0.0
 
     @property
     def size(self) -> int:
@@ -88,7 +91,7 @@ class SweepFrame:
         """
         lo, hi = (np.broadcast_to(end, (self.size,)).astype(float) for end in self.contour.domain)
         lo, hi = np.where(self.mirrored, -hi, lo), np.where(self.mirrored, -lo, hi)
-        size, ends = np.arange(self.size), np.broadcast_to(1.0 + np.asarray(self.stem), (self.size,))
+        size, ends = np.arange(self.size), np.broadcast_to(1.0 + np.asarray(self.stem) + self.way, (self.size,))
         for end, outward in ((lo, -1.0), (hi, 1.0)):
             open_ended = ~np.isfinite(end)
             reach = np.full(self.size, self.length)
@@ -99,7 +102,7 @@ class SweepFrame:
                 reach *= 2.0
             far = np.flatnonzero(~(outward * self.locate(size, end).x <= _FAR))
             if far.size:
-                end[far] = self._parameter_at(far, 2.0 * outward)
+                end[far] = self._parameter_at(far, outward * (1.0 + ends[far]))
         return lo, hi
 
     def own_domain(self) -> tuple[Floats, Floats]:
@@ -107,7 +110,7 @@ class SweepFrame:
         low, high = self.domain()
         return np.where(self.mirrored, -high, low), np.where(self.mirrored, -low, high)
 
-    def _parameter_at(self, index: Index, x: float) -> Floats:
+    def _parameter_at(self, index: Index, x: Floats) -> Floats:
         """Parameters at which the contour itself, without standoff, is at x in the sweep frame."""
         sign = np.where(self.mirrored[index], -1.0, 1.0)
         from_base = sign * x * self.length_at(index)

@@ -22,7 +22,7 @@ from tactile_bayes.datasets.specification_reading import rule_of
 from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.paths import Paths, trace
-from tactile_bayes.mechanics.reachability import Reachability, SnapOff
+from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rods.profile import profile_of
 from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN
 from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
@@ -289,9 +289,7 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
     """Return the reasons for rejection of candidates with so many sweeps each, side by side."""
     fate = paths.reach.reshape(-1, sweeps).max(axis=1)
     with np.errstate(invalid="ignore"):
-        # Rods that are carried may be in contact up to the end of the drive.
-        clear = paths.is_clear() | ((paths.snap_off == SnapOff.NEVER) & (paths.lines is not None))
-    clear = clear.reshape(-1, sweeps).all(axis=1)
+        clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
     reasons = np.array([one.message for one in Reachability], dtype=object)[fate]
     return np.where((fate == Reachability.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
 

@@ -70,7 +70,8 @@ class Paths:
     largest_curvature: Floats
     """Largest curvature of the rod up to snap-off [1/L], with a relative error of 1e-4."""
     clear_angle: Floats
-    """Drive angle beyond which the unloaded rod has passed the contour, as far as that is known [rad]."""
+    """Drive angle beyond which the unloaded rod has passed the contour, as far as that is known [rad]. If the base is
+    carried, the travel from snap-off on at which the unloaded rod lies in the object [L]; −∞ if it does so nowhere."""
     tolerance: Floats | None
     shapes: Shapes
     sweeps: Sweeps
@@ -82,7 +83,10 @@ class Paths:
     """States at the drive angles given to `trace`, shape (n, k, columns)."""
 
     def is_clear(self) -> Flags:
-        """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,)."""
+        """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,).
+
+        A drive that carries the base does not bring it to the object again either.
+        """
         with np.errstate(invalid="ignore"):
             return np.asarray(self.snap_angle > self.clear_angle)
 
@@ -181,6 +185,7 @@ def trace(
     relative: bool = False,
     polished: bool = True,
     lines: Floats | None = None,
+    asks_sliding: bool = False,
 ) -> Paths:
     """Follow the equilibria of every contour from first contact to snap-off.
 
@@ -207,6 +212,8 @@ def trace(
     lines : ndarray, shape (1 or n, lines, columns), optional
         Lines of drives that carry the base, in the sweep frame from the first pose of each, as in `lines_through`; NaN
         after the last. Drive angles are then travels, in rod lengths.
+    asks_sliding : bool
+        Whether there is a path only where friction opposes the slip all along it, as it always does on such lines.
     """
     from tactile_bayes.mechanics.branches.sweeps import Sweeps  # numba takes a second to load
 
@@ -232,8 +239,8 @@ def trace(
         relative_length=np.ones(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
-    of_rod: dict[str, Any] = {"profile": profile, "tolerance": tolerance}
-    solutions = _swept(shapes, sweeps, angles, lines, relative, states=True, polished=polished, **of_rod)
+    options: dict[str, Any] = {"profile": profile, "tolerance": tolerance, "asks_sliding": asks_sliding}
+    solutions = _swept(shapes, sweeps, angles, lines, relative, states=True, polished=polished, **options)
     most = int(solutions.phases.max(initial=0))
     changes = np.where(solutions.phases[:, None, None] > 0, solutions.changes[:, : most + 1], np.nan)
     return Paths(

@@ -14,6 +14,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Drive
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.path import Direction
+from tactile_bayes.sweep.sliding import sliding_from
 
 __all__ = ["Event", "SweepEvents", "events_of"]
 
@@ -72,6 +73,13 @@ class SweepEvents:
     clear : bool
         Whether the unloaded rod is clear of the object after snap-off. If it is not, the rod comes to rest in another
         contact, which no sweep reaches.
+    slides_from : float
+        Travel from which friction opposes the slip. It is that of first contact, unless a rod turns about a pivot that
+        is curved toward the object: with friction it sticks there at first, which is not modelled, and no samples of
+        its contact before this travel are recorded.
+    touches_again : float
+        Travel at which a drive that carries the base brings the rod, clear after snap-off, to the object again
+        [length], and beyond which its state is not computed; NaN if it does not.
     largest_strain : float
         Largest bending strain of the rod up to snap-off, with a relative error of 1e-4; 0 for a rod without thickness.
     """
@@ -82,6 +90,8 @@ class SweepEvents:
     transitions: tuple[Event, ...]
     snap_off: Event
     clear: bool
+    slides_from: float
+    touches_again: float
     largest_strain: float
 
 
@@ -90,14 +100,21 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
     index = np.zeros(len(phases) + 1, dtype=np.intp)
     states = paths.event_states().take(index, np.arange(index.size))
     columns = to_lab_frame(paths.sweep_frame, index, states, rod)
+    clear, again = bool(paths.is_clear()[0]), np.nan
     if isinstance(drive, Carried):
         internal = lines_through(drive.poses, rod.length, backward=direction == "backward").travels
         columns["travel"] = np.interp(paths.event_travels()[0, : index.size], internal, drive.travels)
+        if paths.clear_angle[0] > paths.snap_angle[0]:
+            clear, again = True, float(np.interp(paths.clear_angle[0], internal, drive.travels))
         columns["base_x"], columns["base_y"], _ = drive.at(columns["travel"]).T
         base = (float(drive.poses[0, 0]), float(drive.poses[0, 1]))
     else:
         base, columns["travel"] = drive.base, columns["drive_angle"]
         columns["base_x"], columns["base_y"] = (np.full(index.size, value) for value in base)
+    slides = float(columns["travel"][0])
+    if not isinstance(drive, Carried):
+        way = sliding_from(paths)
+        slides = np.pi - way if direction == "backward" else way
     kinds = [
         phases[0],
         *(f"{before} → {after}" for before, after in pairwise(phases)),
@@ -105,6 +122,5 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
     ]
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]
     found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
-    clear = bool(paths.is_clear()[0]) or kinds[-1] == "never"
     strain = float(paths.largest_curvature[0]) * 0.5 * rod.diameter / rod.length
-    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, strain)
+    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, slides, again, strain)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried
+from tactile_bayes.sweep.sliding import sliding_from
 
 __all__ = ["Direction", "carried_paths", "friction_angle_of", "sweep_paths", "to_sweep_frame"]
 
@@ -26,6 +28,13 @@ _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 _SAME = 1e-9
 """Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: its side
 is then the one to which it is turned less."""
+_SLIDING = (
+    "without friction (friction=0) it slides either way; with friction, split a drive that turns back while the rod is "
+    "in contact into drives that go one way, or take another heading or drive angle",
+    "without friction (friction=0) it slides either way; with friction, take a rod that is less curved toward the "
+    "object, the other direction, or another pivot",
+)
+"""What to do where friction would hold a rod that is carried, and one that turns about a pivot."""
 
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
 """Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
@@ -42,7 +51,8 @@ def sweep_paths(
 ) -> Paths:
     """Compute the exact path of one sweep along one contour, or raise an error that says why there is none.
 
-    Parameters and errors are those of `scan`, with one pivot and one direction.
+    Parameters and errors are those of `scan`, with one pivot and one direction. Friction opposes the slip all along the
+    path, or from a travel on: see `sliding_from`.
     """
     rod = Rod() if rod is None else rod
     sweep_frame = to_sweep_frame(contour, base, direction, rod)
@@ -53,7 +63,11 @@ def sweep_paths(
             f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
-    paths = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile)
+    paths = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile, asks_sliding=True)
+    if paths.reach[0] == Reachability.STICKS:
+        assumed = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile)
+        if assumed.reach[0] == Reachability.TOUCHES and np.isfinite(sliding_from(assumed)):
+            paths = assumed
     where = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
     _refuse(paths, contour, rod, direction, where)
     return paths
@@ -71,8 +85,9 @@ def carried_paths(
     base, friction_angle = (float(poses[0, 0]), float(poses[0, 1])), friction_angle_of(friction)
     found: dict[Direction, Paths] = {}
     for direction in _DIRECTIONS:
+        way = float(np.abs(poses[:, 0] - base[0]).max()) / rod.length
         lines = lines_through(poses, rod.length, backward=direction == "backward").lines[None]
-        sweep_frame = to_sweep_frame(contour, base, direction, rod)
+        sweep_frame = replace(to_sweep_frame(contour, base, direction, rod), way=way)
         found[direction] = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile, lines=lines)
 
     first = {direction: float(of_side.first_angle[0]) for direction, of_side in found.items()}
@@ -109,8 +124,9 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
             )
         case Reachability.STICKS:
             raise ReachError(
-                f"{sweep} friction would hold the contact at {_point(paths)}, where the rod would have to slide the "
-                "other way, and sticking is not modelled: take another heading or drive angle, or less friction"
+                f"{sweep} friction would hold the contact at {_point(paths)}: the rod would have to slide the other "
+                "way there, or would not slide at first, and sticking is not modelled; "
+                f"{_SLIDING[paths.lines is None]}"
             )
         case Reachability.TOO_FAR:
             raise ReachError(

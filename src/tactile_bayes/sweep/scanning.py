@@ -48,6 +48,8 @@ _FEWEST_POSES = 8
 _ROUNDING = 1e-9
 """Share of a step by which the last one may be too short."""
 
+_TURN = 2.0 * math.pi
+
 _COARSEST = 0.5
 """Largest step of the drive [rad]; a larger one is probably in degrees."""
 
@@ -122,7 +124,8 @@ def equilibria(
     rod : Rod, optional
         By default the dimensionless rod.
     friction : float
-        Coulomb's coefficient μ of the sliding rod, at most 0.84.
+        Coulomb's coefficient μ of the sliding rod, at most 0.84. It acts as on a straight rod, which slides toward the
+        snap-off.
 
     Returns
     -------
@@ -233,7 +236,9 @@ def scan(
     rod : Rod, optional
         By default the dimensionless rod, which is straight. A rod with a diameter touches with its surface.
     friction : float
-        Coulomb's coefficient μ of the sliding rod, at most 0.84.
+        Coulomb's coefficient μ of the sliding rod, at most 0.84. With friction, a rod that turns about a pivot and is
+        curved toward the object sticks at first, which is not modelled: these samples are left out
+        (`SweepEvents.slides_from`).
 
     Returns
     -------
@@ -243,8 +248,8 @@ def scan(
     Warns
     -----
     ClearanceWarning
-        If the unloaded rod would cut the object after snap-off: its state is then unknown, and these samples are left
-        out.
+        If the unloaded rod would cut the object after snap-off, or a drive brings it there again later: its state is
+        then unknown, and these samples are left out.
     StrainWarning
         If the rod is bent beyond its elastic strain, or beyond a strain of 0.1, where the model of a slender, linearly
         elastic rod fails.
@@ -252,7 +257,9 @@ def scan(
     Raises
     ------
     ReachError
-        If the rod is too short to touch the contour, or its tip folds over until the other side of the rod touches.
+        If the rod is too short to touch the contour, its tip folds over until the other side of the rod touches, or
+        friction would hold the contact: where a drive turns back while the rod is in contact, where a tip that is carried
+        head-on does not slide at first, and where the sense of sliding changes along the path.
     ContourError
         If the pivot is not below the contour or too close to it, the rod would touch beyond an end of it, or a rod that
         is curved toward the contour would touch it twice.
@@ -287,7 +294,7 @@ def scan(
         if isinstance(one, Carried):
             paths, sense = carried_paths(contour, one, rod=rod, friction=friction)
             sweep = events_of(paths, sense, one, rod)
-            _warn_of(sweep, rod)
+            _warn_of(sweep, one, rod)
             travels = _travels(one, step, sweep, rod)
             found = [(paths, sweep, one.at(travels), _ways(one, travels, sense, rod))]
         else:
@@ -295,7 +302,7 @@ def scan(
             for sense in senses:
                 paths = sweep_paths(contour, base=one.base, direction=sense, rod=rod, friction=friction)
                 sweep = events_of(paths, sense, one, rod)
-                _warn_of(sweep, rod)
+                _warn_of(sweep, one, rod)
                 angles = _angles(grid, step, sweep)
                 poses = np.column_stack([*(np.full(angles.size, value) for value in one.base), angles])
                 found.append((paths, sweep, poses, np.pi - angles if sense == "backward" else angles))
@@ -359,9 +366,29 @@ def _angles(grid: Floats | None, step: float | None, sweep: SweepEvents) -> Floa
         angles = angles[np.abs(angles) <= 2.0 * np.pi]  # a drive turns by no more
     else:
         angles = grid
+    sense = 1.0 if forward else -1.0
     if not sweep.clear:
-        angles = angles[(1.0 if forward else -1.0) * (sweep.snap_off.drive_angle - angles) >= 0.0]
+        angles = angles[sense * (sweep.snap_off.drive_angle - angles) >= 0.0]
+    angles = _within_a_turn(angles, sense, sweep)
+    touching = sense * (angles - sweep.first_contact.drive_angle) >= 0.0
+    angles = angles[~(touching & (sense * (sweep.slides_from - angles) > 0.0))]
     return angles[:: 1 if forward else -1]
+
+
+def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents) -> Floats:
+    """Return the angles without those at which the rod, a turn before or later, is in the same contact."""
+    before = sense * (angles - sweep.snap_off.drive_angle) > -_TURN
+    later = sense * (angles - sweep.first_contact.drive_angle) < _TURN
+    if not (before & later).all():
+        first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
+        warnings.warn(
+            f"{_name(sweep)} the rod touches the object from {first:.6g} to {snap:.6g} rad, and so it does a turn (2π) "
+            f"before and later: {np.count_nonzero(~(before & later))} of the drive angles, up to "
+            f"{snap - sense * _TURN:.6g} or from {first + sense * _TURN:.6g} rad on, are left out",
+            ClearanceWarning,
+            stacklevel=4,
+        )
+    return np.asarray(angles[before & later])
 
 
 def _travels(drive: Carried, step: float | None, sweep: SweepEvents, rod: Rod) -> Floats:
@@ -372,7 +399,8 @@ def _travels(drive: Carried, step: float | None, sweep: SweepEvents, rod: Rod) -
     else:
         step = _SHARE * rod.length if step is None else step
         travels = np.asarray(step * np.arange(math.floor(float(drive.travels[-1]) / step + _ROUNDING) + 1))
-    return travels if sweep.clear else travels[travels <= sweep.snap_off.travel]
+    last = sweep.touches_again if sweep.clear else sweep.snap_off.travel
+    return travels[~(travels > last)]
 
 
 def _ways(drive: Carried, travels: Floats, direction: str, rod: Rod) -> Floats:
@@ -387,12 +415,21 @@ def _floats(values: ArrayLike) -> Floats:
     return np.asarray(np.nan) if numbers is None else numbers
 
 
-def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
-    where = f"in the {sweep.direction} sweep from ({sweep.base[0]:g}, {sweep.base[1]:g})"
+def _warn_of(sweep: SweepEvents, drive: Drive, rod: Rod) -> None:
+    where = _name(sweep)
     if not sweep.clear:
         warnings.warn(
             f"{where} the rod snaps at {_place(sweep)}, but unloaded it would still cut the "
             "object: it comes to rest in another contact, which no sweep reaches; the samples after that are left out",
+            ClearanceWarning,
+            stacklevel=3,
+        )
+    if sweep.clear and not math.isnan(sweep.touches_again):
+        x, y, angle = drive.at(sweep.touches_again) if isinstance(drive, Carried) else (math.nan,) * 3
+        warnings.warn(
+            f"{where} the rod is free after {_place(sweep)}, and touches the object again at base ({x:.6g}, {y:.6g}) "
+            f"and drive angle {angle:.6g} rad, a travel of {sweep.touches_again:.6g}: a sweep has one contact, and the "
+            "samples after that are left out; end the drive there, and scan the rest as a drive of its own",
             ClearanceWarning,
             stacklevel=3,
         )
@@ -410,6 +447,10 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
             StrainWarning,
             stacklevel=3,
         )
+
+
+def _name(sweep: SweepEvents) -> str:
+    return f"in the {sweep.direction} sweep from ({sweep.base[0]:g}, {sweep.base[1]:g})"
 
 
 def _place(sweep: SweepEvents) -> str:

@@ -122,6 +122,7 @@ def scan_many(
         profile=rod.profile,
         drive_angles=in_sweep_frame,
         polished=False,
+        asks_sliding=True,
     )
     units = ManyUnits(rod.length_unit, rod.moment_unit, rod.force_unit)
     system = "dimensionless" if rod.is_dimensionless else "SI"

@@ -23,7 +23,7 @@ from tactile_bayes.mechanics.branches.leg import first_equilibrium
 from tactile_bayes.mechanics.branches.limits import Approach, approach, arrival
 from tactile_bayes.mechanics.branches.line import line_of, only_turns, pose_at
 from tactile_bayes.mechanics.branches.outline import Outline, from_base
-from tactile_bayes.mechanics.branches.slip import slip
+from tactile_bayes.mechanics.branches.slip import NOT_SLIPPING, slip
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.reachability import Reachability
 
@@ -63,12 +63,15 @@ class _Arrived(NamedTuple):
 
 
 @compiled
-def beginning(scene: Scene, lines: Floats | None, first_step: float) -> Beginning:
-    """Beginning of a branch, on the first line that leads to contact if the drive carries the base."""
+def beginning(scene: Scene, lines: Floats | None, first_step: float, slides: bool) -> Beginning:
+    """Beginning of a branch, on the first line that leads to contact if the drive carries the base.
+
+    Friction opposes the slip there if `slides`; otherwise it acts as in a forward sweep of a straight rod.
+    """
     near, scene, line, seen = _arrive(scene, lines, first_step)
     if near.reach != _TOUCHES:
         return Beginning(near.reach, near, scene, line, seen, in_phase(scene, near.tip_first), nowhere())
-    reach, scene, loaded, state = _first_state(scene, lines, seen, near)
+    reach, scene, loaded, state = _first_state(scene, lines, seen, near, slides)
     least_psi1 = tangential_psi1(scene) - (0.0 if lines is None else _NOT_TURNED)
     if reach == _TOUCHES and loaded.tip and state.at.q < least_psi1:
         reach = _TOUCHES_TWICE
@@ -86,24 +89,37 @@ def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> _Arrived:
 
 @compiled
 def _first_state(
-    scene: Scene, lines: Floats | None, seen: Outline, near: Approach
+    scene: Scene, lines: Floats | None, seen: Outline, near: Approach, slides: bool
 ) -> tuple[int, Scene, Loaded, Balance]:
-    """State at first contact, with the friction that it has: it opposes the slip of the rod along the contour."""
+    """State at first contact, with the friction that it has: it opposes the slip of the rod along the contour.
+
+    A tip that is carried head-on does not slip to first order: rounding would decide the sense.
+    """
     loaded = in_phase(scene, near.tip_first)
-    guessed = first_equilibrium(loaded, seen, near)
-    if lines is None:
-        return _TOUCHES, scene, loaded, balance(loaded, guessed)[0]
-    begin = settle(loaded, guessed, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
-    if not loaded.tip and begin.at.q > 1.0:  # the approach is not exact
+    begin = _unloaded(loaded, lines, seen, near)
+    if not loaded.tip and lines is not None and begin.at.q > 1.0:  # the approach is not exact
         near = Approach(near.reach, near.distance, near.begin, True, near.low)
         loaded = in_phase(scene, True)
-        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+        begin = _unloaded(loaded, lines, seen, near)
     delta = scene.rig.friction_angle
-    if delta > 0.0 and not only_turns(scene.line) and slip(loaded, begin) > 0.0:
-        scene = with_friction(scene, -delta)
-        loaded = in_phase(scene, loaded.tip)
-        begin = settle(loaded, first_equilibrium(loaded, seen, near), _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
-        if not slip(loaded, begin) > 0.0:
+    if slides and delta > 0.0:
+        slipping = slip(loaded, begin)
+        if loaded.tip and not only_turns(scene.line) and not abs(slipping) > NOT_SLIPPING:
             return _STICKS, scene, loaded, begin
-    pushed = begin.travel_rate * begin.tangent.force > 0.0
+        if slipping > NOT_SLIPPING:
+            scene = with_friction(scene, -delta)
+            loaded = in_phase(scene, loaded.tip)
+            begin = _unloaded(loaded, lines, seen, near)
+            if not slip(loaded, begin) > 0.0:
+                return _STICKS, scene, loaded, begin
+    pushed = lines is None or begin.travel_rate * begin.tangent.force > 0.0
     return _TOUCHES if pushed else _SLIPS_OFF, scene, loaded, begin
+
+
+@compiled
+def _unloaded(loaded: Loaded, lines: Floats | None, seen: Outline, near: Approach) -> Balance:
+    """State without force at first contact."""
+    guessed = first_equilibrium(loaded, seen, near)
+    if lines is None:
+        return balance(loaded, guessed)[0]
+    return settle(loaded, guessed, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)

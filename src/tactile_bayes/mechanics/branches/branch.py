@@ -67,7 +67,7 @@ from tactile_bayes.mechanics.branches.leg_events import (
     release,
     share_of,
 )
-from tactile_bayes.mechanics.branches.line import Line, only_turns
+from tactile_bayes.mechanics.branches.line import Line
 from tactile_bayes.mechanics.branches.readings import (
     Asked,
     Followed,
@@ -282,6 +282,7 @@ def follow_branch(
     tolerance: Floats,
     workspace: BranchWorkspace,
     found: Found,
+    slides: bool,
 ) -> Ends:
     """Follow a branch from first contact to snap-off.
 
@@ -295,10 +296,13 @@ def follow_branch(
         Parameters at which the contour may not be smooth.
     tolerance : ndarray, shape (3,)
         Tolerated errors of moment and forces [EI/L and EI/L²].
+    slides : bool
+        Whether friction opposes the slip everywhere, else there is no path; otherwise it acts as in a forward sweep of
+        a straight rod.
     """
     work = workspace.leg
     curves = work.curves
-    start = beginning(scene, lines, accuracy.first_step)
+    start = beginning(scene, lines, accuracy.first_step, slides)
     near, scene, line, seen, loaded, begin = start.near, start.scene, start.line, start.seen, start.loaded, start.state
     z, rig = begin.at, scene.rig
     if start.reach != _TOUCHES:
@@ -383,6 +387,7 @@ def follow_branch(
                     until = at_change
                 if over <= 1.0:
                     until = at_over
+                ends_before = folds or change <= 1.0 or over <= 1.0
                 if folds:
                     until = settle_on(loaded, leg, stop, guess(work, stop), SETTLED)
                 twice = second_contact(scene, seen, leg, goes_on, stop, work)
@@ -394,7 +399,7 @@ def follow_branch(
                     steadiness = min(max(rate * stop / (until.travel - begin_angle), 0.0), 1.0)
                     if released and end.at.force < _NO_LOAD and change > 1.0 and over > 1.0:
                         fate = _RELEASE
-                stuck = math.nan if only_turns(loaded.line) else held(loaded, stop, work)
+                stuck = held(loaded, leg, stop, until if ends_before else end, work) if slides else math.nan
                 if not leg.tip and lines is not None and until.at.q < _CLEARANCE:
                     return _nothing(_TOO_CLOSE, near.distance, until.at.p)
                 if wants_states:

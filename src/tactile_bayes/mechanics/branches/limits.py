@@ -17,7 +17,7 @@ from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.poses.beam import Beam, Chord, chord_to, mirrored_beam
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
-__all__ = ["Approach", "approach", "arrival", "clear_angle", "is_clear", "touch"]
+__all__ = ["Approach", "approach", "arrival", "clear_angle", "touch"]
 
 
 class _Sought(IntEnum):
@@ -322,10 +322,3 @@ def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int,
             low = ends(from_base(outline, pose.x, pose.y))[0]
             return Approach(reach, found.distance, found.begin, found.tip_first, low), k, travel
     return Approach(reach, distance, math.nan, True, math.nan), 0, math.nan
-
-
-@compiled
-def is_clear(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> bool:
-    """True if an unloaded rod in a pose has passed the contour."""
-    passed = Offset(-pose.x, pose.y, math.pi - pose.angle)
-    return _turned(mirrored(outline), mirrored_beam(beam), passed, last_step).gap > 0.0

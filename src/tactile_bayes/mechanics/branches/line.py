@@ -111,7 +111,10 @@ def lines_through(poses: Floats, length: float, *, backward: bool = False, off: 
 
 
 def _corners(points: Floats, off: float) -> Index:
-    """Indices of the points between which a path is straight, by the method of Ramer, Douglas and Peucker."""
+    """Indices of the points between which a path is straight, by the method of Ramer, Douglas and Peucker.
+
+    A path that goes back on its line has a corner where it turns.
+    """
     corners, parts = {0, len(points) - 1}, [(0, len(points) - 1)]
     while parts:
         first, last = parts.pop()
@@ -120,8 +123,13 @@ def _corners(points: Floats, off: float) -> Index:
         inside = points[first + 1 : last] - points[first]
         share = np.clip(inside @ chord / way**2, 0.0, 1.0) if way > 0.0 else np.zeros(len(inside))
         away = np.linalg.norm(inside - share[:, None] * chord, axis=1)
+        back = way * (np.maximum.accumulate(share) - share)
+        corner = None
         if away.size and away.max() > off:
             corner = first + 1 + int(np.argmax(away))
+        elif back.size and back.max() > off:
+            corner = first + 1 + int(np.argmax(share[: int(np.argmax(back))]))
+        if corner is not None:
             corners.add(corner)
             parts += [(first, corner), (corner, last)]
     return np.array(sorted(corners))

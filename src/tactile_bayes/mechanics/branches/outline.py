@@ -29,6 +29,7 @@ __all__ = [
     "mirrored",
     "narrower",
     "on_object",
+    "over",
     "place",
 ]
 
@@ -36,7 +37,7 @@ _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3
 """Rod lengths beyond which an end of a contour does not matter."""
 
-_MOST_STEPS, _SETTLED = 60, 1e-5
+_MOST_STEPS, _SETTLED = 60, 1e-7
 """Largest number of steps in which the parameter at an x is sought, and the last one over the range: beside it the
 contour is straight."""
 
@@ -229,6 +230,13 @@ def is_inside(outline: Outline, arclength: float, x: float, y: float, low: float
     left, right = _beside(outline, low, arclength), _beside(outline, high, arclength)
     if not (left.x < x < right.x and (y - left.y) * (right.x - left.x) < (x - left.x) * (right.y - left.y)):
         return False
+    at = over(outline, arclength, x, low, high)
+    return (y - at.y) * at.cos > (x - at.x) * at.sin
+
+
+@compiled
+def over(outline: Outline, arclength: float, x: float, low: float, high: float) -> Place:
+    """Point beside which the rod lies with an arc length, at an x between those of two parameters."""
     p, before = 0.5 * (low + high), high - low
     settled = _SETTLED * before
     for _ in range(_MOST_STEPS):
@@ -237,8 +245,7 @@ def is_inside(outline: Outline, arclength: float, x: float, y: float, low: float
         step, p = abs(new - p), new
         if not step > settled:
             break
-    at = _beside(outline, p, arclength)
-    return (y - at.y) * at.cos > (x - at.x) * at.sin
+    return _beside(outline, p, arclength)
 
 
 @compiled

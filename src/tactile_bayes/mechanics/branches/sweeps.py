@@ -17,6 +17,7 @@ from tactile_bayes.mechanics.branches.branch import (
     branch_workspace,
     follow_branch,
 )
+from tactile_bayes.mechanics.branches.clearance import travel_into
 from tactile_bayes.mechanics.branches.curves import Accuracy
 from tactile_bayes.mechanics.branches.equilibrium import (
     Equilibrium,
@@ -27,8 +28,8 @@ from tactile_bayes.mechanics.branches.equilibrium import (
     on_line,
     with_friction,
 )
-from tactile_bayes.mechanics.branches.limits import clear_angle, is_clear
-from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_at, line_of, pose_at
+from tactile_bayes.mechanics.branches.limits import clear_angle
+from tactile_bayes.mechanics.branches.line import NO_LINE, Line
 from tactile_bayes.mechanics.branches.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS, Found, Samples, write_state
 from tactile_bayes.mechanics.compiler import cached, compiled
@@ -43,7 +44,8 @@ __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_s
 _SAME_ANGLE = 1e-5
 """Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
 
-_TOUCHES, _NEVER, _RELEASE = int(Reachability.TOUCHES), int(SnapOff.NEVER), int(SnapOff.RELEASE)
+_TOUCHES, _STICKS = int(Reachability.TOUCHES), int(Reachability.STICKS)
+_NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
 _EXACT = Accuracy(resolved=1e-9, sharp=np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True)
 """Accuracy with states and events to rounding."""
@@ -141,7 +143,8 @@ class Solutions(NamedTuple):
     curvature: Floats
     """Largest curvature of the rod up to snap-off [1/L], if states are computed."""
     clear_angle: Floats
-    """Drive angle beyond which the unloaded rod is clear [rad]; NaN if it is not computed."""
+    """Drive angle beyond which the unloaded rod is clear [rad]; on lines, the travel from snap-off on at which it lies
+    in the object, −∞ if it does so nowhere; NaN if it is not computed."""
 
 
 _INDICES, _FLAGS, _CODES = ("contour", "segment", "phases"), ("backward",), ("reach", "snap_off")
@@ -310,7 +313,7 @@ def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line |
 
 @compiled
 def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: float) -> float:
-    """Travel beyond which the unloaded rod is clear; on lines, only whether it is clear where contact ends.
+    """Travel beyond which the unloaded rod is clear; on lines, that from snap-off on at which it is not.
 
     A rod that is released touches there without load, which small errors alone would decide: −∞ if it does so nowhere
     else.
@@ -318,10 +321,28 @@ def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: flo
     if lines is None:
         clear = clear_angle(scene.outline, scene.beam, first_step)
         return -math.inf if ends.snap_off == _RELEASE and clear < ends.snap_angle + _SAME_ANGLE else clear
-    if ends.snap_off == _RELEASE:
+    if ends.snap_off == _NEVER:
         return -math.inf
-    pose = pose_at(line_of(lines, line_at(lines, ends.snap_angle)), ends.snap_angle)
-    return -math.inf if ends.snap_off == _NEVER or is_clear(scene.outline, scene.beam, pose, first_step) else math.inf
+    return travel_into(scene.outline, scene.beam, lines, ends.snap_angle, scene.exact)
+
+
+@compiled
+def _follow(
+    scene: Scene,
+    room: Floats | None,
+    knots: Floats,
+    samples: Samples,
+    accuracy: Accuracy,
+    tolerance: Floats,
+    workspace: BranchWorkspace,
+    found: Found,
+    asks_sliding: bool,
+) -> Ends:
+    """Follow a branch along which friction opposes the slip; in rotations it acts as if it did unless that is asked."""
+    ends = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, True)
+    if ends.reach == _STICKS and room is None and not asks_sliding:
+        return follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, False)
+    return ends
 
 
 @cached
@@ -338,6 +359,7 @@ def _solve(
     accuracy: Accuracy,
     tolerance: Floats,
     asks_clearance: bool,
+    asks_sliding: bool,
     workspace: BranchWorkspace,
     table: Floats,
     loads: Floats,
@@ -372,7 +394,7 @@ def _solve(
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
         samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
         found = Found(loads[c], all_states[c], changes[i])
-        ends = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found)
+        ends = _follow(scene, room, knots, samples, accuracy, tolerance, workspace, found, asks_sliding)
         event.reach, event.distance = ends.reach, ends.distance
         event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
         event.snap_angle, event.snap_parameter = ends.snap_angle, ends.snap_parameter
@@ -394,6 +416,7 @@ def solve_sweeps(
     states: bool = False,
     polished: bool = True,
     asks_clearance: bool = True,
+    asks_sliding: bool = False,
 ) -> Solutions:
     """Follow the paths of sweeps, and compute loads and states of their samples.
 
@@ -419,6 +442,9 @@ def solve_sweeps(
         derivatives.
     asks_clearance : bool
         Whether `clear_angle` is computed.
+    asks_sliding : bool
+        Whether there is a path only where friction opposes the slip all along it. It always does so where the base is
+        carried; in rotations it otherwise acts as on a straight rod, which is wrong where a curved one slides outward.
     """
     accuracy, order = _FAST, _FAST_ORDER
     if tolerance is None:
@@ -444,6 +470,7 @@ def solve_sweeps(
             accuracy,
             _NEVER_MISSED if tolerance is None else tolerance,
             asks_clearance,
+            asks_sliding,
             branch_workspace(longest, order, shapes.knots.shape[1], lines),
             np.empty(shapes.tables.shape[1:]),
             loads,

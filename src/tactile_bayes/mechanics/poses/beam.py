@@ -50,6 +50,7 @@ __all__ = [
     "mirrored_by",
     "moved_by_stem",
     "rest_curvature",
+    "rest_point",
     "rubbed_otherwise",
     "varied",
     "varied_of",
@@ -404,11 +405,33 @@ def free_end(beam: Beam, arclength: float) -> tuple[float, float]:
 @compiled
 def _free_end(varied: Varied | None, curvature: float, arclength: float) -> tuple[float, float]:
     if varied is None:
-        length = 1.0 - arclength
-        turn = 0.5 * curvature * length
-        chord = length if turn == 0.0 else length * math.sin(turn) / turn
-        return chord * math.cos(turn), chord * math.sin(turn)
+        return _end_of_arc(curvature, 1.0 - arclength)
     return beyond_along(varied.profile, arclength, varied.work)
+
+
+@compiled
+def _end_of_arc(curvature: float, length: float) -> tuple[float, float]:
+    """End of an arc, along it at its beginning, and to its left [L]."""
+    turn = 0.5 * curvature * length
+    chord = length if turn == 0.0 else length * math.sin(turn) / turn
+    return chord * math.cos(turn), chord * math.sin(turn)
+
+
+@compiled
+def rest_point(beam: Beam, way: float) -> tuple[float, float]:
+    """Point of stem or rod at rest at a way along them from the pivot: along the stem, and to its left [L]."""
+    if way <= beam.stem:
+        return way, 0.0
+    return _rest_point(beam.varied, beam.curvature, beam.stem, way - beam.stem)
+
+
+@compiled
+def _rest_point(varied: Varied | None, curvature: float, stem: float, arclength: float) -> tuple[float, float]:
+    if varied is None:
+        along, across = _end_of_arc(curvature, arclength)
+        return stem + along, across
+    found = rest_along(varied.profile, stem, arclength, varied.work)
+    return found.distance * math.cos(found.bearing), found.distance * math.sin(found.bearing)
 
 
 @compiled

@@ -1,0 +1,101 @@
+"""Contours, rods and drives of all kinds, drawn at random, for tests of what scans of them hand out."""
+
+import numpy as np
+
+import tactile_bayes as tb
+from tactile_bayes.contours import (
+    Circle,
+    Contour,
+    Ellipse,
+    Joined,
+    Parabola,
+    PowerLaw,
+    from_function,
+    from_points,
+)
+from tactile_bayes.sweep.drive import Carried
+
+
+def contour(rng: np.random.Generator) -> Contour:
+    """A contour with a vertex or an edge, a closed one, or one that ends."""
+    q, x_c = rng.uniform(0.2, 0.7), rng.uniform(-0.4, 0.4)
+    match rng.integers(7):
+        case 0:
+            return Parabola(np.exp(rng.uniform(-1.5, 1.5)), q, x_c)
+        case 1:
+            return Circle(rng.uniform(0.05, 0.8), q, x_c)
+        case 2:
+            return Ellipse(rng.uniform(0.1, 0.8), rng.uniform(0.1, 0.8), q, x_c)
+        case 3:
+            return PowerLaw(np.exp(rng.uniform(-1.0, 1.5)), rng.uniform(1.4, 4.0), q, x_c)
+        case 4:
+            return _edge(rng, x_c, q)
+        case 5:
+            a, ends = rng.uniform(0.3, 2.0), x_c + np.array([-1.0, 1.0]) * rng.uniform(0.3, 1.0, 2)
+            return from_function(lambda x: q + a * (np.cosh(x - x_c) - 1.0), ends)
+        case _:
+            x = np.sort(rng.uniform(x_c - rng.uniform(0.4, 1.0), x_c + rng.uniform(0.4, 1.0), 40))
+            return from_points(x, q + rng.uniform(0.3, 2.0) * (x - x_c) ** 2)
+
+
+def _edge(rng: np.random.Generator, x: float, y: float) -> Contour:
+    """Two parabolas that cross, with an edge between them."""
+    before = rng.uniform(-1.2, 0.8)
+
+    def half(slope_angle: float) -> Parabola:
+        a = np.exp(rng.uniform(-1.5, 1.0))
+        x_c = x - np.tan(slope_angle) / (2.0 * a)
+        return Parabola(a, y - a * (x - x_c) ** 2, x_c)
+
+    return Joined(half(before), half(min(before + rng.uniform(0.1, 1.8), 1.3)), x=x)
+
+
+def rod(rng: np.random.Generator, bend: float = 0.6) -> tb.Rod:
+    """A straight, curved, tapered or thick rod, on a stem or not, of length one."""
+    stem = float(rng.choice([0.0, rng.uniform(0.02, 0.3)]))
+    curved = float(rng.uniform(-bend, bend))
+    match rng.integers(5):
+        case 0:
+            return tb.Rod(stem=stem)
+        case 1:
+            return tb.Rod(rest_curvature=curved, stem=stem)
+        case 2:
+            return tb.Rod(taper=float(rng.uniform(0.1, 0.8)), diameter=0.02, stem=stem)
+        case 3:
+            return tb.Rod(diameter=float(rng.uniform(0.005, 0.05)), stem=stem)
+        case _:
+            return tb.Rod(rest_curvature=lambda s: curved * (0.3 + s), taper=float(rng.uniform(0.0, 0.6)), stem=stem)
+
+
+def carried_drive(rng: np.random.Generator, poses: int | None = None) -> Carried:
+    """A drive that carries the base past the object, along one line or several."""
+    count = int(rng.integers(2, 5)) if poses is None else poses
+    side = rng.choice([-1.0, 1.0])
+    x = side * np.linspace(rng.uniform(0.5, 1.5), -rng.uniform(0.3, 1.5), count)
+    y = rng.uniform(-0.6, 0.2) + rng.uniform(-0.3, 0.3, count)
+    begin = rng.uniform(0.5, 2.2)
+    angle = begin + rng.choice([0.0, 1.0]) * rng.uniform(-0.6, 0.6, count)
+    angle = angle if side > 0.0 else np.pi - angle
+    if count == 2 and rng.integers(2):
+        way = np.array([x[-1] - x[0], y[-1] - y[0]])
+        return tb.Translation(
+            (float(x[0]), float(y[0])), float(np.arctan2(way[1], way[0])), float(angle[0]), float(np.hypot(*way))
+        )
+    return tb.Motion(x, y, angle)
+
+
+def way(rng: np.random.Generator) -> dict[str, object]:
+    """Arguments of `scan` for a rotation, or a drive that carries the base one way, or back again too."""
+    match rng.integers(4):
+        case 0:
+            base = float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-0.2, 0.1))
+            return {"direction": str(rng.choice(["forward", "backward"])), "base": base, "drive_step": 0.03}
+        case 1:
+            there = carried_drive(rng, 2).poses
+            return {
+                "drive": tb.Motion(*np.vstack([there, there[:1] + rng.uniform(0.0, 0.5) * np.diff(there, axis=0)]).T)
+            }
+        case 2:
+            return {"drive": carried_drive(rng, 2)}
+        case _:
+            return {"drive": carried_drive(rng)}
