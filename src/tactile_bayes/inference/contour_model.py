@@ -20,6 +20,7 @@ from tactile_bayes.inference.parameters.noise import Noise
 from tactile_bayes.inference.parameters.nuisances import Nuisances
 from tactile_bayes.inference.parameters.prior_density import log_density_of
 from tactile_bayes.inference.parameters.priors import MAY_VANISH, Prior, support_of
+from tactile_bayes.inference.record_likelihood.blocks import zero_load_of_blocks
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.load_cell import zero_load
@@ -117,6 +118,16 @@ class ContourModel:
         self.likelihood.noise = np.where(self.present, rough, np.inf)
 
     @property
+    def deviations(self) -> Floats:
+        """Estimated standard deviation of each sample, shape (1 or samples, 3): that of a reading, or of a mean."""
+        return self.of_samples(self.deviation)
+
+    def of_samples(self, deviation: Floats) -> Floats:
+        """Return the standard deviation of each sample, shape (1 or samples, 3), from that of a reading, shape (3,)."""
+        blocks = self.likelihood.blocks
+        return np.asarray(deviation[None] if blocks is None else deviation / np.sqrt(blocks.readings)[:, None])
+
+    @property
     def present(self) -> Flags:
         """True for channels that were measured, shape (3,)."""
         return ~np.isnan(self.likelihood.measured).all(axis=0)
@@ -152,8 +163,8 @@ class ContourModel:
 
     @property
     def loads_of_a_point(self) -> int:
-        """Number of predicted loads of a point: one for every channel, sample and error of the encoder."""
-        return self.likelihood.measured.size * self.likelihood.encoder.count
+        """Number of predicted loads of a point: one for every channel, and place at which a sample's is evaluated."""
+        return self.likelihood.measured.size * self.likelihood.places
 
     def prior_medians(self, names: Sequence[str]) -> list[float]:
         """Return the medians of some parameters' priors."""
@@ -332,6 +343,8 @@ class ContourModel:
         return points[self.likelihood.usable(self.contours(points), self.rig(points))] if len(points) else points
 
     def _zero_load(self) -> xr.Dataset:
+        if self.likelihood.blocks is not None:
+            return zero_load_of_blocks(self.measured)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DriftWarning)
             return zero_load(self.measured)
@@ -345,5 +358,7 @@ class ContourModel:
 
     def _rough_noise(self) -> Floats:
         """Return the standard deviation of each channel from second differences of its samples, shape (3,)."""
-        measured, stated = self.likelihood.measured, self.likelihood.load_cell.noise
+        measured, stated, blocks = self.likelihood.measured, self.likelihood.load_cell.noise, self.likelihood.blocks
+        if blocks is not None and np.any(blocks.freedom):
+            return np.asarray(np.sqrt(blocks.scatter.sum(axis=0) / blocks.freedom.sum()))
         return np.array([rough_noise(v) if len(v) > 2 else s for v, s in zip(measured.T, stated, strict=True)])

@@ -73,7 +73,8 @@ def contour_problem(experiment: Experiment) -> ContourProblem:
     """
     problem = _of_sides(experiment)
     record, cell = experiment.record, experiment.noise.cell
-    doubtful = doubtful_sweeps(without_errors(problem.model.measured, cell), cell)[:_MOST_DOUBTFUL]
+    judged = record if "blocks" in problem.model.measured.attrs else problem.model.measured
+    doubtful = doubtful_sweeps(without_errors(judged, cell), cell)[:_MOST_DOUBTFUL]
     if not doubtful:
         return problem
     stated = {sweep: side_of(record, sweep) for sweep in doubtful}
@@ -90,13 +91,14 @@ def contour_problem(experiment: Experiment) -> ContourProblem:
 
 
 def _of_sides(experiment: Experiment) -> ContourProblem:
-    """Return the problem of an experiment with the sides of contact that its record states.
+    """Return the problem of an experiment, shortened, with the sides of contact that its record states.
 
     Raises
     ------
     InferenceError
         If no sample carries a load.
     """
+    experiment = experiment.shortened
     loaded = loaded_samples(experiment.record, experiment.noise.stated_cell)
     if not loaded.any():
         raise InferenceError(NO_LOAD)

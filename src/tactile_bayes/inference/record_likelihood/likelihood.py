@@ -14,11 +14,13 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.record_likelihood.blocks import NODES, Blocks
 from tactile_bayes.inference.record_likelihood.encoder import EncoderErrors
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
 from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.inference.record_likelihood.rod_tables import RodTables
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.averaged_cell import AveragedCell
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.mechanics.branches.shapes import shapes_of
 from tactile_bayes.mechanics.paths import Paths, trace
@@ -89,7 +91,9 @@ class RecordLikelihood:
         self.friction = friction
         record = to_dimensionless(measured)
         load_cell.refuse_other_frame(measured)
-        self.load_cell = load_cell.dimensionless(self.rod)
+        self.blocks = Blocks.of(measured, self.rod)
+        single = load_cell.dimensionless(self.rod)
+        self.load_cell = single if self.blocks is None else self.blocks.cell(single)
         self.encoder = EncoderErrors(self.load_cell)
         if self.encoder.count > 1 and (load_cell.drift or any(load_cell.bias_uncertainty)):
             raise ParameterError(
@@ -111,7 +115,8 @@ class RecordLikelihood:
     def noise(self, deviation: Floats) -> None:
         self._noise = np.asarray(deviation, dtype=float)
         largest = np.nan_to_num(np.abs(self.measured)).max(axis=0)
-        share = _UNFELT * math.sqrt(min(1.0, 360.0 / len(self.measured)))
+        readings = len(self.measured) if self.blocks is None else float(self.blocks.readings.sum())
+        share = _UNFELT * math.sqrt(min(1.0, 360.0 / readings))
         self._tolerance = np.maximum(share * self._noise, _LEAST * np.maximum(largest, 1.0))
 
     def paths(
@@ -236,35 +241,42 @@ class RecordLikelihood:
 
     def predict_with_errors(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags]:
         """Return loads for every error of the encoder, shape (n, errors, samples, 3), and which contours are usable."""
-        return self._predict(contours, rig, self.encoder.errors)[:2]
+        return self._predict(contours, rig, self.encoder.errors[:, None])[:2]
 
     def predict_with_events(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags, Floats]:
         """Return the results of `predict`, and the drive angles of first contact and snap-off.
 
         The angles are readings in the sweep frame [rad], shape (n, segments, 2); NaN if there is no such event.
         """
-        loads, reached, events = self._predict(contours, rig, np.zeros(1))
+        loads, reached, events = self._predict(contours, rig, np.zeros((1, 1)))
         return loads[:, 0], reached, events
 
     def _predict(self, contours: Contour, rig: Rig | None, errors: Floats) -> tuple[Floats, Flags, Floats]:
+        """Return loads for errors of the encoder, shape (errors, 1), usable contours, and events.
+
+        Those of a block are the mean over `NODES`.
+        """
         rig = self._rig_of(rig, contours.shape[0])
+        errors = errors if self.blocks is None else NODES[:, None] * self.blocks.spread
         found = self._solutions(contours, rig, errors)
-        predicted = found.loads.reshape(-1, errors.size, *self.measured.shape)
+        predicted = found.loads.reshape(-1, len(errors), *self.measured.shape)
         if self._turn is not None:
-            turn = self._turn - self.misread(rig)[:, None] - errors[:, None]
+            turn = self._turn - self.misread(rig)[:, None] - errors
             predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
+        if self.blocks is not None:
+            predicted = 0.5 * (predicted[:, :1] + predicted[:, 1:])
         return predicted, self._usable(found), self._events(found, rig)
 
     def _solutions(self, contours: Contour, rig: Rig, errors: Floats | None = None) -> Solutions:
         """Solve the forward model; batch index k·n + i is contour i in segment k; without errors, for no samples."""
         from tactile_bayes.mechanics.branches.sweeps import solve_sweeps  # numba takes a second to load
 
-        errors = np.empty(0) if errors is None else errors
+        errors = np.empty((0, 1)) if errors is None else errors
         return solve_sweeps(
             self._shapes(contours, rig),
             self._sweeps(rig),
             self.segments.samples_with(errors),
-            (contours.shape[0], errors.size * len(self.measured)),
+            (contours.shape[0], len(errors) * len(self.measured)),
             profile=self._profile(rig),
             known=self._known(rig),
             tolerance=None if self.exact else self._tolerance,
@@ -338,6 +350,20 @@ class RecordLikelihood:
         """
         return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
 
+    @property
+    def places(self) -> int:
+        """Number of drive angles at which the loads of a sample are evaluated."""
+        return self.encoder.count if self.blocks is None else NODES.size
+
+    def _within_blocks(self, predicted: Floats, scale: Floats, pointwise: bool) -> Floats:
+        """Return the log-density of readings within their blocks, for loads of shape (n, samples, 3)."""
+        assert self.blocks is not None
+        assert isinstance(self.load_cell, AveragedCell)
+        of_reading = np.atleast_2d(self.load_cell.deviation_of_readings(predicted))
+        deviation = of_reading * (scale[..., None, :] if scale.ndim else scale)
+        present = ~np.isnan(self.measured).all(axis=0)
+        return self.blocks.log_density_within(deviation, present, pointwise=pointwise)
+
     def score(
         self,
         predicted: Floats,
@@ -362,6 +388,8 @@ class RecordLikelihood:
         if not is_exact:
             values = logsumexp(values + self.encoder.log_weights[:, None], axis=1)
             values = values if pointwise else values.sum(axis=-1)
+        if self.blocks is not None:
+            values = values + self._within_blocks(predicted[:, 0], scale, pointwise)
         values[~reached] = -np.inf
         if np.any(np.isnan(values)):
             raise ParameterError(
