@@ -20,7 +20,6 @@ from tactile_bayes.inference.parameters.noise import Noise
 from tactile_bayes.inference.parameters.nuisances import Nuisances
 from tactile_bayes.inference.parameters.prior_density import log_density_of
 from tactile_bayes.inference.parameters.priors import MAY_VANISH, Prior, support_of
-from tactile_bayes.inference.record_likelihood.blocks import zero_load_of_blocks
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.load_cell import zero_load
@@ -343,8 +342,6 @@ class ContourModel:
         return points[self.likelihood.usable(self.contours(points), self.rig(points))] if len(points) else points
 
     def _zero_load(self) -> xr.Dataset:
-        if self.likelihood.blocks is not None:
-            return zero_load_of_blocks(self.measured)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DriftWarning)
             return zero_load(self.measured)

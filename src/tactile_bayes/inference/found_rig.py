@@ -13,6 +13,7 @@ import xarray as xr
 from tactile_bayes.inference.parameters.nuisances import CURVE
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of, to_si, with_rod
@@ -110,7 +111,7 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
         drive_angle_offset=load_cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
         drive_angle_backlash=load_cell.drive_angle_backlash + rig.get("backlash", 0.0),
     )
-    fraction = np.linspace(-0.5, 0.5, measured.sizes["sample"])
+    fraction = elapsed_in(measured)
     columns = {
         name: measured[name] - drift * fraction for name, drift in zip(CHANNELS, by_channel("drift", 0.0), strict=True)
     }

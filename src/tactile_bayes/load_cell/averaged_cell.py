@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell.cell import LoadCell
+from tactile_bayes.load_cell.data_sheet import DataSheet
 
 __all__ = ["AveragedCell"]
 
@@ -31,6 +32,11 @@ class AveragedCell(LoadCell):
     """
 
     readings: Floats = field(default_factory=lambda: np.ones(1), compare=False)
+
+    @classmethod
+    def of(cls, cell: DataSheet, readings: Floats) -> AveragedCell:
+        """Return the cell whose samples are means of so many readings of a cell."""
+        return replace(cls.from_entries(cell.entries()), readings=readings)
 
     @property
     def resolution(self) -> Floats:

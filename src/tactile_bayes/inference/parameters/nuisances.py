@@ -16,9 +16,9 @@ from tactile_bayes.checks import check_names, check_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.parameters.discrepancy import DISCREPANCY, is_discrepancy
 from tactile_bayes.inference.parameters.priors import Prior
-from tactile_bayes.inference.record_likelihood.blocks import elapsed_in
 from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.load_cell.curve import curved
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER

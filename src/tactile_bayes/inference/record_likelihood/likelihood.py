@@ -14,13 +14,13 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.record_likelihood.blocks import NODES, Blocks
 from tactile_bayes.inference.record_likelihood.encoder import EncoderErrors
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
 from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.inference.record_likelihood.rod_tables import RodTables
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.averaged_cell import AveragedCell
+from tactile_bayes.load_cell.blocks import NODES, Blocks
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.mechanics.branches.shapes import shapes_of
 from tactile_bayes.mechanics.paths import Paths, trace
@@ -93,7 +93,7 @@ class RecordLikelihood:
         load_cell.refuse_other_frame(measured)
         self.blocks = Blocks.of(measured, self.rod)
         single = load_cell.dimensionless(self.rod)
-        self.load_cell = single if self.blocks is None else self.blocks.cell(single)
+        self.load_cell = single if self.blocks is None else AveragedCell.of(single, self.blocks.readings)
         self.encoder = EncoderErrors(self.load_cell)
         if self.encoder.count > 1 and (load_cell.drift or any(load_cell.bias_uncertainty)):
             raise ParameterError(

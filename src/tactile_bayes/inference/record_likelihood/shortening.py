@@ -11,14 +11,14 @@ import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.errors import DriftWarning
-from tactile_bayes.inference.record_likelihood.blocks import AFTER_CONTACT, BEFORE_ONSET, IN_CONTACT
 from tactile_bayes.inference.record_likelihood.record_segments import without_errors
 from tactile_bayes.load_cell import LoadCell, RandomWalk, zero_load
+from tactile_bayes.load_cell.blocks import AFTER_CONTACT, BEFORE_ONSET, IN_CONTACT
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.reconstruction import contact_sides, with_sides
 from tactile_bayes.record import CHANNELS, base_of_sample, carried_sweeps, present_channels, rows_of_sweeps
 
-__all__ = ["MOST_SAMPLES", "shortened"]
+__all__ = ["MOST_SAMPLES", "is_long", "shortened", "thinned"]
 
 MOST_SAMPLES = 2000
 """Largest number of samples that the likelihood takes one by one."""
@@ -46,6 +46,11 @@ _MARGIN, _MOST_SINGLE = 8, 200
 """Number of readings on either side of a snap-off that stay single, and the largest number around one."""
 
 
+def is_long(record: xr.Dataset) -> bool:
+    """Return True for a record of more than `MOST_SAMPLES` that is not shortened yet."""
+    return bool(record.sizes["sample"] > MOST_SAMPLES and "blocks" not in record.attrs)
+
+
 def shortened(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
     """Return a record as the likelihood takes it, and the load cell of its samples.
 
@@ -58,14 +63,14 @@ def shortened(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]
 
     The attribute `blocks` of the result states what was done.
     """
-    if record.sizes["sample"] <= MOST_SAMPLES or "blocks" in record.attrs:
+    if not is_long(record):
         return record, cell
     if _averages(record, cell):
         made = _Readings(record, cell).in_blocks()
         if made.sizes["sample"] < record.sizes["sample"]:
             return made, cell
         return record, cell
-    return _thinned(record, cell)
+    return thinned(record, cell)
 
 
 def _averages(record: xr.Dataset, cell: LoadCell) -> bool:
@@ -83,11 +88,13 @@ def _averages(record: xr.Dataset, cell: LoadCell) -> bool:
     )
 
 
-def _thinned(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
-    """Return every so many samples of each sweep, and the cell that drifts from one to the next as it does over them.
+def thinned(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
+    """Return every so many samples, and the cell that drifts from one to the next as the given one does between them.
 
-    Corners of the way along which a drive carries the base remain.
+    Corners of the way along which a drive carries the base remain. A record that is not long is returned as it is.
     """
+    if not is_long(record):
+        return record, cell
     samples = record.sizes["sample"]
     every = -(-samples // MOST_SAMPLES)
     kept = np.zeros(samples, dtype=bool)
@@ -283,7 +290,7 @@ class _Readings:
         return xr.Dataset(made, attrs={"side": group.side})
 
     def _parts(self, group: _Group, angle: Floats) -> Index:
-        """Return the part of the sweep in which each drive angle lies, as in `zero_load_of_blocks`."""
+        """Return the part of the sweep in which each drive angle lies, as in `bounds_in_blocks`."""
         sense = -1.0 if group.direction == "backward" else 1.0
         (before, begins), (ends, after) = (self._event(group, name) for name in ("onset", "snap_off"))
         past = sense * angle

@@ -8,12 +8,20 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.load_cell.averaged_cell import AveragedCell
-from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.load_cell.contact_bounds import ContactBounds
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, rows_of_sweeps
+from tactile_bayes.record import CHANNELS
 
-__all__ = ["AFTER_CONTACT", "BEFORE_ONSET", "IN_CONTACT", "NODES", "Blocks", "elapsed_in", "zero_load_of_blocks"]
+__all__ = [
+    "AFTER_CONTACT",
+    "BEFORE_ONSET",
+    "IN_CONTACT",
+    "NODES",
+    "Blocks",
+    "are_blocks",
+    "bounds_in_blocks",
+    "elapsed_in",
+]
 
 BEFORE_ONSET, IN_CONTACT, AFTER_CONTACT = 1, 2, 3
 """Parts of a sweep, as far as they are certain; 0 is none of them."""
@@ -40,19 +48,13 @@ class Blocks(NamedTuple):
     @classmethod
     def of(cls, record: xr.Dataset, rod: Rod) -> Blocks | None:
         """Return the blocks that the further columns of a record state, dimensionless; None for single readings."""
-        if "blocks" not in record.attrs or "block_readings" not in record:
+        if not are_blocks(record):
             return None
         readings, spread, freedom = (
             record[f"block_{name}"].values.astype(float) for name in ("readings", "spread", "freedom")
         )
         scatter = np.stack([record[f"block_scatter_{name}"].values for name in CHANNELS], axis=-1)
         return cls(readings, spread, freedom, scatter / np.square(rod.load_units))
-
-    def cell(self, cell: DataSheet) -> AveragedCell:
-        """Return the cell whose samples are these means."""
-        made = AveragedCell.from_entries({**cell.entries()})
-        object.__setattr__(made, "readings", self.readings)
-        return made
 
     def log_density_within(self, deviation: Floats, present: Flags, *, pointwise: bool) -> Floats:
         """Return the log-density of the readings of blocks, given their means and slopes.
@@ -74,6 +76,11 @@ class Blocks(NamedTuple):
         return np.asarray(terms.sum(axis=-1 if pointwise else (-2, -1)))
 
 
+def are_blocks(record: xr.Dataset) -> bool:
+    """Return True if the samples of a record are means of blocks."""
+    return "blocks" in record.attrs and "block_readings" in record
+
+
 def elapsed_in(record: xr.Dataset) -> Floats:
     """Return the position of each sample in its record, linear from the first reading (−½) to the last (½)."""
     if "blocks" in record.attrs and "block_elapsed" in record:
@@ -81,41 +88,18 @@ def elapsed_in(record: xr.Dataset) -> Floats:
     return np.linspace(-0.5, 0.5, record.sizes["sample"])
 
 
-def zero_load_of_blocks(record: xr.Dataset) -> xr.Dataset:
-    """Return what `zero_load` finds in the readings of a record in blocks: unloaded samples, events, bias and noise."""
-    part, unloaded = record["block_part"].values, record["block_unloaded"].values.astype(bool)
-    events = [_between(rows, part[rows]) for rows in rows_of_sweeps(record["sweep"].values)]
-    readings, freedom = record["block_readings"].values[unloaded], record["block_freedom"].values[unloaded]
-    bias, noise = np.full((2, len(CHANNELS)), np.nan)
-    for i, name in enumerate(CHANNELS):
-        means, scatter = record[name].values[unloaded], record[f"block_scatter_{name}"].values[unloaded]
-        if means.size > 1:
-            bias[i] = np.average(means, weights=readings)
-            squares = scatter.sum() + float(readings @ np.square(means - bias[i]))
-            noise[i] = np.sqrt(squares / (freedom.sum() + means.size - 1))
-    return xr.Dataset(
-        {
-            "unloaded": ("sample", unloaded),
-            "onset": (("sweep", "side"), np.array([each[:2] for each in events])),
-            "snap_off": (("sweep", "side"), np.array([each[2:] for each in events])),
-            "bias": ("channel", bias),
-            "noise": ("channel", noise),
-        }
+def bounds_in_blocks(part: Index, unloaded: Flags) -> ContactBounds:
+    """Return the bounds of contact in a sweep of blocks, from the parts of the sweep that were found in its readings."""
+    begins, ends = np.flatnonzero(part == IN_CONTACT)[[0, -1]] if np.any(part == IN_CONTACT) else (-1, -1)
+    before = np.flatnonzero(part[: max(begins, 0)] == BEFORE_ONSET)
+    after = ends + 1 + np.flatnonzero(part[ends + 1 :] == AFTER_CONTACT)
+    leading = int(np.argmin(unloaded)) if not unloaded.all() else unloaded.size
+    trailing = int(np.argmin(unloaded[::-1])) if not unloaded.all() else 0
+    return ContactBounds(
+        np.nan,
+        bool(begins >= 0),
+        (int(before[-1]), int(begins)) if before.size else (-1, -1),
+        (int(ends), int(after[0])) if begins >= 0 and after.size else (-1, -1),
+        leading,
+        trailing,
     )
-
-
-def _between(rows: Index, part: Index) -> tuple[int, int, int, int]:
-    """Return the rows of a sweep between which contact begins, and ends; −1 where there is no such event."""
-
-    def last(which: int) -> int:
-        found = np.flatnonzero(part == which)
-        return int(rows[found[-1]]) if found.size else -1
-
-    def first(which: int) -> int:
-        found = np.flatnonzero(part == which)
-        return int(rows[found[0]]) if found.size else -1
-
-    before, begins, ends, after = last(BEFORE_ONSET), first(IN_CONTACT), last(IN_CONTACT), first(AFTER_CONTACT)
-    onset = (before, begins) if min(before, begins) >= 0 else (-1, -1)
-    snap_off = (ends, after) if min(ends, after) >= 0 else (-1, -1)
-    return (*onset, *snap_off)
