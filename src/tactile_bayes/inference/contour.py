@@ -377,6 +377,8 @@ def sampled(
         )
         tree = xr.DataTree.from_dict(drawn_groups(model, draws))
         tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)
+        if "blocks" in tree.attrs:
+            tree.attrs["message"] += f"; the likelihood takes {tree.attrs['blocks']}"
         if keep is not None:
             keep(tree)
         groups = predicted_groups(model, draws, np.random.default_rng(seeds[2]))

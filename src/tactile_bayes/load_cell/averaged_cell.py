@@ -9,6 +9,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell.cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.mechanics.rods.rod import Rod
 
 __all__ = ["AveragedCell"]
 
@@ -38,9 +39,16 @@ class AveragedCell(LoadCell):
         """Return the cell whose samples are means of so many readings of a cell."""
         return replace(cls.from_entries(cell.entries()), readings=readings)
 
+    def dimensionless(self, rod: Rod) -> AveragedCell:
+        return replace(super().dimensionless(rod), readings=self.readings)
+
     @property
     def resolution(self) -> Floats:
         return np.zeros(3)
+
+    @property
+    def is_alike(self) -> bool:
+        return False
 
     @property
     def limit(self) -> Floats:

@@ -89,7 +89,7 @@ def elapsed_in(record: xr.Dataset) -> Floats:
 
 
 def bounds_in_blocks(part: Index, unloaded: Flags) -> ContactBounds:
-    """Return the bounds of contact in a sweep of blocks, from the parts of the sweep that were found in its readings."""
+    """Return the bounds of contact in a sweep of blocks, from its parts, which were found in the readings."""
     begins, ends = np.flatnonzero(part == IN_CONTACT)[[0, -1]] if np.any(part == IN_CONTACT) else (-1, -1)
     before = np.flatnonzero(part[: max(begins, 0)] == BEFORE_ONSET)
     after = ends + 1 + np.flatnonzero(part[ends + 1 :] == AFTER_CONTACT)

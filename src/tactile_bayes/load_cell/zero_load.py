@@ -217,7 +217,7 @@ def _if_long_enough(bounds: ContactBounds, samples: int) -> ContactBounds:
 class _Stretch(NamedTuple):
     """Readings of an unloaded stretch in which the zero is constant."""
 
-    count: float
+    readings: float
     freedom: float
     """Degrees of freedom of `squares`."""
     mean: Floats
@@ -241,7 +241,7 @@ class _Stretch(NamedTuple):
 
 def _statistics(stretches: list[_Stretch], steps: Floats, floor: Floats, false_alarm: float) -> dict[str, Floats]:
     """Mean and deviation of unloaded stretches with their standard errors, shape (channels,)."""
-    sizes = np.array([stretch.count for stretch in stretches], dtype=float)
+    sizes = np.array([stretch.readings for stretch in stretches], dtype=float)
     count, groups = sizes.sum(), len(stretches)
     names = ("bias", "bias_uncertainty", "noise", "noise_uncertainty", "same_bias_p_value")
     freedom = sum(stretch.freedom for stretch in stretches)
