@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -41,6 +41,12 @@ _DIVISIBLE = 8
 _BEND = 4.0
 """Improvement of a bin by two straight lines in place of one, in variances of the noise for each channel, beyond which
 it is split: without a bend its mean is 2."""
+
+_SAME_ANGLE = 1e-12
+"""Standard deviation of drive angles that is rounding [rad]."""
+
+_SIDES: tuple[Literal["right"], Literal["left"]] = ("right", "left")
+"""Sides of the two readings between which an event lies at which bins end and begin."""
 
 _MARGIN, _MOST_SINGLE = 8, 200
 """Number of readings on either side of a snap-off that stay single, and the largest number around one."""
@@ -197,7 +203,13 @@ class _Readings:
         angle = self.angle[group.samples]
         count = max(_FEWEST_BINS, int(np.ceil(np.ptp(angle) / width)))
         at = np.searchsorted(angle, np.linspace(angle[0], angle[-1], count + 1)[1:-1])
-        edges = np.unique(np.concatenate([[0, angle.size], at, self._single(group)]))
+        ends = [np.sort(self._event(group, name)) for name in ("onset", "snap_off")]
+        beside = [
+            int(np.searchsorted(angle, float(end), side))
+            for pair in ends
+            for end, side in zip(pair, _SIDES, strict=True)
+        ]
+        edges = np.unique(np.concatenate([[0, angle.size], at, beside, self._single(group)]).astype(np.intp))
         return self._split(group, edges)
 
     def _single(self, group: _Group) -> Index:
@@ -259,7 +271,8 @@ class _Readings:
         angle = mean(self.angle[samples])
         off = self.angle[samples] - angle[of_block]
         squares = np.bincount(of_block, off**2, count.size)
-        spread = np.where(count > 1, np.sqrt(squares / count), 0.0)
+        squares[squares <= count * _SAME_ANGLE**2] = 0.0
+        spread = np.sqrt(squares / count)
         turned = squares > 0.0
         elapsed = np.linspace(-0.5, 0.5, self.record.sizes["sample"])[samples]
         unloaded = mean(self.found["unloaded"].values[samples].astype(float)) == 1.0
