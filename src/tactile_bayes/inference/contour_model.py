@@ -162,8 +162,8 @@ class ContourModel:
 
     @property
     def loads_of_a_point(self) -> int:
-        """Number of predicted loads of a point: one for every channel, and place at which a sample's is evaluated."""
-        return self.likelihood.measured.size * self.likelihood.places
+        """Number of predicted loads of a point: one for every channel, sample and error of the encoder."""
+        return self.likelihood.measured.size * self.likelihood.encoder.count
 
     def prior_medians(self, names: Sequence[str]) -> list[float]:
         """Return the medians of some parameters' priors."""

@@ -16,7 +16,6 @@ __all__ = [
     "AFTER_CONTACT",
     "BEFORE_ONSET",
     "IN_CONTACT",
-    "NODES",
     "Blocks",
     "are_blocks",
     "bounds_in_blocks",
@@ -26,20 +25,20 @@ __all__ = [
 BEFORE_ONSET, IN_CONTACT, AFTER_CONTACT = 1, 2, 3
 """Parts of a sweep, as far as they are certain; 0 is none of them."""
 
-NODES = np.array([-1.0, 1.0])
-"""Places within a block at which its load is evaluated, in standard deviations of its drive angles. The mean of two is
-exact for loads that are cubic in evenly spread drive angles."""
-
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
 class Blocks(NamedTuple):
-    """Samples of a record as means of neighbouring readings, each array by sample."""
+    """Samples of a record that stand for blocks of neighbouring readings, each array by sample.
+
+    The readings of a block have a straight line over the drive angle. Two samples on it, a standard deviation of the
+    drive angles on either side of their mean, and with half of the readings each, have the mean and the slope of the
+    readings, and their uncertainties: the likelihood of all readings is that of the two samples, times that of the
+    scatter about the line, for any loads that are straight in the block, and nearly so for curved ones.
+    """
 
     readings: Floats
-    """Number of readings."""
-    spread: Floats
-    """Standard deviation of their drive angles [rad]."""
+    """Number of readings of which it is the mean, or half of those of whose line it is one of two points."""
     freedom: Floats
     """Degrees of freedom of `scatter`."""
     scatter: Floats
@@ -50,11 +49,9 @@ class Blocks(NamedTuple):
         """Return the blocks that the further columns of a record state, dimensionless; None for single readings."""
         if not are_blocks(record):
             return None
-        readings, spread, freedom = (
-            record[f"block_{name}"].values.astype(float) for name in ("readings", "spread", "freedom")
-        )
+        readings, freedom = (record[f"block_{name}"].values.astype(float) for name in ("readings", "freedom"))
         scatter = np.stack([record[f"block_scatter_{name}"].values for name in CHANNELS], axis=-1)
-        return cls(readings, spread, freedom, scatter / np.square(rod.load_units))
+        return cls(readings, freedom, scatter / np.square(rod.load_units))
 
     def log_density_within(self, deviation: Floats, present: Flags, *, pointwise: bool) -> Floats:
         """Return the log-density of the readings of blocks, given their means and slopes.

@@ -43,13 +43,13 @@ def in_blocks(record, cell=CELL):
 
 @pytest.mark.parametrize("sweeps", [1, 7])
 def test_blocks_hold_every_reading_once(sweeps):
-    """Means, weighted by their numbers of readings, and sums of squares about them make up those of the record."""
+    """Sums over the samples, weighted by their numbers of readings, are those of the record."""
     record = long_record(sweeps=sweeps)
     made = in_blocks(record)
     assert made.sizes["sample"] <= MOST_SAMPLES
     readings = made.block_readings.values
     assert readings.sum() == record.sizes["sample"]
-    assert f"{record.sizes['sample']:,} samples in {made.sizes['sample']:,} blocks" in made.attrs["blocks"]
+    assert made.attrs["blocks"].startswith(f"{record.sizes['sample']:,} samples in ")
     for name in ("drive_angle", *CHANNELS):
         assert readings @ made[name].values == pytest.approx(record[name].values.sum(), rel=1e-9, abs=1e-9)
     assert readings @ made.block_elapsed.values == pytest.approx(0.0, abs=1e-6)
@@ -83,8 +83,7 @@ def test_readings_at_one_angle_are_one_block():
     once = ideal(300)
     record = CELL.measure(once.isel(sample=np.repeat(np.arange(once.sizes["sample"]), 20)), seed=1)
     made = in_blocks(record)
-    singles = made.block_readings.values == 1
-    assert np.all(made.block_spread.values[~singles] < 1e-12)
+    assert set(made.drive_angle.values.round(12)) == set(record.drive_angle.values.round(12))
     assert np.all(made.block_freedom.values == made.block_readings.values - 1)
 
 
@@ -95,7 +94,7 @@ def test_readings_at_one_angle_are_one_block():
     ids=["white", "relative", "bias", "steps"],
 )
 def test_the_likelihood_of_blocks_is_that_of_the_readings(flaw, sweeps):
-    """Differences from the best point agree to 0.3, and to 3 % where they are larger."""
+    """Differences from the best point agree to 0.1, and to 2 % where they are larger."""
     record = long_record(3_000, sweeps, replace(CELL, **flaw))
     given = Experiment(record, nuisances=["friction", "drive_angle_offset"])
     short = given.shortened
@@ -110,7 +109,7 @@ def test_the_likelihood_of_blocks_is_that_of_the_readings(flaw, sweeps):
     best = np.argmax(whole)
     lower, lower_in_blocks = whole[best] - whole, blocks[best] - blocks
     assert np.ptp(whole) > 3.0
-    assert np.all(np.abs(lower - lower_in_blocks) < 0.3 + 0.03 * lower)
+    assert np.all(np.abs(lower - lower_in_blocks) < 0.1 + 0.02 * lower)
     pointwise = short.model.log_likelihood(points, pointwise=True)
     np.testing.assert_allclose(pointwise.sum(axis=1), blocks, rtol=1e-9)
 

@@ -20,7 +20,7 @@ from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.inference.record_likelihood.rod_tables import RodTables
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.averaged_cell import AveragedCell
-from tactile_bayes.load_cell.blocks import NODES, Blocks
+from tactile_bayes.load_cell.blocks import Blocks
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.mechanics.branches.shapes import shapes_of
 from tactile_bayes.mechanics.paths import Paths, trace
@@ -241,42 +241,35 @@ class RecordLikelihood:
 
     def predict_with_errors(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags]:
         """Return loads for every error of the encoder, shape (n, errors, samples, 3), and which contours are usable."""
-        return self._predict(contours, rig, self.encoder.errors[:, None])[:2]
+        return self._predict(contours, rig, self.encoder.errors)[:2]
 
     def predict_with_events(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags, Floats]:
         """Return the results of `predict`, and the drive angles of first contact and snap-off.
 
         The angles are readings in the sweep frame [rad], shape (n, segments, 2); NaN if there is no such event.
         """
-        loads, reached, events = self._predict(contours, rig, np.zeros((1, 1)))
+        loads, reached, events = self._predict(contours, rig, np.zeros(1))
         return loads[:, 0], reached, events
 
     def _predict(self, contours: Contour, rig: Rig | None, errors: Floats) -> tuple[Floats, Flags, Floats]:
-        """Return loads for errors of the encoder, shape (errors, 1), usable contours, and events.
-
-        Those of a block are the mean over `NODES`.
-        """
         rig = self._rig_of(rig, contours.shape[0])
-        errors = errors if self.blocks is None else NODES[:, None] * self.blocks.spread
         found = self._solutions(contours, rig, errors)
-        predicted = found.loads.reshape(-1, len(errors), *self.measured.shape)
+        predicted = found.loads.reshape(-1, errors.size, *self.measured.shape)
         if self._turn is not None:
-            turn = self._turn - self.misread(rig)[:, None] - errors
+            turn = self._turn - self.misread(rig)[:, None] - errors[:, None]
             predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
-        if self.blocks is not None:
-            predicted = 0.5 * (predicted[:, :1] + predicted[:, 1:])
         return predicted, self._usable(found), self._events(found, rig)
 
     def _solutions(self, contours: Contour, rig: Rig, errors: Floats | None = None) -> Solutions:
         """Solve the forward model; batch index k·n + i is contour i in segment k; without errors, for no samples."""
         from tactile_bayes.mechanics.branches.sweeps import solve_sweeps  # numba takes a second to load
 
-        errors = np.empty((0, 1)) if errors is None else errors
+        errors = np.empty(0) if errors is None else errors
         return solve_sweeps(
             self._shapes(contours, rig),
             self._sweeps(rig),
             self.segments.samples_with(errors),
-            (contours.shape[0], len(errors) * len(self.measured)),
+            (contours.shape[0], errors.size * len(self.measured)),
             profile=self._profile(rig),
             known=self._known(rig),
             tolerance=None if self.exact else self._tolerance,
@@ -349,11 +342,6 @@ class RecordLikelihood:
             Whether the result is by sample.
         """
         return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
-
-    @property
-    def places(self) -> int:
-        """Number of drive angles at which the loads of a sample are evaluated."""
-        return self.encoder.count if self.blocks is None else NODES.size
 
     def _within_blocks(self, predicted: Floats, scale: Floats, pointwise: bool) -> Floats:
         """Return the log-density of readings within their blocks, for loads of shape (n, samples, 3)."""

@@ -217,24 +217,20 @@ class RecordSegments:
         return ways
 
     def samples_with(self, errors: Floats) -> Segments:
-        """Return the samples of every segment, once for each error of the encoder, sorted by drive angle.
-
-        Errors are of shape (errors, 1), or (errors, samples).
-        """
+        """Return the samples of every segment, once for each error of the encoder, sorted by drive angle."""
         from tactile_bayes.mechanics.branches.sweeps import Segments
 
         key = errors.tobytes()
         if key not in self._samples_by_errors:
             samples, angles = [], []
             for row, segment in zip(self._angles, self, strict=True):
-                own = errors if errors.shape[1] == 1 else errors[:, segment.samples]
-                shifts = own if segment.backward else -own
+                shifts = errors if segment.backward else -errors
                 if not segment.sense:
-                    shifts = np.zeros_like(own)
-                shifted = (row[: segment.samples.size] + shifts).ravel()
+                    shifts = np.zeros_like(errors)
+                shifted = (row[: segment.samples.size] + shifts[:, None]).ravel()
                 order = np.argsort(shifted, kind="stable")
                 angles.append(shifted[order])
-                rows = segment.samples + self.drive_angles.size * np.arange(len(errors))[:, None]
+                rows = segment.samples + self.drive_angles.size * np.arange(errors.size)[:, None]
                 samples.append(rows.ravel()[order])
             first = np.cumsum([0, *(part.size for part in samples)])
             self._samples_by_errors[key] = Segments(first, np.concatenate(samples), np.concatenate(angles), self.lines)

@@ -1,10 +1,10 @@
-"""The shortening of a long record: to means of neighbouring readings, or, where these have no likelihood, to fewer."""
+"""The shortening of a long record: to lines through neighbouring readings, or, without a likelihood of these, fewer."""
 
 from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -23,13 +23,13 @@ __all__ = ["MOST_SAMPLES", "is_long", "shortened", "thinned"]
 MOST_SAMPLES = 2000
 """Largest number of samples that the likelihood takes one by one."""
 
-_BINS = 1000
+_BINS = 700
 """Number of bins of the drive angle in all sweep segments, before they are split."""
 
 _FEWEST_BINS = 12
 """Least number of bins of a segment."""
 
-_MOST_SPLIT = 1.5
+_MOST_SPLIT = 1.25
 """Largest number of bins after splitting, over that before."""
 
 _WIDEST = np.radians(2.0)
@@ -45,9 +45,6 @@ it is split: without a bend its mean is 2."""
 _SAME_ANGLE = 1e-12
 """Standard deviation of drive angles that is rounding [rad]."""
 
-_SIDES: tuple[Literal["right"], Literal["left"]] = ("right", "left")
-"""Sides of the two readings between which an event lies at which bins end and begin."""
-
 _MARGIN, _MOST_SINGLE = 8, 200
 """Number of readings on either side of a snap-off that stay single, and the largest number around one."""
 
@@ -61,8 +58,9 @@ def shortened(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]
     """Return a record as the likelihood takes it, and the load cell of its samples.
 
     A record of more than `MOST_SAMPLES` is put in blocks of readings at neighbouring drive angles, narrow enough that
-    loads are smooth in them; readings next to a snap-off stay single. The mean of a block has the noise of a reading
-    over the root of their number, and what scatters about the straight line of a block states the noise. For noise
+    loads are smooth in them, each of which two points of its straight line stand for; readings next to a snap-off stay
+    single. The points have the noise of a reading over the root of their number of readings, and what scatters about
+    the line states the noise. For noise
     whose means have no such distribution (outliers, drift, correlated channels, an encoder with noise or steps, steps
     above the noise, readings at the end of the range), and where a drive carries the base, every so many readings are
     taken instead; the drift is then that between them.
@@ -190,7 +188,7 @@ class _Readings:
         for group, ends in sorted(zip(self.groups, edges, strict=True), key=lambda pair: int(pair[0].sweeps[0])):
             made = self._blocks(group, ends, min(slabs, group.sweeps.size))
             parts += made
-            rows += sum(each.sizes["sample"] for each in made)
+            rows += sum(int(each.attrs["count"]) for each in made)
         samples = self.record.sizes["sample"]
         said = f"{samples:,} samples in {rows:,} blocks, of {samples / rows:.3g} on average"
         sides = {int(part["sweep"].values[0]): str(part.attrs["side"]) for part in parts}
@@ -205,9 +203,9 @@ class _Readings:
         at = np.searchsorted(angle, np.linspace(angle[0], angle[-1], count + 1)[1:-1])
         ends = [np.sort(self._event(group, name)) for name in ("onset", "snap_off")]
         beside = [
-            int(np.searchsorted(angle, float(end), side))
-            for pair in ends
-            for end, side in zip(pair, _SIDES, strict=True)
+            place
+            for low, high in ends
+            for place in (np.searchsorted(angle, low, "right"), np.searchsorted(angle, high, "left"))
         ]
         edges = np.unique(np.concatenate([[0, angle.size], at, beside, self._single(group)]).astype(np.intp))
         return self._split(group, edges)
@@ -265,42 +263,48 @@ class _Readings:
         """Return the blocks of samples, given by drive angle with their bins, as a sweep of this number."""
         _, of_block, count = np.unique(bins, return_inverse=True, return_counts=True)
 
-        def mean(values: Floats) -> Floats:
-            return np.asarray(np.bincount(of_block, values, count.size) / count)
+        def total(values: Floats) -> Floats:
+            return np.asarray(np.bincount(of_block, values, count.size), dtype=float)
 
-        angle = mean(self.angle[samples])
-        off = self.angle[samples] - angle[of_block]
-        squares = np.bincount(of_block, off**2, count.size)
+        middle = total(self.angle[samples]) / count
+        off = self.angle[samples] - middle[of_block]
+        squares = total(off**2)
         squares[squares <= count * _SAME_ANGLE**2] = 0.0
         spread = np.sqrt(squares / count)
-        turned = squares > 0.0
+        points = np.where(spread > 0.0, 2, 1)
+        block = np.repeat(np.arange(count.size), points)
+        place = np.where(points[block] == 2, np.where(np.diff(block, prepend=-1) > 0, -1.0, 1.0), 0.0) * spread[block]
+
+        def on_line(values: Floats) -> tuple[Floats, Floats]:
+            """Return the points of the lines of blocks, and the sum of squares about each."""
+            mean = total(values) / count
+            left = values - mean[of_block]
+            slope = total(off * left) / np.where(squares > 0.0, squares, 1.0)
+            return mean[block] + place * slope[block], total((left - slope[of_block] * off) ** 2)
+
         elapsed = np.linspace(-0.5, 0.5, self.record.sizes["sample"])[samples]
-        unloaded = mean(self.found["unloaded"].values[samples].astype(float)) == 1.0
-        columns = {
-            "sweep": np.full(count.size, sweep),
-            "direction": np.full(count.size, group.direction),
-            **{name: np.full(count.size, self.record[name].values[samples[0]]) for name in ("base_x", "base_y")},
+        unloaded = total(self.found["unloaded"].values[samples].astype(float)) == count
+        angle = middle[block] + place
+        columns: dict[str, Any] = {
+            "sweep": np.full(block.size, sweep),
+            "direction": np.full(block.size, group.direction),
+            **{name: np.full(block.size, self.record[name].values[samples[0]]) for name in ("base_x", "base_y")},
             "drive_angle": angle,
         }
-        scatter = {}
         for name, values in zip(CHANNELS, self.values[samples].T, strict=True):
-            columns[name] = mean(values)
-            left = values - columns[name][of_block]
-            slope = np.bincount(of_block, off * left, count.size) / np.where(turned, squares, 1.0)
-            scatter[f"block_scatter_{name}"] = np.bincount(of_block, (left - slope[of_block] * off) ** 2, count.size)
+            columns[name], scatter = on_line(values)
+            columns[f"block_scatter_{name}"] = (scatter / points)[block]
         columns |= {
-            "block_readings": count,
-            "block_spread": spread,
-            "block_freedom": np.maximum(count - 1 - turned, 0),
-            "block_elapsed": mean(elapsed),
-            "block_unloaded": unloaded.astype(int),
+            "block_readings": (count / points)[block],
+            "block_freedom": ((count - points) / points)[block],
+            "block_elapsed": on_line(elapsed)[0],
+            "block_unloaded": unloaded[block].astype(int),
             "block_part": self._parts(group, angle),
-            **scatter,
         }
         order = slice(None, None, -1) if group.direction == "backward" else slice(None)
         attrs = {name: self.record[name].attrs for name in self.record.variables if name in columns}
         made = {name: ("sample", values[order], attrs.get(name, {})) for name, values in columns.items()}
-        return xr.Dataset(made, attrs={"side": group.side})
+        return xr.Dataset(made, attrs={"side": group.side, "count": count.size})
 
     def _parts(self, group: _Group, angle: Floats) -> Index:
         """Return the part of the sweep in which each drive angle lies, as in `bounds_in_blocks`."""
