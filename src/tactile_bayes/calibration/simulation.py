@@ -15,6 +15,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.load_cell.averaged_cell import AveragedCell
 from tactile_bayes.load_cell.corruption import corrupted_angles
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.record import CHANNELS
@@ -80,6 +81,8 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     values = model.values(point)
     rod = likelihood.rod
     measures = cell.dimensionless(rod)
+    if likelihood.blocks is not None:
+        measures = AveragedCell.of(measures, likelihood.blocks.readings)
     discrepancy = model.discrepancy(point, loads)
     sensed = replace(model.nuisances, curve=measures.moment_curve).sensed(loads, values, measures)
     units = rod.load_units

@@ -15,6 +15,7 @@ from tactile_bayes.inference.parameters.discrepancy import PARAMETERS
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
 from tactile_bayes.inference.result import posterior_draws, record_of, refuse_no_contour, refuse_not_finite
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.blocks import are_blocks
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
 
@@ -149,6 +150,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     finite = scores[np.isfinite(scores).all(axis=-1)]
     overall = float(_p_values(finite.max(axis=0))) if finite.size else np.nan
     columns = posterior["constant_data"].to_dataset()
+    per_reading = np.sqrt(columns["block_readings"].values) if are_blocks(record_of(posterior)) else 1.0
     angle, sweep = columns.drive_angle.values, columns.sweep.values
     worst = [_worst_stretch(of_channel) for of_channel in residuals.values()]
     means = [float(np.mean((r.values[0] * r.scale)[rows])) for r, rows in zip(residuals.values(), worst, strict=True)]
@@ -175,7 +177,10 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             "worst_to": ("channel", [float(angle[rows[-1]]) for rows in worst], {"units": "rad"}),
             **travels,
             "worst_residual": ("channel", means),
-            "neighbour_noise": ("channel", [_neighbour_noise(of_channel) for of_channel in residuals.values()]),
+            "neighbour_noise": (
+                "channel",
+                [_neighbour_noise(of_channel, per_reading) for of_channel in residuals.values()],
+            ),
             "overall_p_value": np.nan if not_checked else overall,
         },
         coords={
@@ -340,6 +345,9 @@ def _worst_stretch(residuals: Residuals) -> Index:
     return found
 
 
-def _neighbour_noise(residuals: Residuals) -> float:
-    """Return the real record's white noise, from the median size of second differences, so that jumps do not count."""
-    return rough_noise(residuals.values[0] * residuals.scale)
+def _neighbour_noise(residuals: Residuals, weight: Floats | float = 1.0) -> float:
+    """Return the real record's white noise, from the median size of second differences, so that jumps do not count.
+
+    It is that of the samples times their weight.
+    """
+    return rough_noise(residuals.values[0] * residuals.scale * weight)

@@ -69,7 +69,9 @@ def infer_contour(
     The likelihood includes the unloaded samples: a contour whose first contact or snap-off is earlier or later than
     the record shows is unlikely. Contours that some sweep of the record could not reach are excluded. The walkers start
     around a robust least-squares optimum, whose search begins at the contact points of Step 2, or, if channels are
-    missing, at the best of many draws from the prior. The sampler is emcee (Foreman-Mackey et al. 2013, doi
+    missing, at the best of many draws from the prior. Of more than 2,000 samples the likelihood takes blocks of
+    neighbouring readings, or every so many samples where the noise does not allow it: the attribute `blocks` and the
+    message state it, and groups by sample are of these. The sampler is emcee (Foreman-Mackey et al. 2013, doi
     10.1086/670067), with proposals by differential evolution (ter Braak 2006, doi 10.1007/s11222-006-8769-1) and from
     fitted t distributions.
 
@@ -142,8 +144,7 @@ def infer_contour(
     -------
     xr.DataTree
         Groups in ArviZ's layout and the record's units, with one chain for each ensemble: `posterior`, `sample_stats`,
-        `prior`, `posterior_predictive` and `log_likelihood` (by sample; for some of the draws, and for fewer with more
-        than 4,000 samples), `events` (first contact and snap-off of each sweep segment, for 250 draws of each chain),
+        `prior`, `posterior_predictive` and `log_likelihood` (by sample; for some of the draws), `events` (first contact and snap-off of each sweep segment, for 250 draws of each chain),
         `observed_data`, `constant_data`. Attributes: version, seed, settings, hash of the data, `converged` (0 or 1)
         and a `message`. A KeyboardInterrupt (Ctrl-C) during sampling ends the run and returns the draws so far, with
         `converged` 0 and a message to that effect; before sampling it is passed on.
@@ -378,6 +379,8 @@ def sampled(
         )
         tree = xr.DataTree.from_dict(drawn_groups(model, draws))
         tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)
+        if "blocks" in tree.attrs:
+            tree.attrs["message"] += f"; the likelihood takes {tree.attrs['blocks']}"
         if keep is not None:
             keep(tree)
         groups = predicted_groups(model, draws, np.random.default_rng(seeds[2]))

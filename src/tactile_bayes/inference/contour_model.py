@@ -117,6 +117,16 @@ class ContourModel:
         self.likelihood.noise = np.where(self.present, rough, np.inf)
 
     @property
+    def deviations(self) -> Floats:
+        """Estimated standard deviation of each sample, shape (1 or samples, 3): that of a reading, or of a mean."""
+        return self.of_samples(self.deviation)
+
+    def of_samples(self, deviation: Floats) -> Floats:
+        """Return the standard deviation of each sample, shape (1 or samples, 3), from that of a reading, shape (3,)."""
+        blocks = self.likelihood.blocks
+        return np.asarray(deviation[None] if blocks is None else deviation / np.sqrt(blocks.readings)[:, None])
+
+    @property
     def present(self) -> Flags:
         """True for channels that were measured, shape (3,)."""
         return ~np.isnan(self.likelihood.measured).all(axis=0)
@@ -345,5 +355,7 @@ class ContourModel:
 
     def _rough_noise(self) -> Floats:
         """Return the standard deviation of each channel from second differences of its samples, shape (3,)."""
-        measured, stated = self.likelihood.measured, self.likelihood.load_cell.noise
+        measured, stated, blocks = self.likelihood.measured, self.likelihood.load_cell.noise, self.likelihood.blocks
+        if blocks is not None and np.any(blocks.freedom):
+            return np.asarray(np.sqrt(blocks.scatter.sum(axis=0) / blocks.freedom.sum()))
         return np.array([rough_noise(v) if len(v) > 2 else s for v, s in zip(measured.T, stated, strict=True)])

@@ -16,7 +16,15 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.record_segments import without_errors
-from tactile_bayes.reconstruction import OTHER_SIDE, doubtful_sweeps, loaded_samples, side_of, with_sides
+from tactile_bayes.inference.record_likelihood.shortening import is_long
+from tactile_bayes.reconstruction import (
+    OTHER_SIDE,
+    doubtful_sweeps,
+    loaded_samples,
+    side_of,
+    sides_and_doubts,
+    with_sides,
+)
 
 __all__ = ["ContourProblem", "contour_problem", "identity_of"]
 
@@ -71,10 +79,15 @@ def contour_problem(experiment: Experiment) -> ContourProblem:
     InferenceError
         If no sample carries a load.
     """
-    problem = _of_sides(experiment)
     record, cell = experiment.record, experiment.noise.cell
-    doubtful = doubtful_sweeps(without_errors(problem.model.measured, cell), cell)[:_MOST_DOUBTFUL]
-    if not doubtful:
+    if is_long(record):  # each sweep is judged once, by all of its samples
+        sides, doubtful = sides_and_doubts(without_errors(record, cell), cell)
+        record = with_sides(record, sides)
+        problem = _of_sides(replace(experiment, record=record))
+    else:
+        problem = _of_sides(experiment)
+        doubtful = doubtful_sweeps(without_errors(problem.model.measured, cell), cell)
+    if not (doubtful := doubtful[:_MOST_DOUBTFUL]):
         return problem
     stated = {sweep: side_of(record, sweep) for sweep in doubtful}
     every = []
@@ -90,13 +103,14 @@ def contour_problem(experiment: Experiment) -> ContourProblem:
 
 
 def _of_sides(experiment: Experiment) -> ContourProblem:
-    """Return the problem of an experiment with the sides of contact that its record states.
+    """Return the problem of an experiment, shortened, with the sides of contact that its record states.
 
     Raises
     ------
     InferenceError
         If no sample carries a load.
     """
+    experiment = experiment.shortened
     loaded = loaded_samples(experiment.record, experiment.noise.stated_cell)
     if not loaded.any():
         raise InferenceError(NO_LOAD)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -23,6 +23,7 @@ from tactile_bayes.inference.parameters.prior_text import priors_in_words
 from tactile_bayes.inference.parameters.priors import Prior, check_priors, refuse_unknown_priors
 from tactile_bayes.inference.parameters.priors import default_priors as contour_priors
 from tactile_bayes.inference.parameters.rig_prior import RigPrior
+from tactile_bayes.inference.record_likelihood.shortening import shortened
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import CONTACT_SIDES
@@ -30,6 +31,9 @@ from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_r
 from tactile_bayes.record.attributes import rod_attributes
 
 __all__ = ["Experiment", "default_priors", "usual_load_cell"]
+
+_WHOLE = "whole_sha256"
+"""Attribute of a shortened record: the hash of the whole one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,12 +122,24 @@ class Experiment:
         priors = {**self.default_priors, **self.priors}
         return ContourModel(self.record, self.shapes, self.rig, self.noise, priors)
 
+    @cached_property
+    def shortened(self) -> Experiment:
+        """The experiment with the samples that the likelihood takes, which are fewer for a long record."""
+        record, cell = shortened(self.record, self.noise.cell)
+        if record is self.record:
+            return self
+        noted = record.assign_attrs({_WHOLE: record_hash(self.record)})
+        if cell.drift == self.noise.cell.drift:
+            return replace(self, record=noted)
+        stated = self.load_cell or LoadCell.from_record(self.record) or cell
+        return replace(self, record=noted, load_cell=replace(stated, drift=cell.drift))
+
     @property
     def about(self) -> dict[str, Any]:
         """Attributes of a posterior: record, assumptions and priors."""
         attrs, cell = self.record.attrs, self.noise.cell
         return {
-            "data_sha256": record_hash(self.record),
+            "data_sha256": attrs.get(_WHOLE) or record_hash(self.record),
             **({"family": self.family} if self.gauge is None else {"gauge": repr(self.gauge.known)}),
             "friction": self.rig.friction,
             "nuisances": json.dumps((*self.rig.names, *self.noise.of_discrepancy)),
@@ -131,7 +147,7 @@ class Experiment:
             "priors": priors_in_words({**self.default_priors, **self.priors}),
             "units": attrs["units"],
             "load_cell_frame": frame_of(self.record),
-            **{name: attrs[name] for name in (CONTACT_SIDES,) if name in attrs},
+            **{name: attrs[name] for name in (CONTACT_SIDES, "blocks") if name in attrs},
             **rod_attributes(rod_of(self.record)),
             **({} if self.rig.joint is None else self.rig.joint.entries),
             "approximations": "; ".join(cell.approximations),

@@ -12,6 +12,8 @@ import xarray as xr
 from tactile_bayes.inference.parameters.nuisances import CURVE
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.averaged_cell import AveragedCell
+from tactile_bayes.load_cell.blocks import are_blocks, elapsed_in
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of, to_si, with_rod
@@ -101,8 +103,9 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
     gain: Any = np.array(load_cell.gain) * by_channel("gain", 1.0) * rig.get("rigidity_scale", 1.0)
     quadratic, cubic = (rig.get(name, v) for name, v in zip(CURVE, load_cell.moment_curve, strict=True))
     bias = np.array(load_cell.bias) + by_channel("bias", 0.0)
+    averaged = AveragedCell.of(load_cell, measured["block_readings"].values) if are_blocks(measured) else load_cell
     cell = replace(
-        load_cell,
+        averaged,
         gain=gain,
         lever=(load_cell.lever[0] + rig.get("lever_x", 0.0), load_cell.lever[1] + rig.get("lever_y", 0.0)),
         moment_curve=(quadratic, cubic),
@@ -110,7 +113,7 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
         drive_angle_offset=load_cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
         drive_angle_backlash=load_cell.drive_angle_backlash + rig.get("backlash", 0.0),
     )
-    fraction = np.linspace(-0.5, 0.5, measured.sizes["sample"])
+    fraction = elapsed_in(measured)
     columns = {
         name: measured[name] - drift * fraction for name, drift in zip(CHANNELS, by_channel("drift", 0.0), strict=True)
     }

@@ -151,7 +151,7 @@ def record_of(posterior: xr.DataTree) -> xr.Dataset:
     kept = {
         name: value
         for name, value in posterior.attrs.items()
-        if str(name).startswith(("rod_", "load_cell_", "contact_sides"))
+        if str(name).startswith(("rod_", "load_cell_", "contact_sides", "blocks"))
     }
     columns = [posterior[group].to_dataset() for group in ("constant_data", "observed_data")]
     return xr.merge(columns).assign_attrs({"units": posterior.attrs["units"], **kept})

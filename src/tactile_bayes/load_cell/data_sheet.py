@@ -216,6 +216,11 @@ class DataSheet:
         return matrix
 
     @property
+    def is_alike(self) -> bool:
+        """True if the errors of all samples have the same covariance, whatever the loads."""
+        return self.drift is None and not self.relative_noise
+
+    @property
     def straight(self) -> Self:
         """The same without the curve of the moment."""
         return replace(self, moment_curve=(0.0, 0.0)) if any(self.moment_curve) else self

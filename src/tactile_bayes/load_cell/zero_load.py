@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -14,6 +14,7 @@ from scipy.special import fdtrc
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import DriftWarning, RecordError
+from tactile_bayes.load_cell.blocks import are_blocks, bounds_in_blocks
 from tactile_bayes.load_cell.contact_bounds import FEWEST, ContactBounds, contact_bounds
 from tactile_bayes.record import (
     CHANNELS,
@@ -150,23 +151,27 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     floor = np.maximum(steps**2 / 12.0, rounding**2)
     sweep = record["sweep"].values
     sweeps = rows_of_sweeps(sweep)
-    travels = travels_of(record)
-    bounds, stretches, means = [], [], []
-    for rows in sweeps:
-        positions = _positions(travels[rows])
-        of_sweep = _bounds(readings[rows], positions, false_alarm, floor)
-        bounds.append(of_sweep)
-        for part in (slice(of_sweep.before), slice(len(rows) - of_sweep.after, None)):
-            if rows[part].size:
-                stretches.append(rows[part])
-                means.append(means_of_positions(readings[rows[part]], positions[part]))
+    positions = [
+        np.arange(rows.size) if are_blocks(record) else _positions(travels_of(record)[rows]) for rows in sweeps
+    ]
+    if are_blocks(record):
+        part, at_rest = record["block_part"].values, record["block_unloaded"].values.astype(bool)
+        bounds = [bounds_in_blocks(part[rows], at_rest[rows]) for rows in sweeps]
+    else:
+        bounds = [_bounds(readings[rows], at, false_alarm, floor) for rows, at in zip(sweeps, positions, strict=True)]
+    stretches, of_positions = [], []
+    for rows, at, of_sweep in zip(sweeps, positions, bounds, strict=True):
+        for ends in (slice(of_sweep.before), slice(len(rows) - of_sweep.after, None)):
+            if rows[ends].size:
+                stretches.append(rows[ends])
+                of_positions.append(means_of_positions(readings[rows[ends]], at[ends]))
     unloaded = np.zeros(sweep.size, dtype=bool)
     for rows in stretches:
         unloaded[rows] = True
-    statistics = _statistics(means, steps, floor, false_alarm)
-    if any(len(rows) > len(mean) for rows, mean in zip(stretches, means, strict=True)):
-        of_samples = _statistics([readings[rows] for rows in stretches], steps, floor, false_alarm)
-        statistics |= {name: of_samples[name] for name in ("noise", "noise_uncertainty")}
+    statistics = _statistics([_Stretch.of(record, rows) for rows in stretches], steps, floor, false_alarm)
+    if any(len(rows) > len(means) for rows, means in zip(stretches, of_positions, strict=True)):
+        of_means = _statistics(list(map(_Stretch.of_readings, of_positions)), steps, floor, false_alarm)
+        statistics |= {name: of_means[name] for name in statistics if name not in ("noise", "noise_uncertainty")}
     moved = np.flatnonzero(statistics["same_bias_p_value"] < false_alarm / len(channels))
     if moved.size:
         names = " and ".join(channels[index] for index in moved)
@@ -254,16 +259,46 @@ def _if_long_enough(bounds: ContactBounds, samples: int) -> ContactBounds:
     return ContactBounds(bounds.p_value, False, bounds.onset, bounds.snap_off, 0, 0)
 
 
-def _statistics(stretches: list[Floats], steps: Floats, floor: Floats, false_alarm: float) -> dict[str, Floats]:
+class _Stretch(NamedTuple):
+    """Readings of an unloaded stretch in which the zero is constant."""
+
+    readings: float
+    freedom: float
+    """Degrees of freedom of `squares`."""
+    mean: Floats
+    """Shape (channels,)."""
+    squares: Floats
+    """Sum of squares about the mean, shape (channels,)."""
+
+    @classmethod
+    def of_readings(cls, values: Floats) -> _Stretch:
+        """Return the stretch of readings of shape (samples, channels)."""
+        mean = values.mean(axis=0)
+        return cls(len(values), len(values) - 1.0, mean, ((values - mean) ** 2).sum(axis=0))
+
+    @classmethod
+    def of(cls, record: xr.Dataset, rows: Index) -> _Stretch:
+        """Return the stretch of some samples of a record, which may be means of readings."""
+        channels = present_channels(record)
+        values = np.stack([record[name].values[rows] for name in channels], axis=-1)
+        if not are_blocks(record):
+            return cls.of_readings(values)
+        weight, freedom = (record[f"block_{name}"].values[rows].astype(float) for name in ("readings", "freedom"))
+        mean = np.average(values, axis=0, weights=weight)
+        scatter = np.array([record[f"block_scatter_{name}"].values[rows].sum() for name in channels])
+        return cls(weight.sum(), freedom.sum() + len(rows) - 1.0, mean, scatter + weight @ (values - mean) ** 2)
+
+
+def _statistics(stretches: list[_Stretch], steps: Floats, floor: Floats, false_alarm: float) -> dict[str, Floats]:
     """Mean and deviation of unloaded stretches with their standard errors, shape (channels,)."""
-    sizes = np.array([len(stretch) for stretch in stretches], dtype=float)
+    sizes = np.array([stretch.readings for stretch in stretches], dtype=float)
     count, groups = sizes.sum(), len(stretches)
     names = ("bias", "bias_uncertainty", "noise", "noise_uncertainty", "same_bias_p_value")
-    freedom = count - groups
+    freedom = sum(stretch.freedom for stretch in stretches)
     if count < FEWEST or freedom < 1:
         return {name: np.full(steps.size, np.nan) for name in names}
-    means = np.stack([stretch.mean(axis=0) for stretch in stretches])
-    within = np.sum([((s - m) ** 2).sum(axis=0) for s, m in zip(stretches, means, strict=True)], axis=0)
+    means = np.stack([stretch.mean for stretch in stretches])
+    within = np.sum([stretch.squares for stretch in stretches], axis=0)
     variance = within / freedom
     rounded = steps > 0.0
     variance[rounded] = np.maximum(variance, steps**2 / 12.0)[rounded]

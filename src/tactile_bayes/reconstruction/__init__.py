@@ -9,6 +9,7 @@ from tactile_bayes.reconstruction.sides import (
     contact_sides,
     doubtful_sweeps,
     side_of,
+    sides_and_doubts,
     with_sides,
 )
 from tactile_bayes.reconstruction.step2 import reconstruct
@@ -26,5 +27,6 @@ __all__ = [
     "reconstruct",
     "samples_of",
     "side_of",
+    "sides_and_doubts",
     "with_sides",
 ]

@@ -99,9 +99,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         has_noise = bool(np.any(cell.unrest) or cell.relative_noise or cell.drive_angle_deviation)
         covariance = np.zeros((1, 3, 3))
         if has_noise:
-            for_covariance = (
-                loads if cell.relative_noise or cell.drift is not None else loads[:1]
-            )  # otherwise all are equal
+            for_covariance = loads[:1] if cell.is_alike else loads
             inverse = np.linalg.inv(cell.slopes(loads))
             covariance = inverse @ cell.covariance(for_covariance) @ np.swapaxes(inverse, -1, -2)
         leaning = np.zeros(loads.shape)

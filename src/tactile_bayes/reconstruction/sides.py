@@ -75,9 +75,7 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
     -------
     ndarray, shape (samples,)
     """
-    sides = _stated(record)
-    if not set(np.unique(record.sweep.values).tolist()) <= sides.keys():
-        sides, _ = sides_and_doubts(record, load_cell)
+    sides, _ = sides_and_doubts(record, load_cell)
     side = np.ones(record.sizes["sample"])
     for sweep, named in sides.items():
         if named == "backward":
@@ -93,6 +91,9 @@ def doubtful_sweeps(record: xr.Dataset, load_cell: LoadCell | None = None) -> tu
 def sides_and_doubts(record: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[dict[int, str], tuple[int, ...]]:
     """Sides of all sweeps as in `contact_sides`, and `doubtful_sweeps`, in one computation."""
     stated, sides, doubted = _stated(record), {}, []
+    sweeps = np.unique(record.sweep.values).tolist()
+    if set(sweeps) <= stated.keys():
+        return {sweep: stated[sweep] for sweep in sweeps}, ()
     for one in _judged(record, load_cell):
         said = str(record.direction.values[one.rows[0]])
         sides[one.sweep] = stated.get(one.sweep, OTHER_SIDE[said] if one.is_contradicted else said)

@@ -25,7 +25,7 @@ from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.found_rig import contact_points, rod_with
-from tactile_bayes.inference.result import posterior_draws, write_result
+from tactile_bayes.inference.result import posterior_draws, record_of, write_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.plotting.maps import set_below
@@ -211,7 +211,9 @@ def _completed(
     probability: float,
     truth: Contour | None,
 ) -> ContourRun:
-    """Write what follows from the posterior in a folder."""
+    """Write what follows from the posterior in a folder, of a long record by the samples that the likelihood took."""
+    if "blocks" in result.attrs:
+        measured, load_cell = record_of(result), None
     with folder:
         return _written(folder, measured, load_cell, result, probability, truth)
 

@@ -28,6 +28,7 @@ from tactile_bayes.inference.contact_posterior.draws import (
 from tactile_bayes.inference.contact_posterior.importance import LARGEST_K, LEAST_DRAWS
 from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
 from tactile_bayes.inference.misfit import NO_LOAD
+from tactile_bayes.inference.record_likelihood.shortening import thinned
 from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
@@ -62,6 +63,8 @@ def infer_contacts(
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.DataTree:
     """Infer the posterior of contact point and slope angle for every loaded sample, from that sample alone.
+
+    Of a record of more than 2,000 samples every so many are taken, as the message says.
 
     A contact has three degrees of freedom, contact point and slope angle, which determine whether the contact is a tip
     or a tangential one. Both phases are branches of one posterior, which yields their probabilities. If errors are
@@ -162,6 +165,7 @@ def infer_contacts(
             "the record carries no data sheet of its load cell: give load_cell=LoadCell(force_noise=..., "
             "moment_noise=...), or LoadCell.from_zero_load(record), which finds the noise in the unloaded samples"
         )
+    measured, cell = thinned(measured, cell)
     density, loaded = _density(measured, cell, float(np.arctan(friction)), prior)
     if not loaded.size:
         raise InferenceError(NO_LOAD)
@@ -290,6 +294,8 @@ def _attributes(
     chance = _misfit_probability(measured, cell, friction)
     if chance < _MIN_MISFIT_PROBABILITY:
         message += f"; THE LOADS DO NOT FIT (probability {chance:.1g}): are rod, friction, frame and noise right?"
+    if "blocks" in measured.attrs:
+        message += f"; the record has {measured.attrs['blocks']}"
     approximations = list(cell.approximations)
     if cell.drift is not None or any(cell.bias_uncertainty):
         approximations.append("unknown bias and drift, which samples share, count as noise of each sample")

@@ -18,6 +18,7 @@ from tactile_bayes.inference.parameters.discrepancy import DISCREPANCY, is_discr
 from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.load_cell.curve import curved
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
@@ -342,7 +343,7 @@ def nuisances_of(
             "have the same effect; leave one of them out"
         )
     rod = rod_of(measured)
-    elapsed = np.linspace(-0.5, 0.5, measured.sizes["sample"])
+    elapsed = elapsed_in(measured)
     curve = cell.dimensionless(rod).moment_curve
     nuisances = Nuisances(tuple(names), {}, rod, friction, elapsed, curve=curve, pivots=len(bases_of(measured)))
     of_place = (*(name for name in names if _BASE.fullmatch(name)), *_GROUPS["gauge"])

@@ -19,6 +19,8 @@ from tactile_bayes.inference.record_likelihood.record_segments import RecordSegm
 from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.inference.record_likelihood.rod_tables import RodTables
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.averaged_cell import AveragedCell
+from tactile_bayes.load_cell.blocks import Blocks
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.mechanics.branches.shapes import shapes_of
 from tactile_bayes.mechanics.paths import Paths, trace
@@ -90,7 +92,9 @@ class RecordLikelihood:
         self.friction = friction
         record = to_dimensionless(measured)
         load_cell.refuse_other_frame(measured)
-        self.load_cell = load_cell.dimensionless(self.rod)
+        self.blocks = Blocks.of(measured, self.rod)
+        single = load_cell.dimensionless(self.rod)
+        self.load_cell = single if self.blocks is None else AveragedCell.of(single, self.blocks.readings)
         self.encoder = EncoderErrors(self.load_cell)
         if self.encoder.count > 1 and (load_cell.drift or any(load_cell.bias_uncertainty)):
             raise ParameterError(
@@ -112,7 +116,8 @@ class RecordLikelihood:
     def noise(self, deviation: Floats) -> None:
         self._noise = np.asarray(deviation, dtype=float)
         largest = np.maximum(np.nan_to_num(np.abs(self.measured)).max(axis=0), 1.0)
-        share = _UNFELT * math.sqrt(min(1.0, 360.0 / len(self.measured)))
+        readings = len(self.measured) if self.blocks is None else float(self.blocks.readings.sum())
+        share = _UNFELT * math.sqrt(min(1.0, 360.0 / readings))
         self._tolerance = np.maximum(share * self._noise, _LEAST * largest)
         self._tolerated_share = float((self._tolerance / largest).min())
 
@@ -340,6 +345,15 @@ class RecordLikelihood:
         """
         return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
 
+    def _within_blocks(self, predicted: Floats, scale: Floats, pointwise: bool) -> Floats:
+        """Return the log-density of readings within their blocks, for loads of shape (n, samples, 3)."""
+        assert self.blocks is not None
+        assert isinstance(self.load_cell, AveragedCell)
+        of_reading = np.atleast_2d(self.load_cell.deviation_of_readings(predicted))
+        deviation = of_reading * (scale[..., None, :] if scale.ndim else scale)
+        present = ~np.isnan(self.measured).all(axis=0)
+        return self.blocks.log_density_within(deviation, present, pointwise=pointwise)
+
     def score(
         self,
         predicted: Floats,
@@ -364,6 +378,8 @@ class RecordLikelihood:
         if not is_exact:
             values = logsumexp(values + self.encoder.log_weights[:, None], axis=1)
             values = values if pointwise else values.sum(axis=-1)
+        if self.blocks is not None:
+            values = values + self._within_blocks(predicted[:, 0], scale, pointwise)
         values[~reached] = -np.inf
         if np.any(np.isnan(values)):
             raise ParameterError(

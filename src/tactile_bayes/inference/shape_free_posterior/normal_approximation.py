@@ -139,7 +139,7 @@ class Observer:
         if not np.isfinite(model.zero[model.present]).all():  # hardly any sample is unloaded
             self.loaded = loaded_samples(model.measured, model.noise.stated_cell)
         stated = np.asarray(model.likelihood.load_cell.noise)
-        self.noise = np.where(stated > 0.0, stated, model.deviation)
+        self.noise = model.of_samples(np.where(stated > 0.0, stated, model.deviation))
         between = model.likelihood.segments.event_angles(self.loaded)[:, 2:]
         self.ends = np.isfinite(between).all(axis=1)
         self._end, self._within = between.mean(axis=1), 0.5 * np.diff(between, axis=1)[:, 0]

@@ -134,7 +134,7 @@ def certainly_loaded(model: ContourModel) -> Flags:
     """Return True for samples whose load noise does not explain, each taken by itself, above the zero of the record."""
     measured, present = model.likelihood.measured[:, model.present], model.present
     zero = np.where(np.isfinite(model.zero[present]), model.zero[present], np.median(measured, axis=0))
-    squared_distance = np.square((measured - zero) / model.deviation[present]).sum(axis=1)
+    squared_distance = np.square((measured - zero) / model.deviations[:, present]).sum(axis=1)
     return np.asarray(squared_distance > chdtri(np.count_nonzero(present), _FALSE_ALARM))
 
 
@@ -175,7 +175,7 @@ class _Search:
         self.deadline = deadline
         size = len(model.forward_parameters)
         self.coordinates = Logarithms(model.coordinates.positive[:size])
-        self.deviation = model.deviation[model.present]
+        self.deviation = model.deviations[:, model.present]
         self.measured = model.likelihood.measured[:, model.present] / self.deviation
         self.brackets = event_brackets(model)
         self.axial_rig_is_due = True
@@ -337,7 +337,7 @@ def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, d
         return np.empty(0)
     loads, _ = model.likelihood.predict(model.contours(point[None]), model.rig(point[None]))
     largest = load_in_contact(loads[0], model.likelihood.segments.course)[:, model.present]
-    squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviation[model.present])
+    squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviations[:, model.present])
     least, most = np.quantile(drawn[:, 0], [0.05, 1.0])
     share = np.sqrt(squares[largest > 0.0].sum() / max(np.square(largest).sum(), np.finfo(float).tiny))
     return np.array([np.clip(share, least, most), np.median(drawn[:, 1])])

@@ -210,7 +210,7 @@ def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> Inf
 def _misfit(model: ContourModel, point: Floats) -> float:
     """Return the mean square of the residuals at a point, over a coarse noise of the record, with outliers clipped."""
     left = model.likelihood.measured - model.likelihood.load_cell.expected(model.loads(point[None]))[0]
-    return float(np.mean(np.minimum(np.abs(left / model.deviation)[:, model.present], 5.0) ** 2))
+    return float(np.mean(np.minimum(np.abs(left / model.deviations)[:, model.present], 5.0) ** 2))
 
 
 class _Mode(NamedTuple):
