@@ -115,9 +115,7 @@ def check_array(name: str, values: Any, correction: str = "give a number, or an 
     >>> check_array("x", [1, math.nan])
     array([ 1., nan])
     """
-    if (
-        isinstance(values, np.ndarray) and values.dtype == np.float64
-    ):  # a short cut, since contours are located in loops
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:  # a short cut, for inner loops
         return values
     numbers = as_numbers(values)
     if numbers is None:
@@ -126,7 +124,7 @@ def check_array(name: str, values: Any, correction: str = "give a number, or an 
 
 
 def check_arrays(**values: Any) -> list[Floats]:
-    """Return arrays of numbers whose shapes broadcast; None stays None.
+    """Return arrays of numbers whose shapes broadcast.
 
     Examples
     --------

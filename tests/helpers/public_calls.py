@@ -311,7 +311,6 @@ def _rod_and_sweep_calls() -> dict[str, Call]:
             },
         ),
         "equilibria": Call(tb.equilibria, {**scan, "slope_angles": [0.1], "direction": "forward"}),
-        "Scan.events": Call(lambda direction: scanned().events[direction], {"direction": "forward"}),
         "elastica.tangential_arclength": Call(
             elastica.tangential_arclength,
             {"contact_x": 0.2, "contact_y": 0.6, "slope_angle": 0.1, "friction_angle": 0.0, "rest_curvature": 0.0},

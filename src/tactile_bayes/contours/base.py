@@ -346,6 +346,7 @@ class Graph(Contour):
         with np.errstate(invalid="ignore"):
             return np.where((x >= lo) & (x <= hi), x, np.nan)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
         x = self._at("parameter", parameter)
         x, g, slope, bend = np.broadcast_arrays(x, *self.derivatives(x))
