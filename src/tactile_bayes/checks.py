@@ -43,6 +43,9 @@ __all__ = [
 TINY = math.ulp(0.0)
 """Least positive number."""
 
+_MOST = 10**9
+"""Largest count, of draws and the like."""
+
 _SHOWN = 120
 """Largest number of characters of a value in a message."""
 
@@ -221,7 +224,7 @@ def check_probability(
     return check_number(name, value, correction, least=TINY, most=math.nextafter(below, 0.0))
 
 
-def check_whole_number(name: str, value: Any, least: int, correction: str = "", *, most: float = math.inf) -> int:
+def check_whole_number(name: str, value: Any, least: int, correction: str = "", *, most: float = _MOST) -> int:
     """Return a whole number from `least` to `most`; a truth value is refused.
 
     Examples
@@ -230,13 +233,13 @@ def check_whole_number(name: str, value: Any, least: int, correction: str = "", 
     4
     """
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        raise refused(name, value, correction or f"give a whole number from {least} up")
+        raise refused(name, value, correction or f"give a whole number from {least} up, at most {most:g}")
     return int(value)
 
 
 def check_seed(value: Any, correction: str = "") -> int:
     """Return a whole number from 0 up, the seed of random numbers."""
-    return check_whole_number("seed", value, 0, correction)
+    return check_whole_number("seed", value, 0, correction, most=math.inf)
 
 
 def check_choice(name: str, value: Any, choices: Collection[str], correction: str = "") -> str:
