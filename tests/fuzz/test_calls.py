@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib import pyplot as plt
 
 import tactile_bayes as tb
 from helpers.public_calls import AcceptedError, end_before_sampling, right_calls
@@ -82,10 +83,6 @@ def wrong():
 def before_sampling(monkeypatch, tmp_path):
     end_before_sampling(monkeypatch)
     monkeypatch.chdir(tmp_path)
-    yield
-    from matplotlib import pyplot as plt
-
-    plt.close("all")
 
 
 def outcome(call, argument, value):
@@ -105,6 +102,8 @@ def outcome(call, argument, value):
         if argument in ("progress", "keep", "stop") and callable(value):
             return "clear"  # the given function's own
         return repr(error)[:200]
+    finally:
+        plt.close("all")
     return "fine"
 
 
