@@ -123,7 +123,7 @@ def tangential_arclength(
     Raises
     ------
     ParameterError
-        If a friction angle is not between 0 and 0.7.
+        If a friction angle is not between 0 and 0.7, or an argument is not numbers of a shape that broadcasts.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def wrench_from_contact(
     Raises
     ------
     ParameterError
-        If a friction angle is not between 0 and 0.7.
+        If a friction angle is not between 0 and 0.7, or an argument is not numbers of a shape that broadcasts.
 
     Examples
     --------
@@ -381,7 +381,7 @@ def contact_from_wrench(
     Raises
     ------
     ParameterError
-        If a friction angle is not between 0 and 0.7.
+        If a friction angle is not between 0 and 0.7, or an argument is not numbers of a shape that broadcasts.
 
     Examples
     --------
