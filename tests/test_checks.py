@@ -14,7 +14,9 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.public_calls import AcceptedError, end_before_sampling
 from helpers.refusals import refused
+from helpers.wrong_values import WRONG
 from tactile_bayes.checks import (
     as_number,
     as_numbers,
@@ -34,16 +36,9 @@ from tactile_bayes.checks import (
     check_whole_number,
     shown,
 )
-from tactile_bayes.comparison import families as family_comparison
 from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
-from tactile_bayes.inference import contour
-from tactile_bayes.inference.contact_posterior import posterior as contact_posterior
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-
-
-class AcceptedError(Exception):
-    """A posterior is about to be sampled: all arguments were accepted."""
 
 
 @functools.cache
@@ -108,57 +103,6 @@ def no_records():
 
 # --- What is wrong, for one argument or another ---------------------------------------------------------------------
 
-WRONG = [
-    None,
-    "",
-    "left",
-    "0.1",
-    b"raw",
-    math.nan,
-    math.inf,
-    -math.inf,
-    -1,
-    -0.5,
-    0,
-    1e-320,
-    1e308,
-    10**400,
-    True,
-    np.bool_(False),
-    1.5,
-    2 + 1j,
-    np.complex128(1j),
-    np.datetime64("2020-01-01"),
-    [],
-    [None],
-    ["left", 1],
-    [math.nan, 1.0],
-    [1.0, math.inf],
-    [True, 1.0],
-    [[1.0, 2.0], [3.0]],
-    {},
-    {"left": 1},
-    {1: 2.0},
-    set(),
-    np.array([]),
-    np.array([1j, 2.0]),
-    np.array(["a", "b"]),
-    np.array([None, 1.0]),
-    np.zeros((2, 3, 4)),
-    np.array(math.nan),
-    object(),
-    xr.Dataset(),
-    xr.DataArray([1.0, 2.0]),
-    xr.DataTree(),
-    tb.contours.Circle(0.5, 0.5),
-    tb.contours.Circle([0.5, 0.6], 0.5),
-    tb.Rod(),
-    tb.Rod(0.1, 1e-5),
-    CELL,
-    tb.SamplerSettings(),
-    stats.norm(0.0, 1.0),
-    np.random.default_rng(1),
-]
 NAMED_BY = {
     **dict.fromkeys(("record", "measured"), "record|samples?|column|units|attribute"),
     **dict.fromkeys(("posterior", "without_events"), "posterior|draws|infer_contour"),
@@ -486,12 +430,7 @@ CASES = (
 def before_sampling(monkeypatch, tmp_path):
     """Have calls that would sample end where they would begin to."""
 
-    def reach(*args, **options):
-        raise AcceptedError
-
-    monkeypatch.setattr(contour, "sampled", reach)
-    monkeypatch.setattr(family_comparison, "walk_of", reach)
-    monkeypatch.setattr(contact_posterior, "draw_contacts", reach)
+    end_before_sampling(monkeypatch)
     monkeypatch.chdir(tmp_path)
 
 

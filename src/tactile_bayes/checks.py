@@ -43,6 +43,9 @@ __all__ = [
 TINY = math.ulp(0.0)
 """Least positive number."""
 
+_MOST = 10**9
+"""Largest count, of draws and the like."""
+
 _SHOWN = 120
 """Largest number of characters of a value in a message."""
 
@@ -115,9 +118,7 @@ def check_array(name: str, values: Any, correction: str = "give a number, or an 
     >>> check_array("x", [1, math.nan])
     array([ 1., nan])
     """
-    if (
-        isinstance(values, np.ndarray) and values.dtype == np.float64
-    ):  # a short cut, since contours are located in loops
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:  # a short cut, for inner loops
         return values
     numbers = as_numbers(values)
     if numbers is None:
@@ -126,7 +127,7 @@ def check_array(name: str, values: Any, correction: str = "give a number, or an 
 
 
 def check_arrays(**values: Any) -> list[Floats]:
-    """Return arrays of numbers whose shapes broadcast; None stays None.
+    """Return arrays of numbers whose shapes broadcast.
 
     Examples
     --------
@@ -223,7 +224,7 @@ def check_probability(
     return check_number(name, value, correction, least=TINY, most=math.nextafter(below, 0.0))
 
 
-def check_whole_number(name: str, value: Any, least: int, correction: str = "", *, most: float = math.inf) -> int:
+def check_whole_number(name: str, value: Any, least: int, correction: str = "", *, most: float = _MOST) -> int:
     """Return a whole number from `least` to `most`; a truth value is refused.
 
     Examples
@@ -232,13 +233,13 @@ def check_whole_number(name: str, value: Any, least: int, correction: str = "", 
     4
     """
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        raise refused(name, value, correction or f"give a whole number from {least} up")
+        raise refused(name, value, correction or f"give a whole number from {least} up, at most {most:g}")
     return int(value)
 
 
 def check_seed(value: Any, correction: str = "") -> int:
     """Return a whole number from 0 up, the seed of random numbers."""
-    return check_whole_number("seed", value, 0, correction)
+    return check_whole_number("seed", value, 0, correction, most=math.inf)
 
 
 def check_choice(name: str, value: Any, choices: Collection[str], correction: str = "") -> str:

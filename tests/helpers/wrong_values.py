@@ -65,6 +65,10 @@ WRONG: list[Any] = [
     tb.SamplerSettings(),
     stats.norm(0.0, 1.0),
     np.random.default_rng(1),
+]
+"""Values that few arguments take."""
+
+MORE: list[Any] = [
     95,
     [0.1, 0.2],
     "no/such/file.nc",
@@ -83,7 +87,7 @@ WRONG: list[Any] = [
     iter([1.0, 2.0]),
     slice(0, 2),
 ]
-"""Values that few arguments take."""
+"""More of them, for tests that know of fewer arguments what is right."""
 
 RESULTS: list[Callable[[], Any]] = [
     public_calls.measured,
@@ -102,4 +106,4 @@ RESULTS: list[Callable[[], Any]] = [
     public_calls.trusted,
     public_calls.inspected,
 ]
-"""Results of the package, of which most arguments take one kind or none."""
+"""Makers of results, of which most arguments take one kind or none."""

@@ -237,5 +237,5 @@ def test_what_is_no_knowledge_is_refused(posterior):
         designed("shape-free", priors={})
     with refused(ParameterError, "load_cell", "posterior"):
         designed(posterior, load_cell=CELL)
-    with refused(InferenceError, "posterior", "contour"):
+    with refused(InferenceError, "infer_contour"):
         designed(xr.DataTree())

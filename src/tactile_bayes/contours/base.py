@@ -54,6 +54,8 @@ class Contour(ABC):
     functions. A family defines the point at p (`locate`) and the ends (`domain`); everything else follows by root
     search and is overridden where there is a formula. `check` verifies a new family.
 
+    Methods raise ParameterError for arguments that are not numbers, or do not broadcast with the parameters.
+
     Contours are equal if they are of one family and all their parameters are equal, including their shapes. A family
     that inherits this is a `dataclass(frozen=True, eq=False)`.
     """
@@ -346,6 +348,7 @@ class Graph(Contour):
         with np.errstate(invalid="ignore"):
             return np.where((x >= lo) & (x <= hi), x, np.nan)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
         x = self._at("parameter", parameter)
         x, g, slope, bend = np.broadcast_arrays(x, *self.derivatives(x))

@@ -11,10 +11,11 @@ from numpy.polynomial import Chebyshev
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_numbers
 from tactile_bayes.contours.base import Graph, Single
 from tactile_bayes.contours.joined import SAME_SLOPE
 from tactile_bayes.contours.rates import mismatch, probes
-from tactile_bayes.errors import ContourError
+from tactile_bayes.errors import ContourError, ParameterError
 
 __all__ = ["FunctionContour", "from_function"]
 
@@ -101,10 +102,10 @@ def from_function(
     """
     named = getattr(g, "__name__", repr(g))
     try:
-        lo, hi = (float(end) for end in domain)
-    except (TypeError, ValueError):
-        raise ContourError(f"from_function: the domain is {domain!r}: give least and greatest x, (-1, 1)") from None
-    if not (np.isfinite(lo) and np.isfinite(hi) and lo < hi):
+        lo, hi = check_numbers("domain", domain, shape=(2,)).tolist()
+    except ParameterError:
+        raise ContourError(f"from_function: the domain is {domain!r}: give two finite numbers, (-1, 1)") from None
+    if not lo < hi:
         raise ContourError(f"from_function: the domain is ({lo}, {hi}): give two finite numbers, the smaller first")
     for what, function in (("g", g), ("the slope", slope), ("the curvature", curvature)):
         if function is not None and not callable(function):

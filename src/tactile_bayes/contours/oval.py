@@ -37,15 +37,15 @@ class _Oval(Vertexed):
     def end_name(self, side: Literal["left", "right"]) -> str:
         return "where it is vertical"
 
+    @np.errstate(over="ignore", invalid="ignore")
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.arcsin((self._at("x", x) - self.x_c) / self.half_axes[0]))
+        return np.asarray(np.arcsin((self._at("x", x) - self.x_c) / self.half_axes[0]))
 
+    @np.errstate(over="ignore", invalid="ignore")
     def height(self, x: ArrayLike) -> Floats:
         offset = self._at("x", x) - self.x_c
         a, b = self.half_axes
-        with np.errstate(invalid="ignore"):
-            sunk = offset**2 / (a + np.sqrt((a - offset) * (a + offset)))
+        sunk = offset**2 / (a + np.sqrt((a - offset) * (a + offset)))
         return np.asarray(self.q + b / a * sunk)
 
 
@@ -84,6 +84,7 @@ class Circle(_Oval):
     def half_axes(self) -> tuple[Parameter, Parameter]:
         return self.r, self.r
 
+    @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = self._at("parameter", parameter)
         x, y = self.x_c + self.r * np.sin(alpha), self.q + 2.0 * self.r * np.sin(0.5 * alpha) ** 2
@@ -133,6 +134,7 @@ class Ellipse(_Oval):
     def half_axes(self) -> tuple[Parameter, Parameter]:
         return self.a, self.b
 
+    @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
         t = self._at("parameter", parameter)  # the eccentric angle from the lowest point
         a, b = self.a, self.b
@@ -149,5 +151,6 @@ class Ellipse(_Oval):
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = self._at("slope_angle", slope_angle)
-        t = np.arctan2(self.a * np.sin(alpha), self.b * np.cos(alpha))
+        with np.errstate(invalid="ignore"):
+            t = np.arctan2(self.a * np.sin(alpha), self.b * np.cos(alpha))
         return np.where(np.abs(alpha) <= 0.5 * np.pi, t, np.nan)

@@ -58,6 +58,7 @@ class Parabola(Vertexed):
         half = Half(PARABOLA, np.asarray(self.a), np.ones(()))
         return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q))
 
+    @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = self._at("parameter", parameter)
         t = np.tan(alpha)
@@ -72,5 +73,6 @@ class Parabola(Vertexed):
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         return np.asarray(np.arctan(2.0 * self.a * (self._at("x", x) - self.x_c)))
 
+    @np.errstate(over="ignore", invalid="ignore")
     def height(self, x: ArrayLike) -> Floats:
         return np.asarray(self.a * (self._at("x", x) - self.x_c) ** 2 + self.q)

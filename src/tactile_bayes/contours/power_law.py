@@ -98,7 +98,7 @@ class PowerLaw(Vertexed):
         common_shape("PowerLaw", w=np.shape(w), n=np.shape(n))
         refuse_unless(np.greater(w, 0.0) & np.isfinite(w), "PowerLaw", "w must be positive and finite", w=w)
         with np.errstate(over="ignore", divide="ignore"):  # where it is narrow, or wide, and n is large
-            a = np.clip(w ** (1.0 - n), 1.0 / _STEEPEST, _STEEPEST)
+            a = np.clip(np.asarray(w) ** (1.0 - n), 1.0 / _STEEPEST, _STEEPEST)
         return cls(a, n, q, x_c)
 
     @property
@@ -124,6 +124,7 @@ class PowerLaw(Vertexed):
         of_offset, of_slope = np.maximum(1.0, 1.0 / (self.n - 1.0)), np.maximum(1.0, self.n - 1.0)
         return of_offset, of_slope, of_offset + of_slope
 
+    @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
         p, a, n = self._at("parameter", parameter), self.a, self.n
         of_offset, of_slope, of_height = self._powers()
@@ -141,14 +142,17 @@ class PowerLaw(Vertexed):
         )
         return Locus(x, y, alpha, speed, bend)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = self._at("slope_angle", slope_angle)
         slope = np.where(np.abs(alpha) < 0.5 * np.pi, np.tan(alpha), np.nan)
         return np.asarray(np.copysign((np.abs(slope) / (self.a * self.n)) ** (1.0 / self._powers()[1]), slope))
 
+    @np.errstate(over="ignore", invalid="ignore")
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         offset = self._at("x", x) - self.x_c
         return np.asarray(np.copysign(np.abs(offset) ** (1.0 / self._powers()[0]), offset))
 
+    @np.errstate(over="ignore", invalid="ignore")
     def height(self, x: ArrayLike) -> Floats:
         return np.asarray(self.q + self.a * np.abs(self._at("x", x) - self.x_c) ** self.n)

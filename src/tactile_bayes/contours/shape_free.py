@@ -122,6 +122,7 @@ class ShapeFree(Tabled):
     def end_name(self, side: Literal["left", "right"]) -> str:
         return "the last slope angle for which a radius is given"
 
+    @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = self._at("parameter", parameter)
         log_radius, x, y = self._evaluate(alpha)

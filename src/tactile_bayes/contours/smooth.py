@@ -96,6 +96,7 @@ class Smooth(Tabled):
         tables = self.__dict__["_table"][self.__dict__["_row"]]
         return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), tables=tables)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha, row = np.broadcast_arrays(self._at("parameter", parameter), self.__dict__["_row"])
         way = (alpha + _UPRIGHT) * (_CELLS / (2.0 * _UPRIGHT))

@@ -73,7 +73,7 @@ def record(
         spec = read_text(manifest.specification)
     else:
         spec = source if isinstance(source, Specification) else read_specification(source)
-    if not isinstance(index, int | np.integer) or not 0 <= index < spec.records:
+    if isinstance(index, bool) or not isinstance(index, int | np.integer) or not 0 <= index < spec.records:
         raise ParameterError(f"there is no record {index!r}: they are numbered from 0 to {spec.records - 1}")
     begin = int(index) - int(index) % spec.shard_records
     if folder is not None:

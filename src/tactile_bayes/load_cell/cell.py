@@ -348,6 +348,11 @@ class LoadCell(DataSheet):
         ndarray, shape (n_samples, 3, 3)
             In the squared units of the cell; infinite for Student's t with 2 degrees of freedom or fewer.
 
+        Raises
+        ------
+        ParameterError
+            If the loads are not numbers of that shape.
+
         Examples
         --------
         >>> cell = LoadCell(force_noise=0.03, moment_noise=0.02, bias_uncertainty=(0.0, 0.04, 0.0))
@@ -379,6 +384,11 @@ class LoadCell(DataSheet):
         Returns
         -------
         ndarray, shape (n_samples,)
+
+        Raises
+        ------
+        ParameterError
+            If the readings are not numbers of that shape.
 
         Examples
         --------

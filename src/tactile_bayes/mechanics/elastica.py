@@ -123,7 +123,7 @@ def tangential_arclength(
     Raises
     ------
     ParameterError
-        If a friction angle is not between 0 and 0.7.
+        If a friction angle is not between 0 and 0.7, or an argument is not numbers of a shape that broadcasts.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def wrench_from_contact(
     Raises
     ------
     ParameterError
-        If a friction angle is not between 0 and 0.7.
+        If a friction angle is not between 0 and 0.7, or an argument is not numbers of a shape that broadcasts.
 
     Examples
     --------
@@ -382,7 +382,7 @@ def contact_from_wrench(
     Raises
     ------
     ParameterError
-        If a friction angle is not between 0 and 0.7.
+        If a friction angle is not between 0 and 0.7, or an argument is not numbers of a shape that broadcasts.
 
     Examples
     --------
@@ -480,8 +480,8 @@ def largest_curvature(wrench: Wrench, rest_curvature: ArrayLike = 0.0) -> Floats
     moment, rest = sign * wrench.holding_moment, sign * curvature
     at_pivot = rest - moment
     # The rod lies across the force in its sense or, if its curvature keeps the other sign, in the opposite one.
-    squared = at_pivot**2 - 2.0 * (force + along)
-    inflated = rest + np.sqrt(at_pivot**2 + 2.0 * (force - along))
     with np.errstate(invalid="ignore", over="ignore"):
+        squared = at_pivot**2 - 2.0 * (force + along)
+        inflated = rest + np.sqrt(at_pivot**2 + 2.0 * (force - along))
         inflated = np.where((at_pivot > 0.0) & (squared > 0.0), rest - np.sqrt(squared), inflated)
     return np.where(sign * across < 0.0, np.maximum(moment, inflated), moment)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from tactile_bayes.checks import check_function, check_names, check_optional, check_path
 from tactile_bayes.errors import ParameterError
@@ -73,7 +75,8 @@ def draw_all(
     absent = [name for name in wanted if name not in _FORMATS]
     if absent or not wanted:
         raise ParameterError(f"formats are {list(formats)!r}: choose from {', '.join(_FORMATS)}")
-    check_optional("only", only, Collection, "give a list of numbers of figures")
+    only = only.tolist() if isinstance(only, np.ndarray) else only
+    check_optional("only", only, Sequence, "give a list of numbers of figures")
     numbers = NUMBERS if only is None else only
     captions = {number: caption(number, **options) for number in numbers}  # refuses before anything is written
     check_function("progress", progress)

@@ -18,6 +18,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
     TINY,
     check_choice,
+    check_names,
     check_numbers,
     check_optional,
     check_probability,
@@ -191,7 +192,8 @@ def design(
         experiment = Experiment(empty, known, cell, own, rod, friction, nuisances)
         knowledge = known_from_prior(experiment, draws=int(draws), rng=rng)
     else:
-        given = {"load_cell": load_cell, "rod": rod, "priors": priors}
+        check_names("nuisances", nuisances)
+        given = {"load_cell": load_cell, "rod": rod, "friction": friction, "priors": priors}
         taken = [name for name, value in given.items() if value is not None]
         if taken:
             raise ParameterError(f"{', '.join(taken)} and a posterior, which has its own: leave one of the two")

@@ -31,6 +31,8 @@ __all__ = [
     "write_not_measured",
 ]
 
+_MOST_SAMPLES = 10**9
+
 AxesArray = NDArray[np.object_]
 
 
@@ -62,7 +64,7 @@ def checked_samples(samples: Any) -> NDArray[np.intp] | None:
     if samples is None:
         return None
     correction = "give a list of numbers of samples, or None"
-    numbers = np.atleast_1d(check_numbers("samples", samples, correction))
+    numbers = np.atleast_1d(check_numbers("samples", samples, correction, least=0, most=_MOST_SAMPLES))
     if numbers.ndim != 1 or np.any(numbers != np.round(numbers)):
         raise refused("samples", samples, correction)
     return numbers.astype(np.intp)

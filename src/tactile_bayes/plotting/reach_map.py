@@ -90,7 +90,7 @@ def prior_contours(
     from tactile_bayes.inference.contour import contours_of
 
     check_drawing(ax, truth)
-    if not {"prior", "constant_data"} <= set(getattr(posterior, "children", ())):
+    if not _has(posterior, "prior", "constant_data"):
         raise ParameterError("there are no draws from a prior here: give the tree that infer_contour returned")
     check_whole_number("contours", contours, 1, _COUNT)
     check_switch("median", median)
@@ -144,7 +144,7 @@ def posterior_contours(
     from tactile_bayes.uncertainty.band import contours_drawn
 
     check_drawing(ax, truth)
-    if not {"posterior", "constant_data"} <= set(getattr(posterior, "children", ())):
+    if not _has(posterior, "posterior", "constant_data"):
         raise ParameterError("this is no posterior of a contour: give the tree that infer_contour returned")
     check_whole_number("contours", contours, 1, _COUNT)
     family = posterior.attrs["family"]
@@ -153,6 +153,12 @@ def posterior_contours(
         expected = contours_of(posterior["prior"].to_dataset(), family)
         layers.insert(0, (f"{family}, from the prior", expected, _PRIOR))
     return _draw(ax, posterior, contours, layers, truth)
+
+
+def _has(posterior: Any, *groups: str) -> bool:
+    """Return whether this is a result of `infer_contour` with these groups."""
+    is_tree = isinstance(posterior, xr.DataTree) and set(groups) <= set(posterior.children)
+    return is_tree and {"family", "rod_length"} <= set(posterior.attrs)
 
 
 def _draw(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_choice, check_kind, check_whole_number
+from tactile_bayes.checks import check_choice, check_kind, check_whole_number, shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.plotting.axes import check_drawing, single_axes
@@ -80,7 +80,7 @@ def rods(
     record, events, rod = in_frame(scan.record, "fixed"), scan.sweeps[number], rod_of(scan.record)
     samples = np.flatnonzero((record["sweep"].values == number) & (record["truth_contact_phase"].values != "none"))
     if samples.size:
-        samples = samples[np.unique(np.linspace(0, samples.size - 1, count).round().astype(int))]
+        samples = samples[np.unique(np.linspace(0, samples.size - 1, min(count, samples.size)).round().astype(int))]
 
     def shape(state: Mapping[str, Any]) -> tuple[Floats, Floats]:
         x, y = rod_shape(
@@ -133,8 +133,9 @@ def _number(scan: Scan, direction: str | None, sweep: int | None) -> int:
     if sweep is not None:
         if direction is not None:
             raise ParameterError(f"both direction={direction!r} and sweep={sweep!r} are given: one of them is enough")
-        if check_whole_number("sweep", sweep, 0) not in range(len(scan.sweeps)):
-            raise ParameterError(f"the scan has no sweep {sweep!r}: choose from\n{_listed(scan)}")
+        is_number = isinstance(sweep, int | np.integer) and not isinstance(sweep, bool)
+        if not is_number or sweep not in range(len(scan.sweeps)):
+            raise ParameterError(f"the scan has no sweep {shown(sweep)}: choose from\n{_listed(scan)}")
         return sweep
     direction = "forward" if direction is None else check_choice("direction", direction, ("forward", "backward"))
     numbers = [number for number, events in enumerate(scan.sweeps) if events.direction == direction]

@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_whole_number
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.checks import refused
 from tactile_bayes.plotting.axes import check_drawing, single_axes
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, number
 from tactile_bayes.plotting.legends import legend_above, legend_entry
@@ -263,11 +262,11 @@ def _of_sweep(found: xr.Dataset, sweep: int) -> xr.Dataset:
     ParameterError
         If there is no such sweep.
     """
-    check_whole_number("sweep", sweep, 0)
     numbers = found["sweep"].values
-    here = np.flatnonzero(numbers == sweep)
+    is_number = isinstance(sweep, int | np.integer) and not isinstance(sweep, bool)
+    here = np.flatnonzero(numbers == sweep) if is_number else np.arange(0)
     if not here.size:
-        raise ParameterError(f"sweep is {sweep!r}: there are {', '.join(map(str, np.unique(numbers)))}")
+        raise refused("sweep", sweep, f"there are {', '.join(map(str, np.unique(numbers)))}")
     return found.isel(sample=here[np.argsort(found["drive_angle"].values[here], kind="stable")])
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_kind, check_mapping, check_names, check_optional, refused
+from tactile_bayes.checks import check_mapping, check_names, check_optional, refused
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attributes import completed_attributes
 from tactile_bayes.record.cell import number_in
@@ -73,7 +73,8 @@ def make_record(
     >>> record.attrs["units"], present_channels(record)
     ('dimensionless', ('holding_moment',))
     """
-    check_kind("columns", columns, Mapping, "give arrays by name of a column")
+    if not isinstance(columns, Mapping) or isinstance(columns, xr.DataTree):
+        raise refused("columns", columns, "give arrays by name of a column")
     check_mapping("attrs", attrs, "give strings and numbers by name")
     check_optional("the rod", rod, Rod)
     cells = {str(name): (np.array(_unmasked(values)), getattr(values, "attrs", {})) for name, values in columns.items()}

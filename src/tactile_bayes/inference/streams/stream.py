@@ -378,7 +378,7 @@ class Stream:
         InferenceError
             Before the first update.
         """
-        check_whole_number("count", count, 1)
+        check_whole_number("count", count, 1, most=10**7)
         state = self._known_state()
         picked = resampled(np.exp(state.log_weights), count, self._random(2, state.updates))
         return state.points[picked, : len(state.experiment.model.family.parameters)]
