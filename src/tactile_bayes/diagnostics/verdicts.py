@@ -22,6 +22,7 @@ from tactile_bayes.inference.result import is_streamed, posterior_draws, record_
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps
+from tactile_bayes.record.origin import column_option
 
 __all__ = ["CONTRADICTION", "NOISE_FACTOR", "OFF_ZERO", "doubtful_sides", "verdicts"]
 
@@ -48,6 +49,14 @@ at its end has nothing beyond it."""
 
 _PRIOR_DOMINATED = 0.7
 """Width of the posterior over that of the prior above which the record is reported as uninformative."""
+
+_COLUMN_OF_ZERO = {
+    "moment_bias": "holding_moment",
+    "force_x_bias": "force_x",
+    "force_y_bias": "force_y",
+    "drive_angle_offset": "drive_angle",
+}
+"""Columns whose zero a parameter is."""
 
 _CAUSES = {
     "runs": "whose residuals do not scatter about zero but stay on one side",
@@ -124,7 +133,7 @@ def verdicts(
     noisier = 1.0 if check is None else _neighbours_over_stated(record, check)
     beyond = _beyond_prior(posterior)
     against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
-    against += _beyond_message(beyond)
+    against += _beyond_message(beyond, record, posterior)
     if check is not None and check.attrs["suggestion"]:
         against.append(check.attrs["suggestion"])
     drawn = "particles have lost their places" if is_streamed(posterior.attrs) else "ensembles agree"
@@ -160,7 +169,7 @@ def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
 
 def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
     """Report channels whose unloaded readings differ from what the posterior expects."""
-    off = []
+    off, options = [], []
     for name, of_channel in residuals.items():
         unloaded = found.unloaded.values & ~of_channel.loaded
         uncertainty = float(found.bias_uncertainty.sel(channel=name))
@@ -171,11 +180,13 @@ def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residu
         if abs(means[0]) > OFF_ZERO * error > 0.0:
             unit = _unit(record, name)
             off.append(f"{name} is off by {means[0]:.3g}{unit} ({abs(means[0]) / error:.0f} standard errors)")
+            options.append(column_option(record[name], added=-float(means[0])))
     if not off:
         return []
+    how = f" as they are read ({' '.join(options)})" if all(options) else ""
     return [
         f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? Take it out of "
-        "the readings, or give LoadCell.from_zero_load(record)."
+        f"the readings{how}, or give LoadCell.from_zero_load(record)."
     ]
 
 
@@ -297,13 +308,19 @@ def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
     return said
 
 
-def _beyond_message(beyond: Mapping[str, str]) -> list[str]:
+def _beyond_message(beyond: Mapping[str, str], record: xr.Dataset, posterior: xr.DataTree) -> list[str]:
     if not beyond:
         return []
+    draws = posterior_draws(posterior)
+    zeros = [
+        column_option(record[column], added=-float(draws[name].median()))
+        for name, column in _COLUMN_OF_ZERO.items()
+        if name in beyond
+    ]
+    subtract = f"subtract a zero as its column is read ({' '.join(zeros)}), " if zeros and all(zeros) else ""
     return [
         f"The record contradicts the prior: {', '.join(beyond.values())}. Check the stated rod and drive "
-        "angle, subtract a zero as its column is read (--column 'force_x=NAME+12.5'), or give a wider prior "
-        "(priors=)."
+        f"angle, {subtract}or give a wider prior (priors=)."
     ]
 
 

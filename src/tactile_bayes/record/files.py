@@ -17,7 +17,7 @@ from tactile_bayes.record.bag import is_bag, read_bag_table
 from tactile_bayes.record.construction import completed_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
-from tactile_bayes.record.origin import renamed
+from tactile_bayes.record.origin import ORIGIN, renamed
 from tactile_bayes.record.schema import FRAMES, Frame
 from tactile_bayes.record.sweep_segments import split_at_turns
 from tactile_bayes.record.table import Table
@@ -160,6 +160,9 @@ def record_in(
     record = completed_record(table, rod, missing, load_cell_frame)
     if rod is None and "units" not in table.attrs:
         record.attrs["units_source"] = "assumed"
+    for variable in record.variables.values():
+        if ORIGIN in variable.attrs:
+            variable.encoding[ORIGIN] = variable.attrs.pop(ORIGIN)
     return record
 
 
