@@ -13,6 +13,7 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import family_named
+from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
 from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
@@ -89,8 +90,9 @@ def verdicts(
         the predictions of the posterior (`check_record`); reasons not to rely on the band (`trust`); ensembles that
         have not converged; noise twice as large as stated, or half; loads of a sample that contradict one another;
         nuisance parameters that are nearly impossible under their prior; smooth residuals, which a discrepancy can
-        describe; a check that was not made, with the reason. The last, which are no faults, say that the prior sets the
-        gap, and name parameters that the record hardly determines.
+        describe; parameters that are cut off where the model has no path of the rod; a check that was not made, with
+        the reason. The last, which are no faults, say that the prior sets the gap, and name parameters that the record
+        hardly determines.
 
     Raises
     ------
@@ -134,6 +136,7 @@ def verdicts(
     beyond = _beyond_prior(posterior)
     against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
     against += _beyond_message(beyond, record, posterior)
+    against += _cut_off_message(posterior)
     if check is not None and check.attrs["suggestion"]:
         against.append(check.attrs["suggestion"])
     drawn = "particles have lost their places" if is_streamed(posterior.attrs) else "ensembles agree"
@@ -321,6 +324,26 @@ def _beyond_message(beyond: Mapping[str, str], record: xr.Dataset, posterior: xr
     return [
         f"The record contradicts the prior: {', '.join(beyond.values())}. Check the stated rod and drive "
         f"angle, {subtract}or give a wider prior (priors=)."
+    ]
+
+
+def _cut_off_message(posterior: xr.DataTree) -> list[str]:
+    """Report parameters that are cut off where the model has no equilibria."""
+    cut_off = cut_off_parameters(posterior)
+    if not cut_off:
+        return []
+    draws = posterior_draws(posterior)
+    least_most = {"above": 1.0, "below": 0.0}
+    ends = [f"{name} ({end} {float(draws[name].quantile(least_most[end])):.3g})" for name, end in cut_off.items()]
+    advice = "is the family right, and the rod?"
+    if is_inferred("friction", _inferred(posterior)) or posterior.attrs.get("friction", 0.0):
+        advice = (
+            "friction excludes states in which the contact would stick, which is not modelled. Infer it without "
+            "friction (friction=0.0, on the command line --friction 0) and compare."
+        )
+    return [
+        f"The posterior is CUT OFF where the model has no path of the rod, not by the record: {', '.join(ends)}. "
+        f"Intervals are too narrow on that side: {advice}"
     ]
 
 

@@ -199,11 +199,10 @@ def renamed(table: Table, columns: Mapping[str, str]) -> Table:
         cells[other] = (values, attrs if other == name else {"long_name": name, **attrs})
     for target, origin in origins.items():
         if origin.column is None:
-            unit = {} if origin.unit is None else {"units": origin.unit}
-            cells[target] = (np.full(table.samples, origin.value), unit)
+            cells[target] = (np.full(table.samples, origin.value), {"units": origin.unit} if origin.unit else {})
         else:
-            found = _cells(target, origin, table.columns[origin.column], used[origin.column] > 1, source)
-            cells[target] = found[0], {**found[1], ORIGIN: _of_file(origin, found[1].get("units"))}
+            values, attrs = _cells(target, origin, table.columns[origin.column], used[origin.column] > 1, source)
+            cells[target] = values, {**attrs, ORIGIN: _of_file(origin, attrs.get("units"))}
     return Table(cells, table.attrs, source)
 
 

@@ -94,9 +94,13 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 f"{sweep} the unloaded rod would cut the contour from the beginning: begin the drive clear of it"
             )
         case Reachability.STICKS:
+            free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)
+            is_free = Reachability(int(free.reach[0])) is Reachability.TOUCHES
+            less = "none, with which the rod has a path (friction=0.0, on the command line --friction 0)"
             raise ReachError(
                 f"{sweep} friction would hold the contact at {_point(paths)}, where the rod would have to slide the "
-                "other way, and sticking is not modelled: take another heading or drive angle, or less friction"
+                "other way, and sticking is not modelled: take another heading or drive angle, less friction"
+                + (f", or {less}" if is_free else "")
             )
         case Reachability.TOO_FAR:
             raise ReachError(

@@ -439,3 +439,35 @@ def test_steps_are_uneven_where_few_differ_only():
     assert np.flatnonzero(uneven_steps(angle, np.arange(31), 1)).tolist() == [10]
     adaptive = np.cumsum(np.r_[0.0, np.tile([0.02, 0.02, 0.05], 10)])
     assert not uneven_steps(adaptive, np.arange(31), 1).any()
+
+
+def held(record, readings, between=0.0):
+    """That record with several readings at each angle, whose noise has a part that is the same for all of them."""
+    rng = np.random.default_rng(9)
+    count = record.sizes["sample"]
+    again = bare(LOAD_CELL.measure(record.isel(sample=np.repeat(np.arange(count), readings)), seed=2))
+    common = {
+        name: again[name] + np.repeat(between * again_noise * rng.standard_normal(count), readings)
+        for name, again_noise in LOAD_CELL.standard_deviations.items()
+    }
+    angle = again.drive_angle + 3e-4 * rng.standard_normal(again.sizes["sample"])
+    return changed(again, drive_angle=angle, **common)
+
+
+def test_a_drive_that_stops_to_measure_raises_no_alarm(ideal):
+    found = tb.inspect_record(held(ideal, 10))
+    assert found.messages == NOTHING
+    assert np.degrees(found.sweeps.drive_step.values) == pytest.approx([1.0, 1.0], abs=0.02)
+    np.testing.assert_array_equal(found.sweeps.positions, found.sweeps.samples / 10)
+    lost = held(ideal, 10).isel(sample=np.delete(np.arange(10 * ideal.sizes["sample"]), slice(400, 420)))
+    (sentence,) = words(lost)
+    assert sentence.startswith("1 step of the drive differs from the others (sample 400)")
+
+
+def test_noise_between_positions_that_readings_do_not_explain_is_named(ideal):
+    found = tb.inspect_record(held(ideal, 20, between=1.0))
+    (sentence,) = found.messages
+    assert sentence.startswith("The noise is not white: ")
+    assert all(name in sentence for name in tb.LoadCell().standard_deviations)
+    between = found.channels.position_noise.values / np.array([0.25e-3, 3e-3, 3e-3])
+    assert between == pytest.approx(np.sqrt(1.05) * np.ones(3), rel=0.35)
