@@ -373,3 +373,64 @@ def test_samples_of_sweeps_may_be_mixed():
     found, mixed = zero_load(measured), zero_load(measured.isel(sample=order))
     np.testing.assert_array_equal(mixed.unloaded, found.unloaded.values[order])
     np.testing.assert_array_equal(order[mixed.snap_off], found.snap_off)
+
+
+# --- Drives that stop, and sweeps without an unloaded sample --------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def steps():
+    """What an ideal cell reads at angles 3° apart."""
+    return scan(paper_profile("II", q=0.5), drive_step=np.radians(3.0)).record
+
+
+def stopped(record, readings, between, seed):
+    """A record with several readings at each angle, and noise of some deviations that is the same for all of them."""
+    rng, cell = np.random.default_rng(seed), LoadCell(force_noise=0.05, moment_noise=0.02)
+    held = record.isel(sample=np.repeat(np.arange(record.sizes["sample"]), readings))
+    measured = cell.measure(held, seed=rng)
+    deviations = between * np.array(list(cell.standard_deviations.values()))
+    common = np.repeat(rng.standard_normal((record.sizes["sample"], 3)) * deviations, readings, axis=0)
+    angle = measured.drive_angle + 1e-3 * rng.standard_normal(measured.sizes["sample"])
+    channels = {name: measured[name] + common[:, i] for i, name in enumerate(CHANNELS)}
+    return measured.assign(drive_angle=angle.assign_attrs(units="rad"), **channels)
+
+
+@pytest.mark.parametrize("between", [0.0, 1.0, 2.0])
+@pytest.mark.parametrize("readings", [5, 20, 100])
+def test_noise_that_is_the_same_at_one_angle_is_no_load(steps, readings, between):
+    measured = stopped(steps, readings, between, seed=readings)
+    found = zero_load(measured)
+    assert found.contact.all()
+    assert (found.onset.sel(side="before") >= 0).all()
+    assert (found.snap_off.sel(side="after") >= 0).all()
+    is_loaded = measured.truth_contact_phase.values != "none"
+    unloaded = found.unloaded.values
+    assert not np.any(unloaded & is_loaded)
+    assert unloaded.sum() > 0.6 * (~is_loaded).sum()
+    noise = np.array([0.02, 0.05, 0.05]) * np.hypot(1.0, between)
+    np.testing.assert_allclose(found.noise, noise, rtol=0.35)
+    assert (np.abs(found.bias) < 5.0 * found.bias_uncertainty).all()
+
+
+@pytest.mark.parametrize("part", ["first", "middle", "last"])
+@pytest.mark.parametrize("samples", [10, 15, 30])
+def test_a_sweep_of_loaded_samples_alone_is_in_contact(steps, samples, part):
+    loaded = np.flatnonzero((steps.truth_contact_phase.values != "none") & (steps.sweep.values == 0))
+    begin = {"first": 0, "middle": (loaded.size - samples) // 2, "last": loaded.size - samples}[part]
+    cropped = steps.isel(sample=loaded[begin : begin + samples])
+    found = zero_load(LoadCell(force_noise=0.02, moment_noise=0.008).measure(cropped, seed=1))
+    assert found.contact.all()
+    assert not found.unloaded.any()
+
+
+def test_a_drift_is_hardly_ever_contact():
+    """Drifts by four deviations of the noise, of which the test of the ends alone finds one in a hundred."""
+    rng = np.random.default_rng(4)
+    found = {0.0: 0, 4.0: 0}
+    for drift in found:
+        for _ in range(200):
+            readings = rng.standard_normal((15, 3)) + drift * np.linspace(0.0, 1.0, 15)[:, None]
+            found[drift] += contact_bounds(readings, 1e-3, np.zeros(3)).found
+    assert found[0.0] == 0
+    assert found[4.0] <= 6

@@ -1,6 +1,7 @@
 """Columns of a rig: names, units, signs and zeros of its own."""
 
 import re
+import shlex
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError, RecordError, RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import make_record, read_record, rod_of, write_record
-from tactile_bayes.record.origin import Origin, origins_of
+from tactile_bayes.record import make_record, read_record, rod_of, to_dimensionless, write_record
+from tactile_bayes.record.origin import Origin, column_option, origins_of
 from tactile_bayes.record.table import Source
 
 
@@ -435,3 +436,35 @@ def test_a_unit_in_the_header_and_another_one_given_contradict_each_other(tmp_pa
     read_record(path, columns={**NAMED, "force_y": "Fy"}, rod=WIRE)
     with refused(RecordError, "line 1, column 'force_y' ('Fy' in the file) is in [mN], but [N] is given for it"):
         read_record(path, columns={**NAMED, "force_y": "Fy[N]"}, rod=WIRE)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("added", [0.0, 0.0182, -0.5])
+@pytest.mark.parametrize("given", ["Fx[mN]", "-Fx[mN]", "12.5-Fx[mN]", "Fx[mN]-0.125"])
+def test_an_option_reads_a_column_with_another_sign_and_zero(tmp_path, given, added, sense):
+    path = tmp_path / "lab.csv"
+    path.write_text("sweep,direction,drive_angle,Fx\n0,forward,1.2,18.25\n0,forward,1.3,-7.5\n")
+
+    def read(text):
+        channels = ("holding_moment", "force_y")
+        return read_record(path, columns={"force_x": text}, rod=Rod(0.1, 1.2e-5), missing=channels)["force_x"]
+
+    first = read(given)
+    option, text = shlex.split(column_option(first, sense=sense, added=added))
+    assert option == "--column"
+    np.testing.assert_allclose(read(text.removeprefix("force_x=")), sense * first + added, rtol=1e-12, atol=1e-15)
+
+
+def test_without_a_file_an_option_has_the_name_of_the_record():
+    assert (
+        column_option(xr.DataArray([0.0], name="force_x", attrs={"units": "1"}), sense=-1)
+        == "--column force_x=-force_x"
+    )
+
+
+def test_there_is_no_option_after_a_conversion_by_the_rod(tmp_path):
+    path = tmp_path / "lab.csv"
+    path.write_text("sweep,direction,drive_angle,Fx\n0,forward,1.2,18.25\n")
+    missing = ("holding_moment", "force_y")
+    record = read_record(path, columns={"force_x": "Fx[mN]"}, rod=Rod(0.1, 1.2e-5), missing=missing)
+    assert column_option(to_dimensionless(record)["force_x"], added=1.0) == ""

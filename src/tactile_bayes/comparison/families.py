@@ -36,6 +36,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import record_hash, rod_of
+from tactile_bayes.uncertainty.rod_reach import reach_attributes
 
 __all__ = ["GIVEN_UP", "SHAPES", "checked_families", "compare_families"]
 
@@ -157,7 +158,7 @@ def compare_families(
 
         `log_density` (family, sample) holds the leave-one-out log-densities. Attributes: `verdict`, a sentence;
         `most_probable`; `none_fits` (1 if no family passes the check); `nuisances`, those inferred (JSON); `friction`
-        as stated; `data_sha256` of the record.
+        as stated; `data_sha256` of the record; `reach_left` and `reach_right`, the ends of what the rod can touch.
 
     Raises
     ------
@@ -229,7 +230,9 @@ def compare_families(
         tried[name] = _Tried(ceiling, found.draws, evidence, predicted, p_value, passed)
     asked = {name: problem.about[name] for name in ("nuisances", "friction")}
     comparison = _labelled({name: tried[name] for name in names}, asked)
-    return comparison.assign_attrs(data_sha256=record_hash(experiment.record), units=experiment.record.attrs["units"])
+    record = experiment.record
+    about = {"data_sha256": record_hash(record), "units": record.attrs["units"], **reach_attributes(record)}
+    return comparison.assign_attrs(about)
 
 
 def _ceiling(model: ContourModel, walk: Walk) -> float:

@@ -21,7 +21,7 @@ def verdict_on(result: xr.Dataset) -> str:
     """Return the verdict on a comparison of families, from the result of `compare_families`."""
     names = [str(name) for name in result.family.values]
     fits, checked = result.fits.values, np.isfinite(result.p_value.values)
-    if result.attrs["none_fits"]:
+    if checked.any() and not fits.any():
         return f"{NONE_FITS} ({', '.join(names)}). Probabilities say which of them is the least wrong. " + what_to_try(
             names, read_json(result.attrs["nuisances"], "nuisances"), friction=result.attrs["friction"]
         )

@@ -13,6 +13,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_optional, refused
 from tactile_bayes.contours.families import family_named
+from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
 from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
@@ -22,6 +23,7 @@ from tactile_bayes.inference.result import contour_draws, is_streamed, posterior
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps
+from tactile_bayes.record.origin import column_option
 from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["CONTRADICTION", "NOISE_FACTOR", "OFF_ZERO", "doubtful_sides", "verdicts"]
@@ -49,6 +51,14 @@ at its end has nothing beyond it."""
 
 _PRIOR_DOMINATED = 0.7
 """Width of the posterior over that of the prior above which the record is reported as uninformative."""
+
+_COLUMN_OF_ZERO = {
+    "moment_bias": "holding_moment",
+    "force_x_bias": "force_x",
+    "force_y_bias": "force_y",
+    "drive_angle_offset": "drive_angle",
+}
+"""Columns whose zero a parameter is."""
 
 _CAUSES = {
     "runs": "whose residuals do not scatter about zero but stay on one side",
@@ -81,8 +91,9 @@ def verdicts(
         the predictions of the posterior (`check_record`); reasons not to rely on the band (`trust`); ensembles that
         have not converged; noise twice as large as stated, or half; loads of a sample that contradict one another;
         nuisance parameters that are nearly impossible under their prior; smooth residuals, which a discrepancy can
-        describe; a check that was not made, with the reason. The last, which are no faults, say that the prior sets the
-        gap, and name parameters that the record hardly determines.
+        describe; parameters that are cut off where the model has no path of the rod; a check that was not made, with
+        the reason. The last, which are no faults, say that the prior sets the gap, and name parameters that the record
+        hardly determines.
 
     Raises
     ------
@@ -129,7 +140,8 @@ def verdicts(
     noisier = 1.0 if check is None else _neighbours_over_stated(record, check)
     beyond = _beyond_prior(posterior)
     against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
-    against += _beyond_message(beyond)
+    against += _beyond_message(beyond, record, posterior)
+    against += _cut_off_message(posterior)
     if check is not None and check.attrs["suggestion"]:
         against.append(check.attrs["suggestion"])
     drawn = "particles have lost their places" if is_streamed(posterior.attrs) else "ensembles agree"
@@ -165,7 +177,7 @@ def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
 
 def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
     """Report channels whose unloaded readings differ from what the posterior expects."""
-    off = []
+    off, options = [], []
     for name, of_channel in residuals.items():
         unloaded = found.unloaded.values & ~of_channel.loaded
         uncertainty = float(found.bias_uncertainty.sel(channel=name))
@@ -176,11 +188,13 @@ def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residu
         if abs(means[0]) > OFF_ZERO * error > 0.0:
             unit = _unit(record, name)
             off.append(f"{name} is off by {means[0]:.3g}{unit} ({abs(means[0]) / error:.0f} standard errors)")
+            options.append(column_option(record[name], added=-float(means[0])))
     if not off:
         return []
+    how = f" as they are read ({' '.join(options)})" if all(options) else ""
     return [
         f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? Take it out of "
-        "the readings, or give LoadCell.from_zero_load(record)."
+        f"the readings{how}, or give LoadCell.from_zero_load(record)."
     ]
 
 
@@ -302,13 +316,39 @@ def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
     return said
 
 
-def _beyond_message(beyond: Mapping[str, str]) -> list[str]:
+def _beyond_message(beyond: Mapping[str, str], record: xr.Dataset, posterior: xr.DataTree) -> list[str]:
     if not beyond:
         return []
+    draws = posterior_draws(posterior)
+    zeros = [
+        column_option(record[column], added=-float(draws[name].median()))
+        for name, column in _COLUMN_OF_ZERO.items()
+        if name in beyond
+    ]
+    subtract = f"subtract a zero as its column is read ({' '.join(zeros)}), " if zeros and all(zeros) else ""
     return [
         f"The record contradicts the prior: {', '.join(beyond.values())}. Check the stated rod and drive "
-        "angle, subtract a zero as its column is read (--column 'force_x=NAME+12.5'), or give a wider prior "
-        "(priors=)."
+        f"angle, {subtract}or give a wider prior (priors=)."
+    ]
+
+
+def _cut_off_message(posterior: xr.DataTree) -> list[str]:
+    """Report parameters that are cut off where the model has no equilibria."""
+    cut_off = cut_off_parameters(posterior)
+    if not cut_off:
+        return []
+    draws = posterior_draws(posterior)
+    least_most = {"above": 1.0, "below": 0.0}
+    ends = [f"{name} ({end} {float(draws[name].quantile(least_most[end])):.3g})" for name, end in cut_off.items()]
+    advice = "is the family right, and the rod?"
+    if is_inferred("friction", _inferred(posterior)) or posterior.attrs.get("friction", 0.0):
+        advice = (
+            "friction excludes states in which the contact would stick, which is not modelled. Infer it without "
+            "friction (friction=0.0, on the command line --friction 0) and compare."
+        )
+    return [
+        f"The posterior is CUT OFF where the model has no path of the rod, not by the record: {', '.join(ends)}. "
+        f"Intervals are too narrow on that side: {advice}"
     ]
 
 

@@ -17,6 +17,7 @@ from tactile_bayes.inference.result import sample_stats
 from tactile_bayes.load_cell.discrepancy import Discrepancy, joined
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels
+from tactile_bayes.record.origin import with_origin
 
 __all__ = ["FEWEST_PREDICTIONS", "drawn_groups", "predicted_groups", "prior_draws", "unit_of"]
 
@@ -40,12 +41,12 @@ _BY_SAMPLE = ("chain", "draw", "sample")
 
 def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
     """Return the groups that are known when sampling ends: draws, statistics of the ensembles, and the record."""
-    observed = {name: model.measured[name] for name in CHANNELS}
+    record = model.measured.assign({name: with_origin(model.measured[name]) for name in (*CHANNELS, "drive_angle")})
     return {
         "posterior": _labelled(model, draws.samples, np.arange(draws.samples.shape[1])),
         "sample_stats": sample_stats(draws),
-        "observed_data": xr.Dataset(observed),
-        "constant_data": model.measured.drop_vars(CHANNELS).drop_attrs(deep=False),
+        "observed_data": xr.Dataset({name: record[name] for name in CHANNELS}),
+        "constant_data": record.drop_vars(CHANNELS).drop_attrs(deep=False),
     }
 
 

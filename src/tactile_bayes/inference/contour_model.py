@@ -69,6 +69,8 @@ class ContourModel:
     low, high : ndarray, shape (d,)
         Bounds of the parameters, whatever the priors.
     likelihood : RecordLikelihood
+    rubs : bool
+        Whether there may be friction.
     found : xr.Dataset
         Zero and noise of the unloaded samples, from `zero_load`.
     zero, deviation : ndarray, shape (3,)
@@ -100,9 +102,9 @@ class ContourModel:
         of_path = (*family.parameters, *nuisances.of_path)
         self.of_path = [i for i, name in enumerate(self.forward_parameters) if name in of_path]
         self._jointly = [self.names.index(name) for name in nuisances.joint.priors] if nuisances.joint else []
-        rubs = bool(nuisances.friction) or "friction" in nuisances.names
+        self.rubs = bool(nuisances.friction) or "friction" in nuisances.names
         self.likelihood = RecordLikelihood(
-            measured, noise.cell.straight, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
+            measured, noise.cell.straight, nuisances.friction, is_always_clear=family.is_always_clear and not self.rubs
         )
         if noise.of_discrepancy and self.likelihood.encoder.count > 1:
             raise ParameterError(
@@ -315,14 +317,23 @@ class ContourModel:
         ReachError
             If none of many draws is within reach.
         """
-        found, drawn = [np.empty((0, len(self.names)))], 0
+        found, drawn, without_friction = [np.empty((0, len(self.names)))], 0, 0
         most = max(_MOST_TRIALS * count, _FEWEST_TRIALS)
         while (had := sum(map(len, found))) < count and drawn < most:
             if had and deadline.has_passed:
                 break
-            found.append(self._within_reach(self.prior_points(rng, count)))
+            tried = self.prior_points(rng, count)
+            found.append(self._within_reach(tried))
             drawn += count
+            if self.rubs and not len(found[-1]) and not without_friction:
+                without_friction = len(self._within_reach(tried, friction=False))
         points = np.concatenate(found)
+        if not len(points) and without_friction:
+            raise ReachError(
+                f"with friction the rod has no path along any of {drawn} contours from the prior in every sweep, but "
+                f"without friction it has along {without_friction} of {count}: the contact would stick, which is not "
+                "modelled. Infer without friction (friction=0.0, on the command line --friction 0)"
+            )
         if not len(points):
             raise ReachError(
                 f"the rod reaches none of {drawn} contours from the prior in every sweep: check base, rod length and "
@@ -336,10 +347,13 @@ class ContourModel:
         """Return the share of so many draws of `prior_points` that are within reach, at least 1/count."""
         return max(len(self._within_reach(self.prior_points(rng, count, others))), 1) / count
 
-    def _within_reach(self, points: Floats) -> Floats:
+    def _within_reach(self, points: Floats, friction: bool = True) -> Floats:
         """Return those of the points, (n, d), of which the rod reaches the contour in every sweep."""
         points = points[self.within_bounds(points)]
-        return points[self.likelihood.usable(self.contours(points), self.rig(points))] if len(points) else points
+        if not len(points):
+            return points
+        rig = self.rig(points)
+        return points[self.likelihood.usable(self.contours(points), rig if friction else rig._replace(friction=0.0))]
 
     def _zero_load(self) -> xr.Dataset:
         with warnings.catch_warnings():

@@ -8,14 +8,14 @@ import numpy as np
 from scipy.special import betainc, betaln, fdtrc, fdtri, stdtrit
 
 from tactile_bayes.arrays import Flags, Floats
-from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, rough_noise
+from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
 __all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
 
 FEWEST = 3
 """Least number of samples for an estimate of bias and noise."""
 
-_FIRM = 10.0
+_FIRM = 20.0
 """Range of a smooth course of the readings, in standard deviations of the noise between neighbours, from which it is
 a load whatever the zero: less may be a drift."""
 
@@ -140,7 +140,7 @@ def _course(readings: Floats, floor: Floats) -> float:
     total = ((readings - readings.mean(axis=0)) ** 2).sum(axis=0)
     parts = root @ (root.T @ readings)
     rest = np.maximum(((readings - parts) ** 2).sum(axis=0), np.maximum(floor * n, 1e-14 * total + _TINY))
-    noise = np.array([rough_noise(column) for column in readings.T])
+    noise = np.sqrt(np.mean(np.diff(readings, n=2, axis=0) ** 2, axis=0) / 6.0)  # of white noise on a smooth course
     firm = np.ptp(parts, axis=0) > _FIRM * np.sqrt(np.maximum(noise**2, floor)) + _TINY
     if not firm.any():
         return 1.0

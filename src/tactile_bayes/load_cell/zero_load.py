@@ -121,7 +121,7 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     noise is that of single readings.
 
     *Cropped sweeps.* A sweep of loaded samples alone has no ends to compare with: its contact is significant where a
-    parabola fits the readings (an F-test) and spans ten standard deviations of the noise between neighbours.
+    parabola fits the readings (an F-test) and spans twenty standard deviations of the noise between neighbours.
 
     *Limits.* A load that is constant throughout a sweep counts as a bias. The warning reports a zero that moves during
     contact (2 σ in 7 of 10 sweeps, 15 samples on either side); but a change by more than about a sixth of the largest

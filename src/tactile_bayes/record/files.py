@@ -18,7 +18,7 @@ from tactile_bayes.record.bag import is_bag, read_bag_table
 from tactile_bayes.record.construction import completed_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
-from tactile_bayes.record.origin import renamed
+from tactile_bayes.record.origin import ORIGIN, renamed
 from tactile_bayes.record.schema import FRAMES, Frame
 from tactile_bayes.record.sweep_segments import split_at_turns
 from tactile_bayes.record.table import Table
@@ -188,6 +188,9 @@ def record_in(
     if record.attrs["units"] == "SI" and not is_bag(Path(table.source.name)):  # messages of ROS are SI
         notes.append(assumed_units(table))
     record.encoding = {"notes": [note for note in notes if note], "remarks": [*table.source.remarks]}
+    for variable in record.variables.values():
+        if ORIGIN in variable.attrs:
+            variable.encoding[ORIGIN] = variable.attrs.pop(ORIGIN)
     return record
 
 

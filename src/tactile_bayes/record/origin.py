@@ -2,22 +2,41 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.parsing import parsed_column
-from tactile_bayes.record.quantity import OTHER_UNITS, accepted_units, unit_of, units_disagree
+from tactile_bayes.record.quantity import OTHER_UNITS, accepted_units, converted, unit_of, units_disagree
 from tactile_bayes.record.schema import COLUMNS, DIRECTIONS, MEASURED, Column, Kind, column_of
 from tactile_bayes.record.spelling import look_alikes, nearest, plain
 from tactile_bayes.record.storable import storable
 from tactile_bayes.record.table import Cells, Source, Table
 
-__all__ = ["Origin", "any_meant", "found_column", "meant_kinds", "origins_of", "renamed"]
+__all__ = [
+    "ORIGIN",
+    "Origin",
+    "any_meant",
+    "column_option",
+    "found_column",
+    "meant_kinds",
+    "origins_of",
+    "renamed",
+    "with_origin",
+]
+
+ORIGIN = "origin_in_file"
+"""Name of the origin of a column as text: an attribute of tables and results, and an encoding of a record, which is not
+written with it."""
 
 CONSTANTS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 """Columns for which a single value can be given."""
@@ -62,6 +81,50 @@ class Origin:
             return str(self.value)
         sign = "-" if self.sign < 0 else "+" if self.offset else ""
         return f"{f'{self.offset:.15g}' if self.offset else ''}{sign}{self.column}"
+
+
+def column_option(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, digits: int = 3) -> str:
+    """Return the option of a command that reads a column of a record as sense · (its values) + added.
+
+    Parameters
+    ----------
+    column : xr.DataArray
+        Column of the record; if it was not read from a file, its name in the file is the same, and its unit too.
+    sense : {1, -1}
+    added : float
+        In the unit of the record.
+    digits : int
+        Number of significant digits of what is added.
+
+    Returns
+    -------
+    str
+        Quoted for a shell; "" if the origin does not have the unit of the record, as after a conversion by the rod.
+
+    Examples
+    --------
+    >>> column_option(xr.DataArray([0.0], name="force_y", attrs={"units": "N"}), added=0.01824)
+    '--column force_y=force_y+0.0182'
+    """
+    name, unit = str(column.name), str(column.attrs.get("units", "1"))
+    stored = column.encoding.get(ORIGIN) or column.attrs.get(ORIGIN)
+    origin = Origin(**json.loads(stored)) if stored else Origin(name, unit)
+    of_file, of_record = unit_of(origin.unit or unit), unit_of(unit)
+    if of_file is None or of_record is None or of_file.dimension != of_record.dimension or origin.column is None:
+        return ""
+    number = float(converted(added, of_record, of_file))
+    if number:
+        number = round(number, digits - 1 - math.floor(math.log10(abs(number))))
+    read = replace(origin, sign=sense * origin.sign, offset=sense * origin.offset + number)
+    trailing = read.sign > 0 and read.offset
+    text = f"{read.column}{read.offset:+.12g}" if trailing else str(replace(read, offset=round(read.offset, 12)))
+    return f"--column {shlex.quote(f'{name}={text}')}"
+
+
+def with_origin(column: xr.DataArray) -> xr.DataArray:
+    """Return a column of a record with its origin in the file as an attribute, which is written with it."""
+    stored = column.encoding.get(ORIGIN)
+    return column if stored is None else column.assign_attrs({ORIGIN: stored})
 
 
 def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source) -> dict[str, Origin]:
@@ -140,14 +203,25 @@ def renamed(table: Table, columns: Mapping[str, str]) -> Table:
     cells: dict[str, Cells] = {}
     for name, other in called.items():
         values, attrs = table.columns[name]
+        unit = unit_of(str(attrs.get("units", ""))) if name in MEASURED else None
+        if unit is not None and unit.scale != 1:  # it is converted
+            attrs = {**attrs, ORIGIN: json.dumps(asdict(Origin(name, str(attrs["units"]))))}
         cells[other] = (values, attrs if other == name else {"long_name": name, **attrs})
     for target, origin in origins.items():
         if origin.column is None:
-            unit = {} if origin.unit is None else {"units": origin.unit}
-            cells[target] = (np.full(table.samples, origin.value), unit)
+            cells[target] = (np.full(table.samples, origin.value), {"units": origin.unit} if origin.unit else {})
         else:
-            cells[target] = _cells(target, origin, table.columns[origin.column], used[origin.column] > 1, source)
+            values, attrs = _cells(target, origin, table.columns[origin.column], used[origin.column] > 1, source)
+            cells[target] = values, {**attrs, ORIGIN: _of_file(origin, attrs.get("units"))}
     return Table(cells, table.attrs, source)
+
+
+def _of_file(origin: Origin, unit: Any) -> str:
+    """Return an origin as text for an attribute, with the unit of the file, and as a name that `read_record` takes."""
+    assert origin.column is not None
+    is_stated = origin.unit is None or _stem_and_unit(origin.column)[1] is not None
+    column = origin.column if is_stated else f"{origin.column}[{origin.unit}]"
+    return json.dumps(asdict(replace(origin, column=column, unit=unit)))
 
 
 def _cells(target: str, origin: Origin, found: Cells, is_shared: bool, source: Source) -> Cells:

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.record.attributes import checked_attributes, stated_frame
+from tactile_bayes.record.origin import ORIGIN
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, column_of, same_unit
 from tactile_bayes.record.spelling import nearest
@@ -65,6 +66,9 @@ def validate(record: xr.Dataset) -> xr.Dataset:
         hint = "take its record" if hasattr(record, "record") else "build one with make_record"
         raise source.error(f"a record is an xarray.Dataset, not a {type(record).__name__}: {hint}")
     checked = checked_record(table_of(record, source))
+    for name in set(record.variables) & set(checked.variables):
+        if ORIGIN in record[name].encoding:
+            checked[name].encoding[ORIGIN] = record[name].encoding[ORIGIN]
     return checked.set_coords([name for name in record.coords if name in checked.data_vars])
 
 

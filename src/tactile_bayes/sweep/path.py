@@ -29,12 +29,13 @@ _SAME = 1e-9
 """Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: its side
 is then the one to which it is turned less."""
 _SLIDING = (
-    "without friction (friction=0) it slides either way; with friction, split a drive that turns back while the rod is "
-    "in contact into drives that go one way, or take another heading or drive angle",
-    "without friction (friction=0) it slides either way; with friction, take a rod that is less curved toward the "
-    "object, the other direction, or another pivot",
+    "split a drive that turns back while the rod is in contact into drives that go one way, or take another heading or "
+    "drive angle",
+    "take a rod that is less curved toward the object, the other direction, or another pivot",
 )
 """What to do where friction would hold a rod that is carried, and one that turns about a pivot."""
+
+_FREE = "without friction the rod has a path (friction=0.0, on the command line --friction 0); with it, "
 
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
 """Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
@@ -123,10 +124,13 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 f"{sweep} the unloaded rod would cut the contour from the beginning: begin the drive clear of it"
             )
         case Reachability.STICKS:
+            free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)
+            is_free = Reachability(int(free.reach[0])) is Reachability.TOUCHES
             raise ReachError(
                 f"{sweep} friction would hold the contact at {_point(paths)}: the rod would have to slide the other "
                 "way there, or would not slide at first, and sticking is not modelled; "
-                f"{_SLIDING[paths.lines is None]}"
+                + (_FREE if is_free else "")
+                + _SLIDING[paths.lines is None]
             )
         case Reachability.TOO_FAR:
             raise ReachError(

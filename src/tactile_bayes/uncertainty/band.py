@@ -19,6 +19,7 @@ from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.uncertainty.averaged_contours import averaged_heights, family_weights
 from tactile_bayes.uncertainty.quantiles import quantile_band
+from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
 
 __all__ = ["contour_band", "contour_heights", "contours_drawn", "grid_points", "length_unit"]
 
@@ -49,8 +50,9 @@ def contour_band(
     Returns
     -------
     xr.Dataset
-        Over "x": lower, upper, median [length]; share_reaching, the share of contours that extend to x; status, "ok"
-        or the reason why the band is NaN. An average has the attributes averaged_by, "evidence" or "stacking", and
+        Over "x": lower, upper, median [length]; share_reaching, the share of contours that extend to x; status, "ok",
+        "beyond the reach of the rod", where family and prior alone continue the contour, or the reason why the band is
+        NaN. An average has the attributes averaged_by, "evidence" or "stacking", and
         weights, of the families (JSON).
 
     Raises
@@ -84,7 +86,11 @@ def contour_band(
         heights = contour_heights(cast(xr.DataTree, posterior), at)  # which refuses other datasets
     share = np.isfinite(heights).mean(axis=0)
     lower, median, upper = quantile_band(heights, probability, simultaneous)
-    status = np.select([share == 1.0, share > 0.0], ["ok", "some contours end before"], "all contours end before")
+    status = np.select(
+        [(share == 1.0) & beyond_reach(posterior, at), share == 1.0, share > 0.0],
+        [BEYOND_REACH, "ok", "some contours end before"],
+        "all contours end before",
+    )
     unit = length_unit(posterior)
     return xr.Dataset(
         {

@@ -12,6 +12,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.roots import bound_ends, falling_root
 from tactile_bayes.uncertainty.band import contours_drawn, grid_points, length_unit
 from tactile_bayes.uncertainty.quantiles import quantile_band
+from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
 
 __all__ = ["normal_band", "normal_offsets"]
 
@@ -58,7 +59,8 @@ def normal_band(
     xr.Dataset
         Over "x": y and slope_angle of the reference; lower, median and upper, the signed distances of contours from it
         [length], positive into the object; both edges as points, lower_x, lower_y, upper_x, upper_y [length];
-        share_reaching, the share of contours that the normal meets; status, "ok" or the reason why the band is NaN.
+        share_reaching, the share of contours that the normal meets; status, "ok", "beyond the reach of the
+        rod", where family and prior alone continue the contour, or the reason why the band is NaN.
 
     Raises
     ------
@@ -96,8 +98,8 @@ def normal_band(
         "upper_y": locus.y + upper * cos,
     }
     status = np.select(
-        [np.isnan(locus.y), share == 1.0, share > 0.0],
-        ["the reference ends before", "ok", "some contours end before the normal"],
+        [np.isnan(locus.y), (share == 1.0) & beyond_reach(posterior, at), share == 1.0, share > 0.0],
+        ["the reference ends before", BEYOND_REACH, "ok", "some contours end before the normal"],
         "all contours end before the normal",
     )
     return xr.Dataset(

@@ -1,5 +1,7 @@
 """The inspection of a record: nothing is said of a good one, and what is wrong is named."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,8 @@ from tactile_bayes.record import rows_of_sweeps
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 
 COARSE = np.radians(12.0)
+OTHER_FORCE_X = "force_x had the other sign (--column force_x=-force_x)."
+OTHER_MOMENT = "holding_moment had the other sign (--column holding_moment=-holding_moment)"
 NOTHING = ("Nothing looks wrong.",)
 FAINT = ((0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2))
 """Gain beside which the noise of loads is five times that of readings."""
@@ -148,7 +152,7 @@ def correction(record):
 
 
 def test_a_wrong_sign_is_named(turned):
-    assert correction_in(turned[0].messages) == "force_x had the other sign."
+    assert correction_in(turned[0].messages) == OTHER_FORCE_X
 
 
 def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
@@ -164,7 +168,7 @@ def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
     measured = cell.measure(tb.scan(CONTOUR, rod=ROD, drive_step=0.5 * COARSE).record, seed=1)
     assert (np.abs(measured.force_y.values) == 0.12).any()
     stated = measured.assign_attrs(load_cell_gain_force_x_force_x=0.2, load_cell_gain_force_x_force_y=-0.01)
-    assert correction(stated) == "force_x had the other sign."
+    assert correction(stated) == OTHER_FORCE_X
 
 
 @pytest.mark.slow
@@ -194,19 +198,19 @@ def counted_otherwise(record, sense, turns, moment=1):
 @pytest.mark.parametrize(
     ("sense", "turns", "moment", "named"),
     [
-        (-1, 1, -1, "90-NAME'), and holding_moment had the other sign."),
-        pytest.param(-1, 1, 1, "90-NAME').", marks=pytest.mark.slow),
-        pytest.param(-1, 0, -1, "-NAME'), and holding_moment had the other sign.", marks=pytest.mark.slow),
-        pytest.param(-1, 2, 1, "180-NAME').", marks=pytest.mark.slow),
-        pytest.param(1, -1, 1, "NAME+90').", marks=pytest.mark.slow),
-        pytest.param(1, 1, 1, "NAME-90').", marks=pytest.mark.slow),
-        pytest.param(1, 2, 1, "NAME+180').", marks=pytest.mark.slow),
+        (-1, 1, -1, f"1.57079632679-drive_angle), and {OTHER_MOMENT}."),
+        pytest.param(-1, 1, 1, "1.57079632679-drive_angle).", marks=pytest.mark.slow),
+        pytest.param(-1, 0, -1, f"-drive_angle), and {OTHER_MOMENT}.", marks=pytest.mark.slow),
+        pytest.param(-1, 2, 1, "3.14159265359-drive_angle).", marks=pytest.mark.slow),
+        pytest.param(1, -1, 1, "drive_angle+1.57079632679).", marks=pytest.mark.slow),
+        pytest.param(1, 1, 1, "drive_angle-1.57079632679).", marks=pytest.mark.slow),
+        pytest.param(1, 2, 1, "drive_angle+3.14159265359).", marks=pytest.mark.slow),
     ],
 )
 def test_a_drive_angle_that_is_counted_otherwise_is_named_first(coarse, sense, turns, moment, named):
     first, *_ = words(counted_otherwise(coarse, sense, turns, moment))
     assert first.split("nearly all would if ")[1] == (
-        f"the drive angle were counted otherwise (in degrees: --column 'drive_angle={named}"
+        f"the drive angle were counted otherwise (--column drive_angle={named}"
     )
 
 
@@ -216,7 +220,7 @@ def test_a_world_in_which_all_fits_but_lies_below_the_pivot_is_told(coarse):
     mirrored = changed(mirrored, force_x=mirrored.force_y, force_y=mirrored.force_x)
     first, *_ = words(mirrored)
     assert "touch something below the pivot, not above: nearly all would touch something above if" in first
-    assert first.endswith("holding_moment had the other sign, and force_x and force_y were exchanged.")
+    assert first.endswith(f"{OTHER_MOMENT}, and force_x and force_y were exchanged.")
 
 
 def test_friction_is_named():
@@ -306,7 +310,34 @@ def test_a_zero_farther_off_than_infer_expects_is_to_be_taken_off(record):
     for load_cell in (None, LOAD_CELL):
         (sentence,) = words(changed(record, force_y=record.force_y.values - 0.03), load_cell=load_cell)
         assert sentence.startswith("Without load the cell reads -29.9 mN of force_y, more than infer expects.")
-        assert "--column 'force_x=NAME+12.5' adds 12.5 in the column's unit" in sentence
+        assert sentence.endswith("--column force_y=force_y+0.0299.")
+
+
+def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
+    """A file of a laboratory, with its own names, units, signs and zeros."""
+    columns = {
+        "drive_angle": "90-Motor[deg]",
+        "holding_moment": "Mz [N mm]",
+        "force_x": "Fx[mN]",
+        "force_y": "2-Fy[mN]",
+    }
+    mm, mn = 1e3 * coarse.holding_moment.values, 1e3 * coarse.force_x.values
+    fy = 2.0 - 1e3 * (coarse.force_y.values - 0.03)
+    table = np.column_stack([90.0 - np.degrees(coarse.drive_angle.values), mm, mn, fy])
+    np.savetxt(tmp_path / "lab.csv", table, delimiter=",", header="Motor,Mz [N mm],Fx,Fy", comments="")
+
+    def read(**own):
+        return tb.read_record(tmp_path / "lab.csv", columns=columns | own, split_sweeps=True, rod=ROD)
+
+    (sentence,) = words(read())
+    (zero,) = re.findall(r"--column 'force_y=(.*?)'", sentence)
+    assert re.fullmatch(r"3[12]\.\d*-Fy\[mN\]", zero)
+    assert words(read(force_y=zero)) == NOTHING
+    assert words(read(force_y=zero, force_x="-Fx[mN]"))[0].endswith(
+        "force_x had the other sign (--column 'force_x=Fx[mN]')."
+    )
+    *_, angle = words(read(force_y=zero, drive_angle="Motor[deg]"))[0].partition("--column ")
+    assert angle.startswith("'drive_angle=90-Motor[deg]'")
 
 
 def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal):
@@ -396,10 +427,10 @@ def test_a_slope_a_kink_and_a_drop_are_no_outliers():
 def test_equal_readings_are_stuck_unless_steps_make_them_so():
     rows = [np.arange(12)]
     reading = np.array([0.1, 0.3, 0.2, 0.2, 0.2, 0.4, 0.1, 0.3, 0.5, 0.2, 0.1, 0.4])
-    assert np.flatnonzero(stuck(reading, rows, 0.0, false_alarm=1e-3)).tolist() == [2, 3, 4]
+    assert np.flatnonzero(stuck(reading, rows, 0.0, 1e3, false_alarm=1e-3)).tolist() == [2, 3, 4]
     chance = repeat_chance(reading, rows, 0.1, 0.1)
     assert chance == pytest.approx(1.0 / (2.0 * np.sqrt(np.pi)))  # of two normal numbers, one step apart at most
-    assert not stuck(reading, rows, chance, false_alarm=1e-3).any()
+    assert not stuck(reading, rows, chance, 1e3, false_alarm=1e-3).any()
 
 
 def test_steps_are_uneven_where_few_differ_only():
@@ -408,3 +439,35 @@ def test_steps_are_uneven_where_few_differ_only():
     assert np.flatnonzero(uneven_steps(angle, np.arange(31), 1)).tolist() == [10]
     adaptive = np.cumsum(np.r_[0.0, np.tile([0.02, 0.02, 0.05], 10)])
     assert not uneven_steps(adaptive, np.arange(31), 1).any()
+
+
+def held(record, readings, between=0.0):
+    """That record with several readings at each angle, whose noise has a part that is the same for all of them."""
+    rng = np.random.default_rng(9)
+    count = record.sizes["sample"]
+    again = bare(LOAD_CELL.measure(record.isel(sample=np.repeat(np.arange(count), readings)), seed=2))
+    common = {
+        name: again[name] + np.repeat(between * again_noise * rng.standard_normal(count), readings)
+        for name, again_noise in LOAD_CELL.standard_deviations.items()
+    }
+    angle = again.drive_angle + 3e-4 * rng.standard_normal(again.sizes["sample"])
+    return changed(again, drive_angle=angle, **common)
+
+
+def test_a_drive_that_stops_to_measure_raises_no_alarm(ideal):
+    found = tb.inspect_record(held(ideal, 10))
+    assert found.messages == NOTHING
+    assert np.degrees(found.sweeps.drive_step.values) == pytest.approx([1.0, 1.0], abs=0.02)
+    np.testing.assert_array_equal(found.sweeps.positions, found.sweeps.samples / 10)
+    lost = held(ideal, 10).isel(sample=np.delete(np.arange(10 * ideal.sizes["sample"]), slice(400, 420)))
+    (sentence,) = words(lost)
+    assert sentence.startswith("1 step of the drive differs from the others (sample 400)")
+
+
+def test_noise_between_positions_that_readings_do_not_explain_is_named(ideal):
+    found = tb.inspect_record(held(ideal, 20, between=1.0))
+    (sentence,) = found.messages
+    assert sentence.startswith("The noise is not white: ")
+    assert all(name in sentence for name in tb.LoadCell().standard_deviations)
+    between = found.channels.position_noise.values / np.array([0.25e-3, 3e-3, 3e-3])
+    assert between == pytest.approx(np.sqrt(1.05) * np.ones(3), rel=0.35)

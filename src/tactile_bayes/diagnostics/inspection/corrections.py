@@ -9,7 +9,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, frame_of
+from tactile_bayes.record.origin import column_option
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 
 __all__ = ["OTHER_ANGLE", "Correction", "as_it_is", "corrections_for"]
@@ -40,14 +41,14 @@ class Correction(NamedTuple):
     """Number of things that are changed."""
 
 
-def corrections_for(frame: Literal["fixed", "turning"], friction: float) -> list[Correction]:
-    """Return all corrections to try, simple ones first, for a record in this frame and with this assumed friction."""
-    other: Literal["fixed", "turning"] = "turning" if frame == "fixed" else "fixed"
+def corrections_for(record: xr.Dataset, friction: float) -> list[Correction]:
+    """Return all corrections to try, simple ones first, for a record with this assumed friction."""
+    other: Literal["fixed", "turning"] = "turning" if frame_of(record) == "fixed" else "fixed"
     simple: list[tuple[str, Transform]] = [
-        ("force_x had the other sign", _with_sign("force_x")),
-        ("force_y had the other sign", _with_sign("force_y")),
-        ("both forces had the other sign", _with_sign("force_x", "force_y")),
-        ("holding_moment had the other sign", _with_sign("holding_moment")),
+        (f"force_x had the other sign{_options(record, 'force_x')}", _with_sign("force_x")),
+        (f"force_y had the other sign{_options(record, 'force_y')}", _with_sign("force_y")),
+        (f"both forces had the other sign{_options(record, 'force_x', 'force_y')}", _with_sign("force_x", "force_y")),
+        (f"holding_moment had the other sign{_options(record, 'holding_moment')}", _with_sign("holding_moment")),
         ("force_x and force_y were exchanged", _exchanged),
         (_FRAME_TEXTS[other], lambda record: record.assign_attrs(load_cell_frame=other)),
     ]
@@ -55,7 +56,13 @@ def corrections_for(frame: Literal["fixed", "turning"], friction: float) -> list
     for coefficient in _FRICTIONS:
         text = f"there were friction of about {coefficient:g} (have infer find it: --nuisance friction)"
         found.append(Correction(text, as_it_is, coefficient))
-    return [*found, *(Correction(text, apply, friction, changes) for text, apply, changes in _angles())]
+    return [*found, *(Correction(text, apply, friction, changes) for text, apply, changes in _angles(record))]
+
+
+def _options(record: xr.Dataset, *names: str, sense: int = -1, added: float = 0.0) -> str:
+    """Return the options that read columns so, in brackets; "" if the record does not know them."""
+    options = [column_option(record[name], sense=sense, added=added, digits=12) for name in names]
+    return f" ({' '.join(options)})" if all(options) else ""
 
 
 def as_it_is(record: xr.Dataset) -> xr.Dataset:
@@ -95,20 +102,15 @@ def _counted(sense: int, turns: float) -> Transform:
     return counted_anew
 
 
-def _angles() -> Iterator[tuple[str, Transform, int]]:
+def _angles(record: xr.Dataset) -> Iterator[tuple[str, Transform, int]]:
     other_moment = _with_sign("holding_moment")
-    for written, sense, turns in (
-        ("90-NAME", -1, 1),
-        ("-NAME", -1, 0),
-        ("180-NAME", -1, 2),
-        ("NAME+90", 1, 1),
-        ("NAME-90", 1, -1),
-        ("NAME+180", 1, 2),
-    ):
-        text, counted = f"{OTHER_ANGLE} (in degrees: --column 'drive_angle={written}')", _counted(sense, turns)
+    moment = f"holding_moment had the other sign{_options(record, 'holding_moment')}"
+    for sense, turns in ((-1, 1), (-1, 0), (-1, 2), (1, 1), (1, -1), (1, 2)):
+        option = _options(record, "drive_angle", sense=sense, added=0.5 * np.pi * turns)
+        text, counted = f"{OTHER_ANGLE}{option}", _counted(sense, turns)
         yield text, counted, 1
         if sense < 0:
-            yield f"{text}, and holding_moment had the other sign", _in_turn(counted, other_moment), 2
+            yield f"{text}, and {moment}", _in_turn(counted, other_moment), 2
         if (sense, turns) == (-1, 1):  # mirrored in the diagonal
-            text += ", holding_moment had the other sign, and force_x and force_y were exchanged"
+            text += f", {moment}, and force_x and force_y were exchanged"
             yield text, _in_turn(counted, other_moment, _exchanged), 3

@@ -13,7 +13,7 @@ from tactile_bayes.diagnostics.inspection.corrections import Correction, as_it_i
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, frame_of
+from tactile_bayes.record import CHANNELS
 
 __all__ = ["Fit", "fit_of"]
 
@@ -79,7 +79,7 @@ def fit_of(
     def share_if(correction: Correction) -> float:
         return sum(_shares(_contacts(_read_by(alone, correction.apply(loads)), alone, correction.friction))[:2])
 
-    corrections = corrections_for(frame_of(loads), friction)
+    corrections = corrections_for(loads, friction)
     progress(0, len(corrections))
     part = share_if(Correction("", as_it_is, friction))
     left = []

@@ -17,6 +17,7 @@ from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.parameters.nuisances import BIAS
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
+from tactile_bayes.record.origin import column_option
 
 __all__ = ["UNFIT", "inspection_messages", "prefix_of", "quantity"]
 
@@ -205,9 +206,11 @@ def _zeros(
     is_stated = source in ("given", "data sheet")
     far = _far_off(record, channels, cell if is_stated else None)
     if far:
+        zeros = {str(row.channel.values): float(row.bias) for row in _rows(channels)}
+        options = [column_option(record[name], added=-zeros[name]) for name in far]
+        how = f"as the column is read: {' '.join(options)}" if all(options) else "from the readings"
         messages.append(
-            f"Without load the cell reads {_and(list(far.values()))}, more than infer expects. Subtract it as the "
-            "column is read: --column 'force_x=NAME+12.5' adds 12.5 in the column's unit."
+            f"Without load the cell reads {_and(list(far.values()))}, more than infer expects. Subtract it {how}."
         )
     if not is_stated or _drifts(cell):
         return messages

@@ -33,11 +33,10 @@ def prior_in_words(prior: Prior) -> str:
     numbers = numbers_of(prior)
     if distribution is None or not numbers:
         return repr(prior)
-    usual = {"loc": 0.0, "scale": 1.0}
-    if numbers.keys() == usual.keys():
+    if numbers.keys() == {"loc", "scale"}:
         written = [f"{value:g}" for value in numbers.values()]
     else:
-        written = [f"{name}={value:g}" for name, value in numbers.items() if value != usual.get(name)]
+        written = [f"{name}={value:g}" for name, value in numbers.items() if name != "loc" or value]
     return f"{distribution.name}({', '.join(written)})"
 
 
