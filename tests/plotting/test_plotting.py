@@ -611,7 +611,7 @@ def test_trace_thins_and_shows_every_chain(posterior):
     assert grid.shape == (5, 2)
     for left, right in grid:
         assert len(left.lines) == len(right.patches) == 4
-        assert all(1000 <= len(line.get_xdata()) <= 2000 for line in left.lines)
+        assert all(250 <= len(line.get_xdata()) <= 500 for line in left.lines)
     assert [ax.get_xlabel() for ax in grid[:, 1]] == [
         "$a$",
         r"$x_{\mathrm{c}}$",
