@@ -324,4 +324,3 @@ def test_inspect_lists_what_was_assumed_and_what_has_no_meaning(rig, tmp_path):
     assert "holding_moment, force_x and force_y: taken as N m, N and N" in units
     said = call("inspect", path, *reading, "-q").stdout
     assert all(line in said for line in (f"reading     {end}", f"reading     {units}", "not used    serial"))
-    assert "warning" in call("reconstruct", path, *reading, "--out", tmp_path / "contacts", "-q").stderr

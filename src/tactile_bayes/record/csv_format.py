@@ -140,7 +140,7 @@ def _with_found_names(header: Header, names: list[str], source: Source) -> Heade
         if found in header.descriptions:
             raise source.line_error(
                 heads[described],
-                f"it describes the column {found!r} as line {heads[found]} does: keep one of the lines",
+                f"it describes the column {found!r}, as line {heads[found]} does: keep one",
             )
         descriptions[found], heads[found] = descriptions.pop(described), heads.pop(described)
     return replace(header, descriptions=descriptions, heads=heads)
