@@ -144,10 +144,11 @@ def infer_contour(
     -------
     xr.DataTree
         Groups in ArviZ's layout and the record's units, with one chain for each ensemble: `posterior`, `sample_stats`,
-        `prior`, `posterior_predictive` and `log_likelihood` (by sample; for some of the draws), `events` (first contact and snap-off of each sweep segment, for 250 draws of each chain),
-        `observed_data`, `constant_data`. Attributes: version, seed, settings, hash of the data, `converged` (0 or 1)
-        and a `message`. A KeyboardInterrupt (Ctrl-C) during sampling ends the run and returns the draws so far, with
-        `converged` 0 and a message to that effect; before sampling it is passed on.
+        `prior`, `posterior_predictive` and `log_likelihood` (by sample; for some of the draws), `events` (first contact
+        and snap-off of each sweep segment, for 250 draws of each chain), `observed_data`, `constant_data`. Attributes:
+        version, seed, settings, hash of the data, `converged` (0 or 1) and a `message`. A KeyboardInterrupt (Ctrl-C)
+        during sampling ends the run and returns the draws so far, with `converged` 0 and a message to that effect;
+        before sampling it is passed on.
 
     Raises
     ------

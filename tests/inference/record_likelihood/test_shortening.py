@@ -1,6 +1,9 @@
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -217,6 +220,19 @@ def test_contacts_of_a_long_record_are_of_every_so_many_samples():
     result = infer_contacts(long_record(4_000), seed=1, draws=40)
     assert result["posterior"].sizes["sample"] <= MOST_SAMPLES
     assert "every" in result.attrs["message"]
+
+
+@pytest.mark.slow
+def test_a_limit_of_time_holds_for_200_000_samples():
+    """Ten seconds above the limit, and 1 GB, in a process of its own whose first, short run waits for compiled code."""
+    root = Path(__file__).parents[3]
+    command = [sys.executable, "-m", "benchmarks.long_records", "200000"]
+    done = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True)
+    *_, wall, _, processor, _, memory, unit = done.stdout.split()
+    assert unit == "GB"
+    assert float(processor) > 0.0
+    assert float(wall) < 3.0 + 10.0
+    assert float(memory) < 1.0
 
 
 @pytest.mark.slow

@@ -41,8 +41,8 @@ class SamplerSettings:
     max_seconds : float, optional
         Time limit of a posterior [s], counted from the call: the search for a start ends with its present step, and so
         do the ensembles, which make at least one step. These steps exceed the limit, and so do the approximation around
-        the start (some 60 points for each parameter) and the last diagnosis: by a few seconds in all, whatever the length
-        of the record, and by more for the first posterior after an installation, which waits for compilers.
+        the start (some 60 points for each parameter) and the last diagnosis: by a few seconds in all, whatever the
+        length of the record, and by more for the first posterior after an installation, which waits for compilers.
         Predictions from the draws, files and figures come after it. A run that ends by it is not reproducible from its
         seed. A run that resumes from a checkpoint has the whole time again; its search for a start, which must have the
         same result each time, is counted, but not cut short.
