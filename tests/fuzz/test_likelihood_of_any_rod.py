@@ -35,10 +35,8 @@ def test_interpolation_is_not_felt_at_the_truth(fuzz_seed):
         except (tb.errors.ReachError, tb.errors.ContourError):
             continue
         measured = CELL.measure(record, seed=rng)
-        values = [
-            float(RecordLikelihood(measured, CELL, friction, exact).log_likelihood(contour)[0])
-            for exact in (True, False)
-        ]
+        likelihoods = [RecordLikelihood(measured, CELL, friction, exact) for exact in (True, False)]
+        values = [float(one.log_likelihood(contour)[0]) for one in likelihoods]
         if np.isfinite(values[0]):
             off.append(abs(values[1] - values[0]))
     assert max(off) < 0.05

@@ -538,9 +538,8 @@ def _write_errors(
         if exact.u < 0.0:
             out[k] = 0.0
         reach = rest_along(rod, 0.0, 1.0, work).distance
-        distance = (
-            1.0 - at[k, 5] * at[k, 5]
-        ) * reach  # mostly near the tip, where a curved rod may lie across its chord
+        # Mostly near the tip, where a curved rod may lie across its chord.
+        distance = (1.0 - at[k, 5] * at[k, 5]) * reach
         chord, known = chord_along(rod, 0.0, distance, work), chord_in(sheet, False, reach, distance)
         out[k] = max(out[k], abs(known.arclength - chord.arclength), abs(known.at_base - chord.bearing))
 
