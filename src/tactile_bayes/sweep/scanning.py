@@ -258,8 +258,8 @@ def scan(
     ------
     ReachError
         If the rod is too short to touch the contour, its tip folds over until the other side of the rod touches, or
-        friction would hold the contact: where a drive turns back while the rod is in contact, where a tip that is carried
-        head-on does not slide at first, and where the sense of sliding changes along the path.
+        friction would hold the contact: where a drive turns back while the rod is in contact, where a tip that is
+        carried head-on does not slide at first, and where the sense of sliding changes along the path.
     ContourError
         If the pivot is not below the contour or too close to it, the rod would touch beyond an end of it, or a rod that
         is curved toward the contour would touch it twice.
