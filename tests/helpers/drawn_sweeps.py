@@ -82,20 +82,3 @@ def carried_drive(rng: np.random.Generator, poses: int | None = None) -> Carried
             (float(x[0]), float(y[0])), float(np.arctan2(way[1], way[0])), float(angle[0]), float(np.hypot(*way))
         )
     return tb.Motion(x, y, angle)
-
-
-def way(rng: np.random.Generator) -> dict[str, object]:
-    """Arguments of `scan` for a rotation, or a drive that carries the base one way, or back again too."""
-    match rng.integers(4):
-        case 0:
-            base = float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-0.2, 0.1))
-            return {"direction": str(rng.choice(["forward", "backward"])), "base": base, "drive_step": 0.03}
-        case 1:
-            there = carried_drive(rng, 2).poses
-            return {
-                "drive": tb.Motion(*np.vstack([there, there[:1] + rng.uniform(0.0, 0.5) * np.diff(there, axis=0)]).T)
-            }
-        case 2:
-            return {"drive": carried_drive(rng, 2)}
-        case _:
-            return {"drive": carried_drive(rng)}
