@@ -32,11 +32,18 @@ REPEATS = (codes.MAX_REPEAT, codes.MIN_REPEAT, codes.POSSESSIVE_REPEAT)
 USUAL = 'a1 .,-/:[("\\\n'
 
 
+class _Letter(str):
+    """A letter in place of a local variable; its attributes are letters too."""
+
+    def __getattr__(self, name):
+        return self
+
+
 class _Blanks(dict):
     """Names of a module; a local name stands for a letter."""
 
     def __missing__(self, name):
-        return getattr(builtins, name, "x")
+        return getattr(builtins, name, _Letter("x"))
 
 
 def patterns():

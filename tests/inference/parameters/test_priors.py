@@ -77,7 +77,7 @@ def test_a_prior_without_density_is_refused_by_its_parameter(prior, words):
         stats.rv_histogram((np.ones(4), np.linspace(0.3, 0.7, 5)))(),
         Flat(0.5, 0.0),
     ],
-    ids=str,
+    ids=lambda prior: getattr(getattr(prior, "dist", None), "name", None) or type(prior).__name__,
 )
 def test_any_prior_with_a_density_is_accepted(prior):
     check_prior("q", prior)
