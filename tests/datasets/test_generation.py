@@ -69,7 +69,7 @@ RIGS = {
     "tapered": drawn_from("circle", rod={"taper": {"uniform": [0.0, 0.95]}}, seed=1),
     "tapered arcs in SI": drawn_from(
         "shape-free",
-        scan={"samples": 30, "friction": 0.2},
+        scan={"samples": 30},
         rod={
             "length": {"uniform": [1.0, 1.2]},
             "flexural_rigidity": 1e-3,
@@ -402,6 +402,14 @@ def test_what_is_hardly_ever_a_contour_is_given_up_with_the_familys_own_words():
     contour = {"family": "parabola", "a": {"normal": [-1.0, 1e-3]}, "q": 0.5}
     with refused(SpecificationError, "1000 times", "1000 no contour", "a must be positive"):
         generate_records(read_specification({**FAR, "contours": [contour]}), 0, 2)
+
+
+def test_sweeps_that_friction_would_hold_at_first_are_no_records():
+    """In one of two directions the rod is curved toward the object, and slides outward until it is straightened."""
+    spec = drawn_from("circle", scan={"friction": 0.3}, rod={"rest_curvature": {"uniform": [0.2, 0.4]}})
+    with refused(SpecificationError, "1000 times", "held by friction", "friction = 0"):
+        generate_records(read_specification(spec), 0, 1)
+
 
 
 def test_the_reasons_of_a_record_that_is_given_up_are_its_own():

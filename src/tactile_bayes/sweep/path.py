@@ -121,7 +121,8 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
             )
         case Reachability.BEGINS_INSIDE:
             raise ContourError(
-                f"{sweep} the unloaded rod would cut the contour from the beginning: begin the drive clear of it"
+                f"{sweep} the unloaded rod would cut the contour from the beginning, or before it touches it on a side "
+                "from which it can be followed: begin the drive clear of it, or carry the rod another way"
             )
         case Reachability.STICKS:
             free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)

@@ -29,7 +29,7 @@ from tactile_bayes.mechanics.branches.equilibrium import (
     with_friction,
 )
 from tactile_bayes.mechanics.branches.limits import clear_angle
-from tactile_bayes.mechanics.branches.line import NO_LINE, Line
+from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_of
 from tactile_bayes.mechanics.branches.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS, Found, Samples, write_state
 from tactile_bayes.mechanics.compiler import cached, compiled
@@ -45,6 +45,7 @@ _SAME_ANGLE = 1e-5
 """Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
 
 _TOUCHES, _STICKS = int(Reachability.TOUCHES), int(Reachability.STICKS)
+_BEGINS_INSIDE = int(Reachability.BEGINS_INSIDE)
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
 _EXACT = Accuracy(resolved=1e-9, sharp=np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True)
@@ -327,6 +328,15 @@ def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: flo
 
 
 @compiled
+def _is_inside_before(scene: Scene, lines: Floats | None, first: float) -> bool:
+    """True if a drive has carried the unloaded rod into the object before it touches there from this side."""
+    if lines is None:
+        return False
+    inside = travel_into(scene.outline, scene.beam, lines, line_of(lines, 0).travel, True)
+    return -math.inf < inside < first - _SAME_ANGLE
+
+
+@compiled
 def _follow(
     scene: Scene,
     room: Floats | None,
@@ -402,6 +412,8 @@ def _solve(
         event.clear_angle = math.nan
         if asks_clearance and ends.reach == _TOUCHES:
             event.clear_angle = _clear_angle(scene, room, ends, accuracy.first_step)
+            if exact and _is_inside_before(scene, room, ends.first_angle):
+                event.reach = _BEGINS_INSIDE
 
 
 def solve_sweeps(
