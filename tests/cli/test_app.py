@@ -223,7 +223,7 @@ def test_a_rig_tells_its_names_units_signs_and_sweeps_by_options(at_once, bare, 
         angle, moment, x, y = (float(row[place(name)]) for name in names[-4:])
         table.append([repr(90 - math.degrees(angle)), repr(1e3 * moment), repr(-1e3 * x), repr(y)])
     path = tmp_path / "rig.csv"
-    path.write_text("\n".join(map(";".join, table)).replace(".", ","), encoding="utf-8")
+    path.write_text("\n".join([*map(";".join, table), ""]).replace(".", ","), encoding="utf-8")
     options = ["drive_angle=90-Winkel[deg]", "holding_moment=Mz", "force_x = -Fx[mN]", "force_y=Fy[N]"]
     options = ["--split-sweeps", *(word for option in options for word in ("--column", option))]
     told = call("infer", path, "--out", tmp_path / "2", "-q", *ROD_OPTIONS, *CELL_OPTIONS, *options)

@@ -121,7 +121,7 @@ def test_what_is_wrong_is_the_first_line_and_is_to_be_corrected(rig):
     result = call("inspect", rig, *signs)
     assert result.exit_code == 0
     first, *_, last = result.stdout.splitlines()
-    assert first.endswith("fit no contact of such a rod: nearly all would if force_x had the other sign.")
+    assert "nearly all would if force_x had the other sign (--column 'force_x=-Fx" in first
     assert last.startswith("Once that is corrected: tactile-bayes infer ")
 
 

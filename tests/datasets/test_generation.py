@@ -411,7 +411,6 @@ def test_sweeps_that_friction_would_hold_at_first_are_no_records():
         generate_records(read_specification(spec), 0, 1)
 
 
-
 def test_the_reasons_of_a_record_that_is_given_up_are_its_own():
     """Of sixty records only the last is hopeless, while others are often drawn again."""
     levels = {"each": [0.7] * 59 + [-0.4]}

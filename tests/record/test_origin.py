@@ -443,7 +443,7 @@ def test_a_unit_in_the_header_and_another_one_given_contradict_each_other(tmp_pa
 @pytest.mark.parametrize("given", ["Fx[mN]", "-Fx[mN]", "12.5-Fx[mN]", "Fx[mN]-0.125"])
 def test_an_option_reads_a_column_with_another_sign_and_zero(tmp_path, given, added, sense):
     path = tmp_path / "lab.csv"
-    path.write_text("sweep,direction,drive_angle,Fx\n0,forward,1.2,18.25\n0,forward,1.3,-7.5\n")
+    path.write_text("sweep,direction,drive_angle [rad],Fx\n0,forward,1.2,18.25\n0,forward,1.3,-7.5\n")
 
     def read(text):
         channels = ("holding_moment", "force_y")
@@ -464,7 +464,7 @@ def test_without_a_file_an_option_has_the_name_of_the_record():
 
 def test_there_is_no_option_after_a_conversion_by_the_rod(tmp_path):
     path = tmp_path / "lab.csv"
-    path.write_text("sweep,direction,drive_angle,Fx\n0,forward,1.2,18.25\n")
+    path.write_text("sweep,direction,drive_angle [rad],Fx\n0,forward,1.2,18.25\n")
     missing = ("holding_moment", "force_y")
     record = read_record(path, columns={"force_x": "Fx[mN]"}, rod=Rod(0.1, 1.2e-5), missing=missing)
     assert column_option(to_dimensionless(record)["force_x"], added=1.0) == ""

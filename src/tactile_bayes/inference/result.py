@@ -217,6 +217,7 @@ def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
     >>> draws = xr.Dataset({"q": (("chain", "draw"), np.full((4, 100), 0.5))})
     >>> with tempfile.TemporaryDirectory() as directory:
     ...     path = Path(directory) / "posterior.nc"

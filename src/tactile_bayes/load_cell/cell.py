@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_array, check_optional, check_seed, check_switch, refused
+from tactile_bayes.checks import check_array, check_kind, check_optional, check_seed, check_switch, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_loads
 from tactile_bayes.load_cell.covariance import covariance, squared_mahalanobis_distance
@@ -278,7 +278,7 @@ class LoadCell(DataSheet):
 
     def refuse_other_frame(self, record: xr.Dataset) -> None:
         """Raise ParameterError if a record is not in the frame of this cell."""
-        validate(record)
+        check_kind("the record", record, xr.Dataset, "give a record, as read_record returns it")
         if self.frame is not None and frame_of(record) != self.frame:
             raise ParameterError(
                 f"the load cell is {self.frame}, but the record's forces are {frame_of(record)}: give the cell without "

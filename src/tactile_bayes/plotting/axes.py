@@ -70,12 +70,16 @@ def checked_samples(samples: Any) -> NDArray[np.intp] | None:
     return numbers.astype(np.intp)
 
 
-def check_panels(axes: Any, shape: tuple[int, ...], meaning: str) -> AxesArray:
-    """Return the given Axes if they have the wanted shape, and refuse others; `meaning` describes the wanted ones."""
+def check_panels(axes: Any, shape: tuple[int, ...], meaning: str, *, lower: bool = False) -> AxesArray:
+    """Return the given Axes if they have the wanted shape, and refuse others; `meaning` describes the wanted ones.
+
+    With `lower` there may be None above the diagonal.
+    """
     from matplotlib.axes import Axes
 
     panels = np.atleast_1d(np.array(None if hasattr(axes, "data_vars") else axes, dtype=object))
-    if panels.shape == shape and not all(isinstance(ax, Axes) for ax in panels.flat):
+    wanted = panels[np.tril_indices(len(panels))] if lower and panels.shape == shape else panels.ravel()
+    if panels.shape == shape and not all(isinstance(ax, Axes) for ax in wanted):
         raise refused("axes", axes, f"give an array of Axes of Matplotlib, shape {shape}: {meaning}")
     if panels.shape != shape:
         raise ParameterError(f"axes have shape {panels.shape}, and {shape} is wanted: {meaning}")

@@ -143,7 +143,7 @@ def pairs(
         )
     size = len(parameters)
     side = max(2.6, min(7.0, 1.75 * size), 0.115 * rcParams["font.size"] * size)
-    grid = new_panels(size, size, side, side) if axes is None else check_panels(axes, (size, size), _ROWS)
+    grid = new_panels(size, size, side, side) if axes is None else check_panels(axes, (size, size), _ROWS, lower=True)
     limits = [_view(p, truth.get(p.name)) for p in parameters]
     for row, column in np.ndindex(size, size):
         ax: Axes = grid.item(row, column)

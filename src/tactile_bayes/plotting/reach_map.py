@@ -90,10 +90,10 @@ def prior_contours(
     from tactile_bayes.inference.contour import contours_of
 
     check_drawing(ax, truth)
+    check_switch("median", median)
     if not _has(posterior, "prior", "constant_data"):
         raise ParameterError("there are no draws from a prior here: give the tree that infer_contour returned")
     check_whole_number("contours", contours, 1, _COUNT)
-    check_switch("median", median)
     prior, family = posterior["prior"].to_dataset(), posterior.attrs["family"]
     share = prior.attrs.get("share_within_reach")
     words = "" if share is None else f"\n({100.0 * share:.2g} % of it is within reach)"

@@ -369,17 +369,20 @@ def _angles(grid: Floats | None, step: float | None, sweep: SweepEvents) -> Floa
     sense = 1.0 if forward else -1.0
     if not sweep.clear:
         angles = angles[sense * (sweep.snap_off.drive_angle - angles) >= 0.0]
-    angles = _within_a_turn(angles, sense, sweep)
+    angles = _within_a_turn(angles, sense, sweep, is_asked=grid is not None)
     touching = sense * (angles - sweep.first_contact.drive_angle) >= 0.0
     angles = angles[~(touching & (sense * (sweep.slides_from - angles) > 0.0))]
     return angles[:: 1 if forward else -1]
 
 
-def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents) -> Floats:
-    """Return the angles without those at which the rod, a turn before or later, is in the same contact."""
+def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents, *, is_asked: bool) -> Floats:
+    """Return the angles without those at which the rod, a turn before or later, is in the same contact.
+
+    It warns if the angles are those that were asked for.
+    """
     before = sense * (angles - sweep.snap_off.drive_angle) > -_TURN
     later = sense * (angles - sweep.first_contact.drive_angle) < _TURN
-    if not (before & later).all():
+    if is_asked and not (before & later).all():
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
         warnings.warn(
             f"{_name(sweep)} the rod touches the object from {first:.6g} to {snap:.6g} rad, and so it does a turn (2π) "

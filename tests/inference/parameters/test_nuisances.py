@@ -334,7 +334,12 @@ def test_the_stem_is_inferred_about_the_stated_one(bent):
             expected = scan(Parabola(5.0, 0.06), rod=replace(stated, stem=true), drive_angles=angles, friction=0.1)
             loads = np.stack([expected.record[name].values for name in CHANNELS], axis=-1) / stated.load_units
             found = model.loads(np.array([[5.0, 0.06, 0.0, true, 0.1]]))[0]
-            np.testing.assert_allclose(found, loads, atol=1e-6 * np.abs(loads).max())
+            places, given = (
+                list(zip(r.sweep.values, r.drive_angle.values, strict=True)) for r in (record, expected.record)
+            )
+            kept = np.array([place in given for place in places])  # without those at which friction would hold the rod
+            assert kept.mean() > 0.95
+            np.testing.assert_allclose(found[kept], loads, atol=1e-6 * np.abs(loads).max())
 
 
 @pytest.mark.parametrize("bent", [0.0, lambda s: 30.0 * s], ids=["straight", "traced"])

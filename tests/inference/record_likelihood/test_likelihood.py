@@ -34,8 +34,11 @@ WIRE_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
 
 
 def exact_loads(record, contour, friction=0.0):
-    """What an ideal sensor on the record's rig would have felt under the contour, (samples, 3), from `scan`."""
-    out = np.empty((record.sizes["sample"], 3))
+    """What an ideal sensor on the record's rig would have felt under the contour, (samples, 3), from `scan`.
+
+    NaN where friction would hold a rod that is curved toward the object at first, which `scan` leaves out.
+    """
+    out = np.full((record.sizes["sample"], 3), np.nan)
     for sweep in np.unique(record.sweep.values):
         rows = np.flatnonzero(record.sweep.values == sweep)
         direction = str(record.direction.values[rows[0]])
@@ -44,8 +47,10 @@ def exact_loads(record, contour, friction=0.0):
         other = scan(
             contour, direction=direction, base=base, drive_angles=angles, rod=rod_of(record), friction=friction
         ).record
-        np.testing.assert_array_equal(other.drive_angle.values, angles)
-        out[rows] = np.stack([other[name].values for name in CHANNELS], axis=-1)
+        given = np.isin(angles, other.drive_angle.values)
+        assert given.all() or (friction and rod_of(record).rest_curvature and np.mean(given) > 0.9)
+        np.testing.assert_array_equal(other.drive_angle.values, angles[given])
+        out[rows[given]] = np.stack([other[name].values for name in CHANNELS], axis=-1)
     return out
 
 
@@ -131,9 +136,10 @@ def test_against_an_independent_sum(rig):
                 sigma = scale[k] * deviation
                 densities = stats.norm.logpdf(values[:, present], loads[:, present], sigma).sum(axis=1)
                 expected = densities + np.log(units).sum()  # densities of dimensionless loads
-                error = SHARE[exactly] * np.abs(loads[:, present]).max(axis=0)
+                error = SHARE[exactly] * np.nanmax(np.abs(loads[:, present]), axis=0)
                 slack = (np.abs(values - loads)[:, present] * error + 0.5 * error**2) / sigma**2
-                assert np.all(np.abs(pointwise[k] - expected) <= slack.sum(axis=1) + 1e-9)
+                is_right = np.abs(pointwise[k] - expected) <= slack.sum(axis=1) + 1e-9
+                assert np.all(is_right | np.isnan(expected))
 
 
 def test_the_rest_curvature_of_a_rig_is_that_of_the_rod_in_addition():

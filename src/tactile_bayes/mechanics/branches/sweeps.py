@@ -348,10 +348,14 @@ def _follow(
     found: Found,
     asks_sliding: bool,
 ) -> Ends:
-    """Follow a branch along which friction opposes the slip; in rotations it acts as if it did unless that is asked."""
+    """Follow a branch along which friction opposes the slip; in rotations it acts as if it did unless that is asked.
+
+    Where such a branch is refused for another reason, that is the reason.
+    """
     ends = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, True)
-    if ends.reach == _STICKS and room is None and not asks_sliding:
-        return follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, False)
+    if ends.reach == _STICKS and room is None:
+        assumed = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, False)
+        return ends if asks_sliding and assumed.reach == _TOUCHES else assumed
     return ends
 
 
