@@ -215,6 +215,7 @@ def test_a_file_without_header_is_told_its_rod_and_cell(record, bare, tmp_path):
     assert stated.stdout.split("\n\n")[:2] == told.stdout.split("\n\n")[:2]
 
 
+@pytest.mark.filterwarnings("ignore:.*no unit is stated")
 def test_a_rig_tells_its_names_units_signs_and_sweeps_by_options(at_once, bare, tmp_path):
     names, *rows = (line.split(",") for line in bare.read_text(encoding="utf-8").splitlines())
     place = names.index

@@ -232,7 +232,7 @@ def scan(
         these.
     drive_angles : array_like, shape (n,), optional
         Drive angles of rotations in place of this grid [rad], used in increasing order forward and in decreasing order
-        backward, without duplicates.
+        backward, without duplicates, and without those at which the rod is in the same contact a turn before or later.
     rod : Rod, optional
         By default the dimensionless rod, which is straight. A rod with a diameter touches with its surface.
     friction : float
@@ -369,28 +369,16 @@ def _angles(grid: Floats | None, step: float | None, sweep: SweepEvents) -> Floa
     sense = 1.0 if forward else -1.0
     if not sweep.clear:
         angles = angles[sense * (sweep.snap_off.drive_angle - angles) >= 0.0]
-    angles = _within_a_turn(angles, sense, sweep, is_asked=grid is not None)
+    angles = _within_a_turn(angles, sense, sweep)
     touching = sense * (angles - sweep.first_contact.drive_angle) >= 0.0
     angles = angles[~(touching & (sense * (sweep.slides_from - angles) > 0.0))]
     return angles[:: 1 if forward else -1]
 
 
-def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents, *, is_asked: bool) -> Floats:
-    """Return the angles without those at which the rod, a turn before or later, is in the same contact.
-
-    It warns if the angles are those that were asked for.
-    """
+def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents) -> Floats:
+    """Return the angles without those at which the rod, a turn before or later, is in the same contact."""
     before = sense * (angles - sweep.snap_off.drive_angle) > -_TURN
     later = sense * (angles - sweep.first_contact.drive_angle) < _TURN
-    if is_asked and not (before & later).all():
-        first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
-        warnings.warn(
-            f"{_name(sweep)} the rod touches the object from {first:.6g} to {snap:.6g} rad, and so it does a turn (2π) "
-            f"before and later: {np.count_nonzero(~(before & later))} of the drive angles, up to "
-            f"{snap - sense * _TURN:.6g} or from {first + sense * _TURN:.6g} rad on, are left out",
-            ClearanceWarning,
-            stacklevel=4,
-        )
     return np.asarray(angles[before & later])
 
 
