@@ -19,7 +19,7 @@ from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.misfit import CHECK_RIG, GAUGE, is_inferred, what_to_try
 from tactile_bayes.inference.parameters.discrepancy import PARAMETERS
-from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of
+from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps
@@ -111,6 +111,7 @@ def verdicts(
     >>> print(found[0].split(":")[0])
     The family parabola and the rig as assumed do not describe the record
     """
+    refuse_no_contour(posterior, "posterior")
     posterior_draws(posterior)
     record = record_of(posterior)
     check_optional("contacts", contacts, xr.Dataset, "give what reconstruct returned")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,7 +16,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_names, check_optional, check_positive
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.base import check_single
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.errors import ClearanceWarning, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.parameters.nuisances import STANDARD
@@ -103,17 +104,19 @@ class Plan:
 
     @cached_property
     def scan(self) -> Scan:
-        """The sweeps without errors."""
-        return scan(
-            self.contour,
-            drive=self.drive,
-            direction=self.direction,
-            base=self.base,
-            drive_step=self.drive_step,
-            drive_angles=self.drive_angles,
-            rod=self.rod,
-            friction=self.taken_friction,
-        )
+        """The sweeps without errors; angles that one direction adds may be those of another turn in the other one."""
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message=".* a turn ", category=ClearanceWarning)
+            return scan(
+                self.contour,
+                drive=self.drive,
+                direction=self.direction,
+                base=self.base,
+                drive_step=self.drive_step,
+                drive_angles=self.drive_angles,
+                rod=self.rod,
+                friction=self.taken_friction,
+            )
 
     @cached_property
     def record(self) -> xr.Dataset:

@@ -369,17 +369,28 @@ def _angles(grid: Floats | None, step: float | None, sweep: SweepEvents) -> Floa
     sense = 1.0 if forward else -1.0
     if not sweep.clear:
         angles = angles[sense * (sweep.snap_off.drive_angle - angles) >= 0.0]
-    angles = _within_a_turn(angles, sense, sweep)
+    angles = _within_a_turn(angles, sense, sweep, is_asked=grid is not None)
     touching = sense * (angles - sweep.first_contact.drive_angle) >= 0.0
     angles = angles[~(touching & (sense * (sweep.slides_from - angles) > 0.0))]
     return angles[:: 1 if forward else -1]
 
 
-def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents) -> Floats:
-    """Return the angles without those at which the rod, a turn before or later, is in the same contact."""
-    before = sense * (angles - sweep.snap_off.drive_angle) > -_TURN
-    later = sense * (angles - sweep.first_contact.drive_angle) < _TURN
-    return np.asarray(angles[before & later])
+def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents, *, is_asked: bool) -> Floats:
+    """Return the angles without those at which the rod, a turn before or later, is in the same contact.
+
+    It warns if the angles are those that were asked for.
+    """
+    first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
+    kept = (sense * (angles - snap) > -_TURN) & (sense * (angles - first) < _TURN)
+    if is_asked and not kept.all():
+        warnings.warn(
+            f"{_name(sweep)} the rod touches the object from {first:.6g} to {snap:.6g} rad, and so it does a turn (2π) "
+            f"before and later: {np.count_nonzero(~kept)} of the drive angles, up to {snap - sense * _TURN:.6g} or "
+            f"from {first + sense * _TURN:.6g} rad on, are left out",
+            ClearanceWarning,
+            stacklevel=4,
+        )
+    return np.asarray(angles[kept])
 
 
 def _travels(drive: Carried, step: float | None, sweep: SweepEvents, rod: Rod) -> Floats:
