@@ -6,14 +6,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from helpers.contour_posteriors import QUICK
 from helpers.predicted_records import ideal, predicted, taken_for_a_parabola, with_readings
 from tactile_bayes.assessment.trust import trust
+from tactile_bayes.contours import Parabola
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.result import to_arviz
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.sweep import Motion, scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.normal_band import normal_band
 
@@ -222,3 +226,13 @@ def test_a_prediction_that_is_no_number_is_named():
     tree["posterior_predictive"] = xr.DataTree(predictive)
     with pytest.raises(InferenceError, match=r"predicted force_x .* chain 0, draw 3"):
         verdicts(tree)
+
+
+@pytest.mark.parametrize(("friction", "named"), [(0.2, True), (0.0, False)])
+def test_a_sweep_that_goes_back_in_contact_is_named_where_there_is_friction(friction, named):
+    there_and_back = scan(Parabola(0.5, 0.5), drive=Motion(0.0, 0.0, [0.4, 2.2, 0.4]), drive_step=0.1).record
+    back = np.arange(there_and_back.sizes["sample"]) > 18
+    columns = {"sweep": ("sample", back.astype(int)), "direction": ("sample", np.where(back, "backward", "forward"))}
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(there_and_back.assign(columns), seed=1)
+    posterior = infer_contour(measured, nuisances=[], friction=friction, seed=1, settings=QUICK)
+    assert ("Sweep 1 went back in contact" in verdicts(posterior)[-1]) is named

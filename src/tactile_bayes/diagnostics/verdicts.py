@@ -21,7 +21,7 @@ from tactile_bayes.inference.misfit import CHECK_RIG, GAUGE, is_inferred, what_t
 from tactile_bayes.inference.parameters.discrepancy import PARAMETERS
 from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, zero_load
-from tactile_bayes.reconstruction import AXIAL_ALARM
+from tactile_bayes.reconstruction import AXIAL_ALARM, contact_sides
 from tactile_bayes.record import CHANNELS, carried_sweeps
 from tactile_bayes.record.origin import column_option
 from tactile_bayes.tasks.documents import read_json
@@ -153,7 +153,25 @@ def verdicts(
         p_value = float(check.overall_p_value)
         against.append(f"All is well: the {drawn}, and the record agrees with their predictions (p = {p_value:.2g}).")
     doubts = [] if trust is None or trust.attrs["conclusion"] in (_NOT, _HOLDS) else [str(trust.attrs["summary"])]
-    return (*against, *doubts, *_prior_dominated(posterior, known=beyond))
+    return (*against, *doubts, *_prior_dominated(posterior, known=beyond), *_going_back(posterior, record))
+
+
+def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
+    """Report sweeps about a pivot that go back in contact, along which friction acts the other way.
+
+    If all seem to, it is the sign of the moment.
+    """
+    if not (is_inferred("friction", _inferred(posterior)) or posterior.attrs.get("friction", 0.0)):
+        return []
+    back = (contact_sides(record) > 0.0) != (record["direction"].values == "forward")
+    sweeps = sorted(set(record["sweep"].values[back].tolist()) - set(carried_sweeps(record)))
+    if not sweeps or back.all():
+        return []
+    named = f"{'Sweeps' if len(sweeps) > 1 else 'Sweep'} {', '.join(map(str, sweeps))}"
+    return [
+        f"{named} went back in contact, where friction acts the other way, which is not modelled: infer the record "
+        "without these samples, or without friction (friction=0.0, on the command line --friction 0), and compare."
+    ]
 
 
 def _inferred(posterior: xr.DataTree) -> list[str]:
