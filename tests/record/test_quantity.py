@@ -50,7 +50,9 @@ def test_a_unit_is_known_by_all_its_spellings(spellings, scale, expected):
         assert (unit.scale, unit.dimension) == (scale, unit_of(expected).dimension), text
 
 
-@pytest.mark.parametrize("text", ["furlong", "g", "V", "degC", "mm/", "N m ?", "forward", "ch1", "kg", "%", "2 mm"])
+@pytest.mark.parametrize(
+    "text", ["furlong", "g", "V", "degC", "mm/", "N m ?", "forward", "ch1", "kg", "%", "2 mm", "Grad", "krad"]
+)
 def test_what_is_no_unit_of_a_record(text):
     assert unit_of(text) is None
 

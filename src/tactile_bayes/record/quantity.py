@@ -47,6 +47,7 @@ _BASES: dict[str, tuple[Dimension, Fraction]] = {
 _WORDS = {
     "": "1",
     "-": "1",
+    "deg.": "deg",
     "degree": "deg",
     "degrees": "deg",
     "radian": "rad",
@@ -178,6 +179,8 @@ def _factors(piece: str) -> tuple[Unit, ...] | None:
         if match is None:
             return None
         dimension, scale = _BASES[match["base"]]
+        if dimension[3] and _PREFIXES[match["prefix"]] > 1:  # Grad is a degree or a gon, and nobody's gigaradian
+            return None
         power = int(match["power"] or 1)
         length, force, time, angle = (power * one for one in dimension)
         factors.append(Unit((_PREFIXES[match["prefix"]] * scale) ** power, (length, force, time, angle)))
