@@ -84,9 +84,18 @@ def test_files_with_a_checksum_are_refused_or_read_as_they_were(tmp_path, origin
     assert found["refused"] > 0.8 * SEALED
 
 
+def largest_child():
+    """Memory of the largest process that this one has waited for [bytes], on Linux: one of another test, maybe."""
+    if sys.platform != "linux":
+        return 0
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
+
+
 def test_files_without_a_checksum_are_refused_or_read_within_limits(tmp_path, originals, fuzz_seed):
     """A changed name or unit cannot be noticed, so that they may be read otherwise."""
-    rng, tasks = np.random.default_rng([fuzz_seed, 1]), []
+    rng, tasks, before = np.random.default_rng([fuzz_seed, 1]), [], largest_child()
     for read, whole, content in originals:
         content = content[: content.rindex(SEAL)]
         assert outcome(tmp_path / "whole.nc", content, read, whole) == "as it was"
@@ -96,7 +105,4 @@ def test_files_without_a_checksum_are_refused_or_read_within_limits(tmp_path, or
     with ThreadPoolExecutor(2) as pool:
         found = Counter(pool.map(lambda task: outcome(*task), tasks))
     assert set(found) <= {"refused", "as it was", "otherwise"}
-    if sys.platform == "linux":
-        import resource
-
-        assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 < BYTES
+    assert largest_child() < BYTES or largest_child() == before
