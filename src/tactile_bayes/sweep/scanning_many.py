@@ -34,8 +34,8 @@ def scan_many(
 ) -> xr.Dataset:
     """Sweep the rod along many contours at once: some 8000 sweeps of 180 samples in a second.
 
-    Loads are accurate to 1e-9 of the largest (1e-7 for rods whose shape or rigidity has kinks), contacts to 1e-10 of the
-    path, and events to rounding. The equations are those of `scan`.
+    Loads are accurate to 1e-9 of the largest (1e-7 for rods whose shape or rigidity has kinks), contacts to 1e-10 of
+    the path, and events to rounding. The equations are those of `scan`.
 
     Parameters
     ----------
