@@ -151,10 +151,9 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     floor = np.maximum(steps**2 / 12.0, rounding**2)
     sweep = record["sweep"].values
     sweeps = rows_of_sweeps(sweep)
-    positions = [
-        np.arange(rows.size) if are_blocks(record) else _positions(travels_of(record)[rows]) for rows in sweeps
-    ]
-    if are_blocks(record):
+    travels, blocked = travels_of(record), are_blocks(record)
+    positions = [np.arange(rows.size) if blocked else _positions(travels[rows]) for rows in sweeps]
+    if blocked:
         part, at_rest = record["block_part"].values, record["block_unloaded"].values.astype(bool)
         bounds = [bounds_in_blocks(part[rows], at_rest[rows]) for rows in sweeps]
     else:

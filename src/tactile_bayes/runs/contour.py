@@ -215,43 +215,32 @@ def _completed(
     if "blocks" in result.attrs:
         measured, load_cell = record_of(result), None
     with folder:
-        return _written(folder, measured, load_cell, result, probability, truth)
+        contacts, band, edges, found = None, None, None, tuple[str, ...]()
+        with folder.attempt("contacts", "contacts.csv"):
+            contacts = contact_points(measured, load_cell, result)
+            if contacts is not None:
+                folder.write_table("contacts", "contacts.csv", contacts)
+        with folder.attempt("band", "band.csv"):
+            band = contour_band(result, reach(result), probability)
+            folder.write_table("band", "band.csv", band)
+        with folder.attempt("gap", "gap.png"):
+            edges = gap_if_any(result, probability)
+        with folder.attempt("verdicts", "summary.txt"):
+            found = verdicts(result, contacts)
+        numbers = summary(result, probability, edges)
 
+        def write_summary() -> None:
+            table = numbers.to_dataframe().to_string()
+            lines = (*found, *folder.messages, "", table, "", result.attrs["message"])
+            folder.write_lines("verdicts", "summary.txt", lines)
+            folder.write_table("summary", "summary.csv", numbers)
 
-def _written(
-    folder: RunFolder,
-    measured: xr.Dataset,
-    load_cell: LoadCell | None,
-    result: xr.DataTree,
-    probability: float,
-    truth: Contour | None,
-) -> ContourRun:
-    contacts, band, edges, found = None, None, None, tuple[str, ...]()
-    with folder.attempt("contacts", "contacts.csv"):
-        contacts = contact_points(measured, load_cell, result)
-        if contacts is not None:
-            folder.write_table("contacts", "contacts.csv", contacts)
-    with folder.attempt("band", "band.csv"):
-        band = contour_band(result, reach(result), probability)
-        folder.write_table("band", "band.csv", band)
-    with folder.attempt("gap", "gap.png"):
-        edges = gap_if_any(result, probability)
-    with folder.attempt("verdicts", "summary.txt"):
-        found = verdicts(result, contacts)
-    numbers = summary(result, probability, edges)
-
-    def write_summary() -> None:
-        table = numbers.to_dataframe().to_string()
-        lines = (*found, *folder.messages, "", table, "", result.attrs["message"])
-        folder.write_lines("verdicts", "summary.txt", lines)
-        folder.write_table("summary", "summary.csv", numbers)
-
-    write_summary()
-    before = len(folder.left_out)
-    _draw(_Figures(measured, result, contacts, band, edges, numbers, truth), folder)
-    if len(folder.left_out) > before:
         write_summary()
-    return ContourRun(result, contacts, band, numbers, (*found, *folder.messages), folder.files, folder.left_out)
+        before = len(folder.left_out)
+        _draw(_Figures(measured, result, contacts, band, edges, numbers, truth), folder)
+        if len(folder.left_out) > before:
+            write_summary()
+        return ContourRun(result, contacts, band, numbers, (*found, *folder.messages), folder.files, folder.left_out)
 
 
 def origin_of(measured: xr.Dataset, probability: float, command: Sequence[str]) -> dict[str, Any]:
