@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ContourError
@@ -75,7 +75,7 @@ def _mean(values: Floats, weight: Floats) -> Floats:
 
 
 def refuse_unless_convex(bends: Bends, freedom: float, place: Callable[[float], float], remark: str) -> None:
-    limit = float(student_t.isf(FALSE_ALARM / bends.errors.size, freedom))
+    limit = -float(stdtrit(freedom, FALSE_ALARM / bends.errors.size))
     worst = int(np.argmin(bends.errors))
     if bends.errors[-1] < -limit and bends.errors.max() < limit:
         raise ContourError(

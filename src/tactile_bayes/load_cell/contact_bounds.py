@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.special import betainc, betaln, fdtrc, fdtri, stdtrit
 
-from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
 __all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
@@ -105,12 +106,9 @@ def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> Conta
 def _contact(readings: Floats, floor: Floats) -> tuple[float, int, int]:
     """Upper bound of the p-value of no contact, and the numbers of samples at both ends that give it."""
     n = len(readings)
-    ends = [k for k in _grid(n) if k < n]
-    before, after = (k.ravel() for k in np.meshgrid(ends, ends))
-    tested = (before + after >= FEWEST) & (before + after < n)
-    if not tested.any():
+    before, after = _tested_ends(n)
+    if not before.size:
         return 1.0, 0, 0
-    before, after = before[tested], after[tested]
     size = (before + after).astype(float)
     first, second = _sums(readings), _sums(readings**2)
     last, last_second = _sums(readings[::-1]), _sums(readings[::-1] ** 2)
@@ -161,6 +159,15 @@ def _clipped(readings: Floats, floor: Floats) -> Floats:
     return np.clip(off, np.minimum(-limit, least), np.maximum(limit, most))
 
 
+@lru_cache(maxsize=256)
+def _tested_ends(n: int) -> tuple[Index, Index]:
+    """Return the numbers of samples at both ends of a sweep of n samples that are compared with the rest."""
+    ends = [k for k in _grid(n) if k < n]
+    before, after = (k.ravel() for k in np.meshgrid(ends, ends))
+    tested = (before + after >= FEWEST) & (before + after < n)
+    return before[tested], after[tested]
+
+
 def _grid(n: int) -> list[int]:
     """Return 0, and steps of half an octave: 1, 2, 3, 4, 6, 8, 12, ..."""
     return [0, 1, *sorted(factor << k for k in range(n.bit_length()) for factor in (2, 3) if factor << k < n)]
@@ -174,9 +181,12 @@ def _log_beta_cdf(x: Floats, a: Floats, b: Floats) -> Floats:
     """Logarithm of the regularised incomplete beta function; where it underflows, by its first term."""
     a, b = np.broadcast_to(a, x.shape), np.broadcast_to(b, x.shape)
     p = betainc(a, b, x)
+    tiny = p <= _TINY
+    log_p = np.log(p, where=~tiny, out=np.empty_like(p))
+    a, b, x = a[tiny], b[tiny], x[tiny]
     with np.errstate(divide="ignore"):
-        first_term = a * np.log(x) + b * np.log1p(-np.minimum(x, 0.5)) - np.log(a) - betaln(a, b)
-        return np.where(p > _TINY, np.log(p), first_term)
+        log_p[tiny] = a * np.log(x) + b * np.log1p(-np.minimum(x, 0.5)) - np.log(a) - betaln(a, b)
+    return log_p
 
 
 # ---- onset and end

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.signal import lfilter
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number
@@ -50,6 +49,8 @@ class _DriftProcess:
 
     def draw(self, normal: Floats) -> Floats:
         """Draw drift from independent standard normal numbers, shape (..., samples, 3)."""
+        from scipy.signal import lfilter  # takes a while to load
+
         steps = math.sqrt(self.step_variance) * normal
         steps[..., :1, :] = math.sqrt(self.initial_variance) * normal[..., :1, :]
         return np.asarray(lfilter([1.0], [1.0, -self.decay], steps, axis=-2)) * self.sizes

@@ -167,7 +167,7 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     unloaded = np.zeros(sweep.size, dtype=bool)
     for rows in stretches:
         unloaded[rows] = True
-    statistics = _statistics([_Stretch.of(record, rows) for rows in stretches], steps, floor, false_alarm)
+    statistics = _statistics(_stretches(record, channels, readings, stretches), steps, floor, false_alarm)
     if any(len(rows) > len(means) for rows, means in zip(stretches, of_positions, strict=True)):
         of_means = _statistics(list(map(_Stretch.of_readings, of_positions)), steps, floor, false_alarm)
         statistics |= {name: of_means[name] for name in statistics if name not in ("noise", "noise_uncertainty")}
@@ -276,16 +276,20 @@ class _Stretch(NamedTuple):
         return cls(len(values), len(values) - 1.0, mean, ((values - mean) ** 2).sum(axis=0))
 
     @classmethod
-    def of(cls, record: xr.Dataset, rows: Index) -> _Stretch:
-        """Return the stretch of some samples of a record, which may be means of readings."""
-        channels = present_channels(record)
-        values = np.stack([record[name].values[rows] for name in channels], axis=-1)
-        if not are_blocks(record):
-            return cls.of_readings(values)
-        weight, freedom = (record[f"block_{name}"].values[rows].astype(float) for name in ("readings", "freedom"))
+    def of_means(cls, values: Floats, weight: Floats, freedom: Floats, scatter: Floats) -> _Stretch:
+        """Return the stretch of means of shape (samples, channels), with the numbers of readings behind them."""
         mean = np.average(values, axis=0, weights=weight)
-        scatter = np.array([record[f"block_scatter_{name}"].values[rows].sum() for name in channels])
-        return cls(weight.sum(), freedom.sum() + len(rows) - 1.0, mean, scatter + weight @ (values - mean) ** 2)
+        squares = scatter.sum(axis=0) + weight @ (values - mean) ** 2
+        return cls(weight.sum(), freedom.sum() + len(values) - 1.0, mean, squares)
+
+
+def _stretches(record: xr.Dataset, channels: tuple[str, ...], readings: Floats, parts: list[Index]) -> list[_Stretch]:
+    """Return the stretches of some parts of a record, whose samples may be means of readings."""
+    if not are_blocks(record):
+        return [_Stretch.of_readings(readings[rows]) for rows in parts]
+    weight, freedom = (record[f"block_{name}"].values.astype(float) for name in ("readings", "freedom"))
+    scatter = np.stack([record[f"block_scatter_{name}"].values for name in channels], axis=-1)
+    return [_Stretch.of_means(*(column[rows] for column in (readings, weight, freedom, scatter))) for rows in parts]
 
 
 def _statistics(stretches: list[_Stretch], steps: Floats, floor: Floats, false_alarm: float) -> dict[str, Floats]:

@@ -182,7 +182,7 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
         loaded.append(rows[bounds.before : end] if bounds.found else rows)
         unloaded.append(np.concatenate([rows[: bounds.before], rows[end:]]))
         enclosed.append(bounds.found and min(bounds.before, bounds.after) >= FEWEST)
-    found = []
+    found, everywhere = [], np.concatenate(unloaded)
     for rows, inside, own, is_enclosed in zip(parts, loaded, unloaded, enclosed, strict=True):
         noise = max(rough_noise(moment[rows]), known, _ROUNDING * float(np.abs(moment[rows]).max()), 1e-100 * unit)
         sign = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
@@ -194,7 +194,7 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
             return float(sign * np.clip(apart, -most, most).mean() / error)
 
         absolute = score(inside, 0.0, unknown)
-        zeros = moment[own if own.size >= FEWEST and inside.size < rows.size else np.concatenate(unloaded)]
+        zeros = moment[own if own.size >= FEWEST and inside.size < rows.size else everywhere]
         zero = float(zeros.mean()) if zeros.size >= FEWEST else np.inf
         if is_enclosed or abs(zero) < _IMPOSSIBLE * unknown:
             relative = score(inside, zero, noise / np.sqrt(zeros.size))

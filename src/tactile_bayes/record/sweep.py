@@ -132,9 +132,10 @@ def base_of_sample(record: xr.Dataset) -> tuple[list[tuple[float, float]], Index
     for number in carried_sweeps(record):
         rows = sweep == number
         x[rows], y[rows] = x[np.argmax(rows)], y[np.argmax(rows)]
+    moved = np.append(True, (x[1:] != x[:-1]) | (y[1:] != y[:-1]))
     places: dict[tuple[float, float], int] = {}
-    index = [places.setdefault(place, len(places)) for place in zip(x.tolist(), y.tolist(), strict=True)]
-    return list(places), np.array(index, dtype=np.intp)
+    index = [places.setdefault(place, len(places)) for place in zip(x[moved].tolist(), y[moved].tolist(), strict=True)]
+    return list(places), np.array(index, dtype=np.intp)[np.cumsum(moved) - 1]
 
 
 def travels_of(record: xr.Dataset) -> Floats:

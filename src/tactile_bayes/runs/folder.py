@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -103,13 +104,11 @@ class Folder:
     def draw(self, what: str, name: str, plot: Callable[..., Any], *arguments: Any, **options: Any) -> None:
         """Write the figure of the Axes that a function returns, as PNG."""
         with own_style():
-            from matplotlib import pyplot as plt
-
-            with plt.ioff():
-                figure = np.ravel(plot(*arguments, **options))[0].figure
-                with self.file(what, name) as temporary:
-                    save_figure(figure, temporary, "png")
-                plt.close(figure)
+            figure = np.ravel(plot(*arguments, **options))[0].figure
+            with self.file(what, name) as temporary:
+                save_figure(figure, temporary, "png")
+        if "matplotlib.pyplot" in sys.modules:  # it would keep the figure; to load it takes a while
+            sys.modules["matplotlib.pyplot"].close(figure)
 
 
 def panels(rows: int, columns: int, width: float, height: float, **options: Any) -> Any:

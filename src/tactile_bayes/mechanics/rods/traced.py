@@ -19,7 +19,7 @@ from numpy.polynomial import Chebyshev
 from numpy.polynomial.legendre import legvander
 from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_numbers, check_positive
@@ -242,7 +242,7 @@ class _Posterior(NamedTuple):
 
     def probability_below(self, scatter: float) -> float:
         """Return the probability that the scatter is smaller than a value, if it was not given."""
-        return float(self.weights @ chi2.sf(self.squares / scatter**2, self.freedom))
+        return float(self.weights @ chdtrc(self.freedom, self.squares / scatter**2))
 
 
 def _posterior(by: Floats, target: Floats, scatter: float | None) -> _Posterior:
