@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import MEASURED, read_record, rod_of
+from tactile_bayes.record import MEASURED, read_record, rod_of, write_record
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 from tactile_bayes.sweep import scan
 
@@ -40,3 +41,39 @@ def test_the_truth_that_is_printed_is_that_of_the_contour():
 def test_the_seed_decides(path, tmp_path):
     assert measure_demo(tmp_path / "same", seed=1).read_bytes() == path.read_bytes()
     assert measure_demo(tmp_path / "other", seed=2).read_bytes() != path.read_bytes()
+
+
+def test_a_demonstration_is_replaced_by_another(tmp_path):
+    before = measure_demo(tmp_path, seed=1).read_bytes()
+    assert measure_demo(tmp_path, seed=2).read_bytes() != before
+
+
+def _of_another_rod(record):
+    return record.assign_attrs(rod_length=2.0 * record.attrs["rod_length"])
+
+
+def _of_fewer_samples(record):
+    return record.isel(sample=slice(0, -1))
+
+
+@pytest.mark.parametrize("changed", [_of_another_rod, _of_fewer_samples])
+def test_another_record_is_not_replaced(changed, path, tmp_path):
+    own = tmp_path / "record.csv"
+    write_record(changed(read_record(path)), own)
+    _is_refused(own)
+
+
+@pytest.mark.parametrize("text", ["", "notes\n1\n"])
+def test_another_file_is_not_replaced(text, tmp_path):
+    own = tmp_path / "record.csv"
+    own.write_text(text)
+    _is_refused(own)
+
+
+def _is_refused(own):
+    before, beside = own.read_bytes(), own.with_name("posterior.nc")
+    beside.touch()
+    with pytest.raises(ParameterError, match=r"record\.csv is no record of the demonstration"):
+        measure_demo(own.parent)
+    assert own.read_bytes() == before
+    assert beside.exists()

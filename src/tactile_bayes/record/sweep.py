@@ -39,8 +39,11 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
     if beyond.any():
         what = _beyond_a_turn(angle, int(np.argmax(beyond)), source)
         raise source.cell_error(np.flatnonzero(beyond), "drive_angle", what)
+    plain = _are_plain(values, forward)
     for rows in _sweeps(values["sweep"]):
         first, last = _ends(rows)
+        if isinstance(rows, slice) and plain[first:last].all():
+            continue
         sweep = int(values["sweep"][first])
         carried = _is_carried(values["base_x"][rows], values["base_y"][rows], angle[rows])
         for name, column, part in (
@@ -64,6 +67,13 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
                 f"to {float(angle[last])!r} rad ({source.row(last)}): label it {DIRECTIONS[sense > 0]!r}, or put its "
                 "samples in the order in which they were measured"
             )
+
+
+def _are_plain(values: Mapping[str, NDArray[Any]], forward: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return whether a drive only turns from one sample to the next: at one base, in the direction of its label."""
+    fixed = [forward, values["base_x"], values["base_y"]]
+    step = np.diff(values["drive_angle"])
+    return np.logical_and.reduce([np.where(forward[1:], step, -step) >= 0.0, *(v[1:] == v[:-1] for v in fixed)])
 
 
 def _beyond_a_turn(angle: Floats, sample: int, source: Source) -> str:
@@ -108,6 +118,8 @@ def carried_sweeps(record: xr.Dataset) -> tuple[int, ...]:
     """Return the numbers of the sweeps in which the drive carries the base, in the order of the record."""
     columns = [record[name].values for name in ("base_x", "base_y", "drive_angle")]
     sweep = record.sweep.values
+    if all((values == values[0]).all() for values in columns[:2]):
+        return ()
     found = {int(sweep[_ends(rows)[0]]): _is_carried(*(values[rows] for values in columns)) for rows in _sweeps(sweep)}
     return tuple(number for number, carried in found.items() if carried)
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 
+import numpy as np
+
 from tactile_bayes.contours import Parabola
+from tactile_bayes.errors import ParameterError, RecordWarning, TactileBayesError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import write_record
+from tactile_bayes.record import CHANNELS, MEASURED, read_record, rod_of, write_record
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR
 from tactile_bayes.sweep import scan
 from tactile_bayes.tasks import replace_together
@@ -37,6 +41,11 @@ def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> Path:
     seed : int
         Seed of the load cell's noise.
 
+    Raises
+    ------
+    ParameterError
+        If the folder holds a record.csv that is no record of the demonstration.
+
     Returns
     -------
     Path
@@ -44,6 +53,7 @@ def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> Path:
     """
     measured = LOAD_CELL.measure(scan(CONTOUR, rod=ROD).record, seed=seed)
     path = Path(out) / "record.csv"
+    _refuse_another_record(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
     with replace_together(
@@ -51,3 +61,27 @@ def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> Path:
     ) as temporary:  # the run is of another record
         write_record(measured, temporary / path.name)
     return path
+
+
+def _refuse_another_record(path: Path) -> None:
+    """Refuse to replace a record that differs from those of the demonstration in more than its noise."""
+    if not os.path.lexists(path) or _is_of_demo(path):
+        return
+    raise ParameterError(
+        f"{path} is no record of the demonstration, which would replace it: give another folder, as in "
+        "tactile-bayes demo --out results/demo"
+    )
+
+
+def _is_of_demo(path: Path) -> bool:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RecordWarning)
+            found = read_record(path)
+        if (rod_of(found), LoadCell.from_record(found)) != (ROD, LOAD_CELL):
+            return False
+    except (TactileBayesError, OSError):
+        return False
+    ideal = scan(CONTOUR, rod=ROD).record
+    fixed = [name for name in MEASURED if name not in CHANNELS]
+    return found.sizes == ideal.sizes and all(np.array_equal(found[name], ideal[name]) for name in fixed)
