@@ -107,9 +107,11 @@ def test_a_process_with_the_locale_of_c():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes end otherwise there")
 def test_a_reader_that_goes_away_ends_the_command_quietly(tmp_path):
-    with (tmp_path / "errors").open("wb") as errors:
-        with subprocess.Popen(QUICK, stdout=subprocess.PIPE, stderr=errors) as process:
-            process.stdout.close()
+    with (
+        (tmp_path / "errors").open("wb") as errors,
+        subprocess.Popen(QUICK, stdout=subprocess.PIPE, stderr=errors) as process,
+    ):
+        process.stdout.close()
     assert (tmp_path / "errors").read_bytes() == b""
 
 
