@@ -47,16 +47,18 @@ def pytest_sessionstart(session):
 
 
 SAMPLING = re.compile(
-    r"\b(infer_(contour|rig|point_load)|calibrat(e|ion_replicate)|compare_families|Stream(Comparison)?)\("
+    r"\b(infer_(contour|rig|point_load)|calibrat(e|ion_replicate)|compare_families|Stream(Comparison)?|design)\("
 )
 """Calls that take a second or more."""
+
+OWN_EXAMPLES = ("inference.contour.infer_contour", "planning.design.design")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Examples of docstrings that sample a posterior are slow, but for that of `infer_contour` itself."""
+    """Examples of docstrings that sample a posterior or plan are slow, but for those of two functions themselves."""
     for item in items:
-        if isinstance(item, pytest.DoctestItem) and not item.name.endswith("inference.contour.infer_contour"):
+        if isinstance(item, pytest.DoctestItem) and not item.name.endswith(OWN_EXAMPLES):
             source = "".join(example.source for example in item.dtest.examples)
             if SAMPLING.search(source):
                 item.add_marker("slow")

@@ -141,7 +141,12 @@ def test_commands_and_options_that_are_shown_exist(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("noise", "page"), [("usual", ROOT / "README.md"), ("tenth", DOCS / "trust.md"), ("threefold", DOCS / "trust.md")]
+    ("noise", "page"),
+    [
+        ("usual", ROOT / "README.md"),
+        pytest.param("tenth", DOCS / "trust.md", marks=pytest.mark.slow),
+        ("threefold", DOCS / "trust.md"),
+    ],
 )
 def test_a_table_of_calibrations_is_that_of_the_published_replicates(noise: str, page: Path) -> None:
     assert table(noise, published(noise)) in TEXTS[page]

@@ -204,6 +204,7 @@ def again(number, **options):
     return calibration_replicate(number, **(asked | options))
 
 
+@pytest.mark.slow
 def test_a_replicate_is_the_same_again(small):
     found, folder = small
     before = (folder / REPLICATES.file).read_bytes()

@@ -113,6 +113,7 @@ def test_a_replicate_again_is_the_one_of_the_run(done):
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_replicate_again_as_json(done):
     out, _ = done
     result = call("--out", out, "--replicate", 0, "--json", *QUICK)

@@ -19,13 +19,16 @@ CIRCLE = ["--family", "circle", "--parameter", "r=0.3", "--parameter", "q=0.8"]
 CARRY = ["--carry", "0.8,0,180,68.75,1.6", *CIRCLE]
 
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
+
 def run_of(folder, *options):
     """A run of commands from a scan to a report."""
     ideal, measured, run = folder / "ideal.csv", folder / "measured.csv", folder / "run"
     for arguments in (
         ("scan", *CARRY, *options, "--out", ideal),
         ("measure", ideal, "--force-noise", 0.05, "--moment-noise", 0.02, "--out", measured),
-        ("infer", measured, "--family", "circle", "--as-stated", "--out", run),
+        ("infer", measured, "--family", "circle", "--as-stated", "--max-steps", 60, "--out", run),
     ):
         result = call(*arguments)
         assert result.exit_code == 0, result.output
@@ -33,12 +36,12 @@ def run_of(folder, *options):
 
 
 @pytest.fixture(scope="module")
-def carried(tmp_path_factory):
+def carried(tmp_path_factory, coarse_pictures):
     return run_of(tmp_path_factory.mktemp("carried"))
 
 
 @pytest.fixture(scope="module")
-def mixed(tmp_path_factory):
+def mixed(tmp_path_factory, coarse_pictures):
     return run_of(tmp_path_factory.mktemp("mixed"), "--base", "0,0")
 
 

@@ -17,6 +17,7 @@ from tactile_bayes.cli.streams import accept_every_text
 ENCODINGS = ["ascii", "cp1252", "cp437", "latin-1", "koi8-r", "shift_jis", "utf-8"]
 
 COMMAND = [sys.executable, "-m", "tactile_bayes.cli"]
+QUICK = [*COMMAND, "dataset", "example"]
 
 
 @contextmanager
@@ -94,27 +95,28 @@ def test_an_example_is_text_of_toml_on_every_stream():
     assert tomllib.loads(written.decode("ascii"))
 
 
-@pytest.mark.parametrize("json_asked", [[], ["--json"]])
-def test_a_process_with_the_locale_of_c(record, json_asked):
+def test_a_process_with_the_locale_of_c():
     variables = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    command = [*COMMAND, "inspect", str(record), *json_asked]
-    done = subprocess.run(command, capture_output=True, env=os.environ | variables, check=True)
+    words = ["measure", "--help"]
+    done = subprocess.run([*COMMAND, *words], capture_output=True, env=os.environ | variables, check=True)
+    assert not called("utf-8", *words)[0].isascii()
     assert done.stdout.isascii()
     assert done.stderr == b""
-    assert b"drive" in done.stdout
+    assert b"Usage: " in done.stdout
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes end otherwise there")
-def test_a_reader_that_goes_away_ends_the_command_quietly(record, tmp_path):
-    with (tmp_path / "errors").open("wb") as errors:
-        command = [*COMMAND, "inspect", str(record)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors) as process:
-            process.stdout.close()
+def test_a_reader_that_goes_away_ends_the_command_quietly(tmp_path):
+    with (
+        (tmp_path / "errors").open("wb") as errors,
+        subprocess.Popen(QUICK, stdout=subprocess.PIPE, stderr=errors) as process,
+    ):
+        process.stdout.close()
     assert (tmp_path / "errors").read_bytes() == b""
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-def test_a_full_disk_behind_the_stream_is_named(record):
+def test_a_full_disk_behind_the_stream_is_named():
     with open("/dev/full", "wb") as full:
-        done = subprocess.run([*COMMAND, "inspect", str(record)], stdout=full, stderr=subprocess.PIPE, check=False)
+        done = subprocess.run(QUICK, stdout=full, stderr=subprocess.PIPE, check=False)
     assert (done.returncode, done.stderr) == (2, b"tactile-bayes: No space left on device\n")

@@ -289,11 +289,11 @@ def test_no_family_is_probable_while_an_evidence_is_too_small(path, lines, follo
 
 def test_control_c_ends_it_with_the_answer(path, lines, monkeypatch):
     head, rows = lines
-    write(path, head, rows[:30])
+    write(path, head, rows[:10])
     monkeypatch.setattr(watching.time, "sleep", lambda seconds: os.kill(os.getpid(), signal.SIGINT))
     result = commands.call("watch", path, "--out", path.parent / "run", *FEW)
     assert result.exit_code == 0
-    assert "\nEnded after 30 samples: stopped by Ctrl-C.\n" in result.stdout
+    assert "\nEnded after 10 samples: stopped by Ctrl-C.\n" in result.stdout
     path.unlink()
     result = commands.call("watch", path, "--out", path.parent / "other", *FEW)
     assert result.exit_code == 130

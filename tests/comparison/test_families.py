@@ -49,6 +49,7 @@ def test_a_band_can_be_averaged_over_families(compared):
     assert (band["upper"] > Circle(0.8, 0.5, 0.0).height(band["x"].values)).all()
 
 
+@pytest.mark.slow
 def test_wider_priors_are_worse_for_more_parameters(compared):
     wide = compared.probability_by_width
     np.testing.assert_allclose(wide.sum("family"), 1.0)

@@ -67,14 +67,23 @@ def test_a_family_far_behind_is_given_up(compared):
         compared[0].posterior("parabola")
 
 
-def test_heights_are_averaged_over_families(compared):
+@pytest.mark.slow
+def test_a_condition_ends_it_near_the_truth(compared):
     now = compared[1][-1]
+    band, truth = tb.contour_band(now, X), tb.contours.Circle(0.4, q=0.5).height(np.array(X))
+    assert np.all((band["lower"].values < truth) & (truth < band["upper"].values))
+    assert bool(now.may_stop)
+
+
+def test_heights_are_averaged_over_families_and_a_refusal_leaves_all_streams_as_they_were(measured):
+    streams = tb.StreamComparison(families=FAMILIES[:2], x=X, **(OPTIONS | {"particles": 100}))
+    now = streams.update(measured.isel(sample=slice(0, 20)))
     band = tb.contour_band(now, X)
     np.testing.assert_allclose(now.height.sel(level=0.025), band["lower"], rtol=1e-12)
     np.testing.assert_allclose(now.height.sel(level=0.975), band["upper"], rtol=1e-12)
-    truth = tb.contours.Circle(0.4, q=0.5).height(np.array(X))
-    assert np.all((band["lower"].values < truth) & (truth < band["upper"].values))
-    assert bool(now.may_stop)
+    with pytest.raises(RecordError):
+        streams.update(measured.isel(sample=slice(0, 12)))
+    assert streams.record.sizes["sample"] == 20
 
 
 @pytest.mark.slow
@@ -96,14 +105,6 @@ def test_resumed_streams_go_on_with_the_same_numbers(measured, tmp_path):
             tb.StreamComparison.resume(tmp_path / "streams.nc", **(options | changed))
     with pytest.raises(InferenceError, match=r"streams\.nc"):
         tb.Stream.resume(tmp_path / "streams.nc", **options)
-
-
-def test_a_refusal_leaves_all_streams_as_they_were(measured):
-    streams = tb.StreamComparison(families=FAMILIES[:2], **(OPTIONS | {"particles": 100}))
-    streams.update(measured.isel(sample=slice(0, 12)))
-    with pytest.raises(RecordError):
-        streams.update(measured.isel(sample=slice(0, 12)))
-    assert streams.record.sizes["sample"] == 12
 
 
 @pytest.mark.parametrize(

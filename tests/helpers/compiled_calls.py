@@ -1,37 +1,28 @@
 """Compiled functions of numbers, called for arrays: they have no face of their own for Python."""
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
-import numba
 import numpy as np
 
 __all__ = ["by_number"]
 
 
-@functools.cache
 def by_number(function: Callable[..., Any], outputs: int) -> Callable[..., Any]:
     """From arrays of shape (n,) to what the function makes of each entry, flat, shape (n, outputs).
 
     Parameters
     ----------
     function : callable
-        From numbers to a tuple of numbers, compiled.
+        Compiled; writes into rows of an array what it makes of the rows of another one.
     outputs : int
-        How many these are.
+        How many numbers it makes of each.
     """
-
-    @numba.njit(error_model="numpy")
-    def of_rows(rows, out):
-        for i in range(rows.shape[0]):
-            for k, value in enumerate(function(rows[i])):
-                out[i, k] = value
 
     def of_arrays(*arguments):
         rows = np.stack(np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in arguments)), axis=-1)
         out = np.empty((rows.shape[0], outputs))
-        of_rows(rows, out)
+        function(rows, out)
         return out
 
     return of_arrays

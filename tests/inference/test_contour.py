@@ -292,6 +292,7 @@ def test_priors_that_exclude_the_truth_are_obeyed(name, prior):
     assert values.max() <= high
 
 
+@pytest.mark.slow
 def test_priors_of_which_little_is_within_reach(monkeypatch):
     monkeypatch.setattr("tactile_bayes.inference.contour_model._MOST_TRIALS", 5)
     result = infer_as_stated(coarse(), seed=1, priors={"q": stats.uniform(0.0, 150.0)}, settings=BRIEF)

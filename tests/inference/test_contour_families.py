@@ -23,9 +23,8 @@ TRUTHS = {
 }
 
 
-@pytest.mark.parametrize(
-    "name", ["ellipse", *(pytest.param(name, marks=pytest.mark.slow) for name in TRUTHS if name != "ellipse")]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TRUTHS)
 def test_posteriors_lie_about_the_truth(name):
     """Within 4.5 posterior standard deviations: false alarm 7e-6 a number, if the posterior is right."""
     family = family_named(name)

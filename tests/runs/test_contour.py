@@ -223,7 +223,7 @@ def broken(*arguments, **options):
 @pytest.mark.parametrize(
     ("function", "what", "file"),
     [
-        ("contact_points", "contacts", "contacts.csv"),
+        pytest.param("contact_points", "contacts", "contacts.csv", marks=pytest.mark.slow),
         pytest.param("contour_band", "band", "band.csv", marks=pytest.mark.slow),
         pytest.param("gap_if_any", "gap", None, marks=pytest.mark.slow),
         ("verdicts", "verdicts", None),

@@ -127,7 +127,7 @@ def swept(seed: int) -> tuple[Shooting, SweepEvents]:
         return Shooting(contour, rod.in_sweep(side), thick, side, friction), events[direction]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(5, 17))])
+@pytest.mark.parametrize("seed", [1, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 17))])
 def test_events_against_shooting(seed):
     shooting, events = swept(seed)
     side = shooting.side

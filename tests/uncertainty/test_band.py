@@ -33,7 +33,7 @@ def test_a_pointwise_band_is_made_of_quantiles(probability):
     assert band.attrs == {"probability": probability, "simultaneous": 0}
 
 
-@pytest.mark.parametrize("which", ["made", "inferred"])
+@pytest.mark.parametrize("which", ["made", pytest.param("inferred", marks=pytest.mark.slow)])
 def test_a_simultaneous_band_holds_whole_contours(which):
     """Its share of whole contours is the stated one, up to one contour (walkers repeat); pointwise bands hold fewer."""
     posterior_ = made() if which == "made" else posterior()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.optimize import brentq
-from scipy.special import bdtr, gammaln, log_ndtr
+from scipy.special import bdtr, gammaln, log_ndtr, xlogy
 
 from tactile_bayes.arrays import Floats, Index
 
@@ -169,11 +169,17 @@ def _power(count: int, probabilities: Floats, level: float) -> float:
     first, reached = 0, np.ones(1)  # the least possible number, and the probabilities from it on
     for rank in range(top):
         allowed = np.flatnonzero(inside[first:, rank]) + first
-        more = stats.poisson.pmf(counts[: allowed[-1] + 1 - first], count * probabilities[rank])
+        more = _poisson(counts[: allowed[-1] + 1 - first], count * probabilities[rank])
         reached = np.convolve(reached, more)[allowed[0] - first : allowed[-1] + 1 - first]
         first = allowed[0]
-    rest = stats.poisson.pmf(count - first - np.arange(reached.size), count * probabilities[top])
-    return float(1.0 - reached @ rest / stats.poisson.pmf(count, count))
+    rest = _poisson(count - first - np.arange(reached.size), count * probabilities[top])
+    return float(1.0 - reached @ rest / _poisson(np.array(count), count))
+
+
+def _poisson(numbers: Index, mean: float) -> Floats:
+    """Return Poisson probabilities, whose checks in `scipy.stats` take longer than they do; 0 for negative numbers."""
+    possible = np.maximum(numbers, 0)
+    return np.where(numbers < 0, 0.0, np.exp(xlogy(possible, mean) - mean - gammaln(possible + 1)))
 
 
 @lru_cache(maxsize=8)

@@ -62,7 +62,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
         If the rod does not reach the contour in every sweep.
     """
     model, point = plan.model, plan.point
-    whole = record_information(model, point)
+    whole = record_information(model, point, slopes=plan.reading_slopes)
     prior = np.diag(prior_precision(model))
     matrix = whole.matrix
     covariance = _inverse(matrix + prior)
@@ -74,7 +74,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
     for channel in range(len(CHANNELS)):
         only = np.arange(len(CHANNELS)) == channel
         for kind, chosen in (("alone", only), ("without", ~only)):
-            part = record_information(model, point, chosen).matrix + prior
+            part = record_information(model, point, chosen, slopes=plan.reading_slopes).matrix + prior
             of_channels[kind].append(np.sqrt(np.diag(_inverse(part))))
     intervals = stretches(plan.scan)
     x = np.concatenate([stretch.x for stretch in intervals])

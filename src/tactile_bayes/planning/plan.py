@@ -25,6 +25,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import CERTAIN
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.family_parameters import family_parameters
+from tactile_bayes.planning.record_information import ReadingSlopes, reading_slopes
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Drive, Scan, scan
@@ -159,6 +160,11 @@ class Plan:
         own = {**family_parameters(self.contour)[1], **dict(zip(smooth, self.model.prior_medians(smooth), strict=True))}
         as_stated = {name: 1.0 for name in self.model.names if name.endswith(("_scale", "_gain"))}
         return np.array([own.get(name, as_stated.get(name, 0.0)) for name in self.model.names])
+
+    @cached_property
+    def reading_slopes(self) -> ReadingSlopes:
+        """Loads and derivatives of the readings at the point, which take longest of all that a plan is asked for."""
+        return reading_slopes(self.model, self.point)
 
     def with_noise(self, factor: float) -> Plan:
         """Return the plan with force_noise and moment_noise of the load cell multiplied by a factor."""

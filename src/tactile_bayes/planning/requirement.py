@@ -27,7 +27,7 @@ from tactile_bayes.errors import ContourError, ParameterError, ReachError, Strai
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.planning.record_information import prior_precision, reading_slopes, record_information
+from tactile_bayes.planning.record_information import prior_precision, record_information
 from tactile_bayes.tasks import TaskProgress
 
 __all__ = ["Where", "required_noise", "required_rod"]
@@ -48,14 +48,13 @@ class _Band:
         model, point = plan.model, plan.point
         self._plan = plan
         self._slopes = height_slopes(model, point, x)
-        self._by = reading_slopes(model, point)
         self._prior = np.diag(prior_precision(model))
         self._wide = band_factor(probability)
 
     def width(self, factor: float) -> float:
         """Return the mean width over the grid points [length]."""
         plan, cell = self._plan, self._plan.with_noise(factor).cell
-        gained = record_information(plan.model, plan.point, slopes=self._by, load_cell=cell).matrix
+        gained = record_information(plan.model, plan.point, slopes=plan.reading_slopes, load_cell=cell).matrix
         spread = deviation_of_heights(self._slopes, gained + self._prior)
         return self._wide * float(spread.mean())
 

@@ -146,6 +146,7 @@ def test_moves_of_some_coordinates_leave_a_target_invariant(parameters, moves, w
     assert np.all(np.abs(error) < 4.0 * standard)
 
 
+@pytest.mark.slow
 def test_a_move_that_does_not_is_noticed():
     """One that forgets how probable its proposals are draws walkers together."""
     error, standard = moments(Gaussian(8, 1.0, wall=False), MOVES["careless"], ensembles=32, steps=50)

@@ -176,6 +176,7 @@ def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
     assert np.isfinite((narrow.upper - narrow.lower).values).all()
 
 
+@pytest.mark.slow
 def test_a_good_record_suggests_nothing():
     assert check_record(infer_contour(measured(), nuisances=(), seed=1, settings=MODEST)).attrs["suggestion"] == ""
 

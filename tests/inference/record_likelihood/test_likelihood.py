@@ -420,7 +420,7 @@ def off_at_the_truth(noise, family, numbers):
 @pytest.mark.parametrize(
     ("noise", "family", "count"),
     [
-        (1.0, "parabola", 30),
+        pytest.param(1.0, "parabola", 30, marks=pytest.mark.slow),
         (0.01, "parabola", 30),
         *(pytest.param(noise, "parabola", 1000, marks=pytest.mark.slow) for noise in (1.0, 0.1, 0.01)),
         *(

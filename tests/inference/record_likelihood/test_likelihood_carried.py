@@ -31,7 +31,7 @@ def model(drive, family="circle", nuisances=STANDARD):
 def test_the_fast_mode_agrees_with_the_exact_one(drive):
     """For contours and rigs drawn from the default priors: events, and loads to a small share of the noise."""
     of_record = model(drive)
-    points, _ = of_record.draw_prior(np.random.default_rng(4), 150)
+    points, _ = of_record.draw_prior(np.random.default_rng(4), 50)
     contours, rig, likelihood = of_record.contours(points), of_record.rig(points), of_record.likelihood
     loads, reached, events = likelihood.predict_with_events(contours, rig)
     likelihood.exact = True

@@ -96,6 +96,7 @@ def test_the_rig_is_found_with_its_gauge():
     assert list(rig()["posterior"].data_vars) == [*NAMES, "noise_scale"]
 
 
+@pytest.mark.slow
 def test_a_stem_is_found_and_lasts():
     """The rod is stated to begin at the pivot, and begins 4 % of its length from there."""
     true = Rod(stem=0.04)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import functools
 import math
 
-import numba
 import numpy as np
 import pytest
 
 from helpers.profiled_rods import drawn_rods, integrated
+from tactile_bayes.mechanics.compiler import cached
 from tactile_bayes.mechanics.contacts import profile_contact, states
 from tactile_bayes.mechanics.poses import profile_pose, profile_shape
 from tactile_bayes.mechanics.poses.taylor import FARTHEST, workspace
@@ -23,37 +23,37 @@ RODS = drawn_rods()
 WORK = workspace()
 
 
-@numba.njit(error_model="numpy")
+@cached
 def pose(profile, psi1, arclength, force, work):
     return _pose(profile, psi1, arclength, force, work)
 
 
-@numba.njit(error_model="numpy")
+@cached
 def contact(profile, wrench, delta, work):
     return _contact(profile, wrench[0], wrench[1], wrench[2], wrench[3], delta, work)
 
 
-@numba.njit(error_model="numpy")
+@cached
 def closed(wrench, delta):
     return _closed(wrench[0], wrench[1], wrench[2], wrench[3], delta)
 
 
-@numba.njit(error_model="numpy")
+@cached
 def shape(profile, wrench, end, arclengths, x, y, work):
     _shape(profile, wrench[0], wrench[1], wrench[2], wrench[3], end, arclengths, x, y, work)
 
 
-@numba.njit(error_model="numpy")
+@cached
 def bending(profile, wrench, end, work):
     return _bending(profile, wrench[0], wrench[1], wrench[2], wrench[3], end, work)
 
 
-@numba.njit(error_model="numpy")
+@cached
 def rest(profile, arclength, work):
     return _rest(profile, 0.0, arclength, work)
 
 
-@numba.njit(error_model="numpy")
+@cached
 def chord(profile, distance, work):
     return _chord(profile, 0.0, distance, work)
 

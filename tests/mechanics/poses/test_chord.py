@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -10,6 +9,7 @@ from scipy.optimize import brentq
 from helpers.compiled_calls import by_number
 from helpers.exact_rod import mp
 from helpers.legendre import HALF, piece, theta_of
+from tactile_bayes.mechanics.compiler import cached
 from tactile_bayes.mechanics.poses import arc as compiled_arc
 from tactile_bayes.mechanics.poses import chord as compiled_chord
 
@@ -20,26 +20,31 @@ _arc_to, _arc_at = compiled_arc.arc_to, compiled_arc.arc_at
 _tangential_arc, _tip_arc = compiled_chord.tangential_arc, compiled_chord.tip_arc
 
 
-@numba.njit(error_model="numpy")
-def _to(row):
-    return _arc_to(row[0], row[1])[0]
+@cached
+def _to(rows, out):
+    for i in range(len(rows)):
+        arc, _ = _arc_to(rows[i, 0], rows[i, 1])
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = arc
 
 
-@numba.njit(error_model="numpy")
-def _at(row):
-    return _arc_at(row[0], row[1], row[2])
+@cached
+def _at(rows, out):
+    for i in range(len(rows)):
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = _arc_at(rows[i, 0], rows[i, 1], rows[i, 2])
 
 
-@numba.njit(error_model="numpy")
-def _lying(row):
-    chi, arc, _ = _tangential_arc(row[0], row[1], row[2])
-    return chi, arc.length, arc.shortfall, arc.offset, arc.turn
+@cached
+def _lying(rows, out):
+    for i in range(len(rows)):
+        out[i, 0], arc, _ = _tangential_arc(rows[i, 0], rows[i, 1], rows[i, 2])
+        out[i, 1], out[i, 2], out[i, 3], out[i, 4] = arc
 
 
-@numba.njit(error_model="numpy")
-def _ending(row):
-    chi, epsilon1, arc, _, _ = _tip_arc(row[0], row[1], row[2], row[3])
-    return chi, epsilon1, arc.length, arc.shortfall, arc.offset, arc.turn
+@cached
+def _ending(rows, out):
+    for i in range(len(rows)):
+        out[i, 0], out[i, 1], arc, _, _ = _tip_arc(rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3])
+        out[i, 2], out[i, 3], out[i, 4], out[i, 5] = arc
 
 
 class Arcs(NamedTuple):

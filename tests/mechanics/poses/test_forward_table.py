@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import pytest
 
 from helpers.profiled_rods import drawn_rods
+from tactile_bayes.mechanics.compiler import cached
 from tactile_bayes.mechanics.poses import beam, forward_table, profile_pose, taylor
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLE, PARTS, Box
 from tactile_bayes.mechanics.poses.forward_table import forward_table as tabulated
@@ -24,7 +24,7 @@ ERROR, ERROR_OF_SLOPES = 1e-5, 1e-3
 """Largest errors of a pose, over the arc length, and of its derivatives by share of the ranges."""
 
 
-@numba.njit(error_model="numpy", _nrt=False)
+@cached
 def _poses(varied, table, delta, psi1, arclength, force, tip, out):
     profile = varied.profile
     slenderness = table.slenderness if _prepare(table, profile, delta, varied.sheet) else 0.0
@@ -37,7 +37,7 @@ def _poses(varied, table, delta, psi1, arclength, force, tip, out):
     return slenderness > 0.0
 
 
-@numba.njit(error_model="numpy", _nrt=False)
+@cached
 def _chords(varied, table, stem, mirrored, distances, out):
     profile = varied.profile
     slenderness = table.slenderness if _prepare(table, profile, 0.0, varied.sheet) else 0.0
@@ -163,7 +163,7 @@ def test_the_bound_of_the_rest_curvature_is_not_below_it():
             assert bound(profile) >= most - 1e-9
 
 
-@numba.njit(error_model="numpy", _nrt=False)
+@cached
 def bound(profile):
     return _most(profile)
 
@@ -191,7 +191,7 @@ def test_strong_friction_of_a_hooked_rod_needs_a_small_range_of_the_force():
         assert np.abs(found - exact)[before, 0].max() < 1e-5
 
 
-@numba.njit(error_model="numpy", _nrt=False)
+@cached
 def _write_distances(profile, psi1, forces, sheet, work, out):
     """Distances of the ends of parts from those of the exact walk; NaN where parts do not hold."""
     _write_parts(profile, sheet)

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import pytest
 
 from helpers.compiled_calls import by_number
 from helpers.exact_rod import mp
+from tactile_bayes.mechanics.compiler import cached
 from tactile_bayes.mechanics.poses import jacobi as compiled_jacobi
 
 EPS = np.finfo(float).eps
 _jacobi, _jacobi_and_slopes = compiled_jacobi.jacobi, compiled_jacobi.jacobi_and_slopes
 
 
-@numba.njit(error_model="numpy")
-def _values(row):
-    return _jacobi(row[0], row[1])
+@cached
+def _values(rows, out):
+    for i in range(len(rows)):
+        for k, value in enumerate(_jacobi(rows[i, 0], rows[i, 1])):
+            out[i, k] = value
 
 
-@numba.njit(error_model="numpy")
-def _slopes(row):
-    a, b, c = _jacobi_and_slopes(row[0], row[1])
-    return a.s, a.c, a.d, a.r, a.j, b.s, b.c, b.d, b.r, b.j, c.s, c.c, c.d, c.r, c.j
+@cached
+def _slopes(rows, out):
+    for i in range(len(rows)):
+        for k, part in enumerate(_jacobi_and_slopes(rows[i, 0], rows[i, 1])):
+            for n, value in enumerate(part):
+                out[i, 5 * k + n] = value
 
 
 def parameters():

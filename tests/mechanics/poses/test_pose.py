@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import pytest
 
 from helpers.compiled_calls import by_number
 from helpers.integration import bent_rod
+from tactile_bayes.mechanics.compiler import cached
 from tactile_bayes.mechanics.poses import pose as compiled_pose
 
 _pose, _pose_and_slopes = compiled_pose.pose, compiled_pose.pose_and_slopes
 
 
-@numba.njit(error_model="numpy")
-def _values(row):
-    return _pose(row[0], row[1], row[2], row[3])
+@cached
+def _values(rows, out):
+    for i in range(len(rows)):
+        out[i, 0], out[i, 1], out[i, 2] = _pose(rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3])
 
 
-@numba.njit(error_model="numpy")
-def _slopes(row):
-    here, by_q, by_force = _pose_and_slopes(row[0], row[1], row[2], row[3], row[4] > 0.0)
-    return here.u, here.v, here.turn, by_q.u, by_q.v, by_q.turn, by_force.u, by_force.v, by_force.turn
+@cached
+def _slopes(rows, out):
+    for i in range(len(rows)):
+        row = rows[i]
+        for k, part in enumerate(_pose_and_slopes(row[0], row[1], row[2], row[3], row[4] > 0.0)):
+            out[i, 3 * k], out[i, 3 * k + 1], out[i, 3 * k + 2] = part
 
 
 def drawn(count=120):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 import pytest
 
 from helpers.profiled_rods import RodAlong, drawn_rods, integrated_pose
+from tactile_bayes.mechanics.compiler import cached
 from tactile_bayes.mechanics.poses import pose as closed
 from tactile_bayes.mechanics.poses import profile_pose
 from tactile_bayes.mechanics.poses.taylor import workspace
@@ -21,20 +21,20 @@ RODS = drawn_rods()
 WORK = workspace()
 
 
-@numba.njit(error_model="numpy")
+@cached
 def _values(profile, psi1, arclength, force, work, out):
     for i in range(psi1.size):
         out[i, 0], out[i, 1], out[i, 2] = _pose(profile, psi1[i], arclength[i], force[i], work)
 
 
-@numba.njit(error_model="numpy")
+@cached
 def _slopes(profile, psi1, arclength, force, work, out):
     for i in range(psi1.size):
         for k, pose in enumerate(_pose_and_slopes(profile, psi1[i], arclength[i], force[i], work)):
             out[i, k, 0], out[i, k, 1], out[i, k, 2] = pose
 
 
-@numba.njit(error_model="numpy")
+@cached
 def _arcs(psi1, arclength, force, curvature, out):
     for i in range(psi1.size):
         for tip in range(2):

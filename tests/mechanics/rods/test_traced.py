@@ -60,7 +60,9 @@ def standardised(curvature, x, y, scatter=None):
     return np.append((rod.rest_curvature(S) - curvature(S)) / rod.deviation(S), off / rod.deviation_of_mean)
 
 
-@pytest.mark.parametrize(("scatter", "given"), [(0.02, None), (0.2, None), (0.2, 0.2)])
+@pytest.mark.parametrize(
+    ("scatter", "given"), [(0.02, None), pytest.param(0.2, None, marks=pytest.mark.slow), (0.2, 0.2)]
+)
 def test_deviations_are_those_of_the_errors(scatter, given):
     """Over drawn rods, at the ends too: mean squares of 60 standardised errors are below the chi-square limit of 1e-6.
 
@@ -185,7 +187,7 @@ def test_curvature_does_not_follow_the_scatter():
 
 
 @pytest.mark.parametrize("name", CURVATURES)
-@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize("given", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_rod_may_go_on_beyond_its_points(name, given):
     """Its trend goes on, with errors that are as large as stated; the points tell no less of the rest."""
     rng = np.random.default_rng(12)
