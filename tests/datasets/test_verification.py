@@ -1,5 +1,6 @@
 """Every kind of damage to a data set is found, and the file named."""
 
+import dataclasses
 import json
 import shutil
 
@@ -145,6 +146,17 @@ def test_numbers_that_come_out_otherwise_are_found(folder, monkeypatch):
     monkeypatch.setattr("tactile_bayes.datasets.verification.generate_records", otherwise)
     verify(folder)
     with pytest.raises(SpecificationError, match=r"shard-000000\.nc: truth_force_x .* numpy \d"):
+        verify(folder, regenerate=1)
+
+
+@pytest.mark.parametrize("change", [{"strained": 1}, {"untouched": 3}, {"redrawn": {"out of reach": 2}}], ids=str)
+def test_counts_that_come_out_otherwise_are_found(folder, change):
+    """Each is possible, and only another generation knows better."""
+    manifest = read_manifest(folder)
+    shards = (manifest.shards[0]._replace(**change), *manifest.shards[1:])
+    write_manifest(dataclasses.replace(manifest, shards=shards), folder)
+    verify(folder)
+    with refused(SpecificationError, "shard-000000.nc", *change):
         verify(folder, regenerate=1)
 
 
