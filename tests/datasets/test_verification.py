@@ -112,7 +112,7 @@ def test_progress_is_told(folder):
 def test_a_specification_that_is_not_the_stated_one_is_found(folder):
     manifest = read_manifest(folder)
     write_manifest(type(manifest)(**{**vars(manifest), "specification_sha256": "0" * 64}), folder)
-    with refused(SpecificationError, "specification", "checksum"):
+    with refused(SpecificationError, "manifest.json", "specification_sha256", "put a copy of it back"):
         verify(folder)
 
 

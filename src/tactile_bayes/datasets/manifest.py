@@ -15,10 +15,10 @@ from typing import Any
 
 from tactile_bayes.datasets.shard import Written, file_in, shard_file
 from tactile_bayes.datasets.specification import Specification
-from tactile_bayes.datasets.specification_text import DEFAULTS
+from tactile_bayes.datasets.specification_reading import read_text
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.tasks import write_atomically
-from tactile_bayes.tasks.documents import read_json, read_toml
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["MANIFEST", "Manifest", "read_manifest", "versions_here", "write_manifest"]
 
@@ -30,6 +30,7 @@ _CORRECTION = (
     "put a copy of it back, or run dataset generate with the same specification into another folder, which makes the "
     "same files again"
 )
+_OF_SPECIFICATION = ("name", "specification_sha256", "seed", "records", "shard_records")
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "xarray", "h5netcdf", "h5py")
 
 
@@ -69,11 +70,6 @@ class Manifest:
     def of(cls, spec: Specification) -> Manifest:
         """Return the manifest of a data set without files."""
         return cls(spec.name, spec.text, spec.sha256, spec.seed, spec.records, spec.shard_records, versions_here())
-
-    def is_of(self, spec: Specification) -> bool:
-        """Return whether the manifest states what follows from a specification, which may have another text."""
-        stated = (self.specification_sha256, self.seed, self.records, self.shard_records)
-        return stated == (spec.sha256, spec.seed, spec.records, spec.shard_records)
 
     def having(self, written: Iterable[Written]) -> Manifest:
         """Return the manifest with further files."""
@@ -164,8 +160,11 @@ def _check(manifest: Manifest) -> None:
     _refuse_unless_typed(manifest, counts=("seed", "records", "shard_records"))
     if not all(isinstance(text, str) for text in [*manifest.versions.keys(), *manifest.versions.values()]):
         raise ValueError("its versions are not texts")
-    stated = {**DEFAULTS, **read_toml(manifest.specification)}
-    _refuse_other(vars(manifest), {name: stated.get(name) for name in ("name", "seed", "records", "shard_records")})
+    try:
+        stated = vars(Manifest.of(read_text(manifest.specification)))
+    except SpecificationError as error:
+        raise ValueError(f"its specification is none: {error}") from error
+    _refuse_other(vars(manifest), {name: stated[name] for name in _OF_SPECIFICATION})
     before = -1
     for shard in manifest.shards:
         _refuse_unless_typed(shard, texts=("file", "sha256"))
