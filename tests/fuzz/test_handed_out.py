@@ -2,6 +2,7 @@
 
 import warnings
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,17 @@ def depth_before(scan, rod, drive):
     """Greatest depth of the unloaded rod in the object on its way to first contact."""
     way = np.linspace(0.0, scan.sweeps[0].first_contact.travel, POSES)[:-1]
     return max(depth(scan.contour, *rest_line(rod, *pose)) for pose in drive.at(way))
+
+
+def test_an_object_in_the_way_is_found():
+    """Of a scan beside an object that is 0.01 lower, both checks say that the rod is in it."""
+    drive = tb.Translation((0.9, -0.3), np.pi, 1.5, 1.8)
+    scan = tb.scan(tb.contours.Parabola(0.5, 0.5), drive=drive)
+    assert violations(scan, tb.Rod(), 0.0) == {}
+    assert depth_before(scan, tb.Rod(), drive) < DEEP
+    lower = replace(scan, contour=tb.contours.Parabola(0.5, 0.49))
+    assert violations(lower, tb.Rod(), 0.0)["inside, loaded"] > 0.005
+    assert depth_before(lower, tb.Rod(), drive) > 0.001
 
 
 def test_a_carried_rod_is_never_in_the_object(fuzz_seed):
