@@ -20,6 +20,7 @@ from helpers.wrong_values import WRONG
 from tactile_bayes.checks import (
     as_number,
     as_numbers,
+    check_array,
     check_choice,
     check_function,
     check_mapping,
@@ -634,3 +635,18 @@ def test_the_switches_are_found():
     assert {("record", "truth"), ("design", "nested"), ("read_record", "split_sweeps")} <= {
         (label, name) for _, label, name in switches()
     }
+
+
+def test_a_masked_number_is_none():
+    """The number beneath the mask is nobody's."""
+    masked = np.ma.masked_array([1.0, 2.0], [False, True])
+    np.testing.assert_array_equal(as_numbers(masked), [1.0, np.nan])
+    np.testing.assert_array_equal(check_array("x", masked), [1.0, np.nan])
+    np.testing.assert_array_equal(as_numbers(np.ma.masked_array([1, 2], [True, False])), [np.nan, 2.0])
+    assert type(check_array("x", np.ma.masked_array([1.0]))) is np.ndarray
+    assert math.isnan(as_number(masked[1]))
+    assert math.isnan(as_number(np.ma.masked_array(3.0, True)))
+    assert as_numbers(np.ma.masked_array([True, False])) is None
+    for refuse in (check_numbers, lambda name, value: tb.plotting.contour(value)):
+        with pytest.raises(ParameterError, match="x"):
+            refuse("x", masked)

@@ -38,6 +38,7 @@ __all__ = [
     "check_whole_number",
     "refused",
     "shown",
+    "unmasked",
 ]
 
 TINY = math.ulp(0.0)
@@ -84,13 +85,18 @@ def as_number(value: Any) -> float | None:
     if not kind and (not isinstance(value, Real) or isinstance(value, bool)):
         return None
     try:
-        return float(value)
+        return float(unmasked(value))
     except OverflowError:
         return None
 
 
+def unmasked(values: Any) -> Any:
+    """Return a masked array as numbers, NaN where it is masked; other values as they are."""
+    return np.ma.filled(values.astype(float), np.nan) if isinstance(values, np.ma.MaskedArray) else values
+
+
 def as_numbers(values: Any) -> Floats | None:
-    """Return real numbers as an array of their shape; None if one of them is not a real number.
+    """Return real numbers as an array of their shape, NaN where masked; None if one of them is not a real number.
 
     Examples
     --------
@@ -107,7 +113,7 @@ def as_numbers(values: Any) -> Floats | None:
             return None
     except (TypeError, ValueError):
         return None
-    return array.astype(float)
+    return np.asarray(unmasked(values)) if isinstance(values, np.ma.MaskedArray) else array.astype(float)
 
 
 def check_array(name: str, values: Any, correction: str = "give a number, or an array of numbers") -> Floats:
@@ -118,7 +124,7 @@ def check_array(name: str, values: Any, correction: str = "give a number, or an 
     >>> check_array("x", [1, math.nan])
     array([ 1., nan])
     """
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:  # a short cut, for inner loops
+    if type(values) is np.ndarray and values.dtype == np.float64:  # a short cut, for inner loops
         return values
     numbers = as_numbers(values)
     if numbers is None:

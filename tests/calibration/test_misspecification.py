@@ -31,6 +31,7 @@ def radius(slope_angle):
     [
         ("friction", "much"),
         ("friction", -0.1),
+        ("friction", 1e308),
         ("friction", math.nan),
         ("rigidity_scale", None),
         ("drive_angle_offset", math.inf),

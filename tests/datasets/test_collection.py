@@ -164,7 +164,7 @@ def test_files_that_are_lost_or_damaged_are_named(folder, tmp_path):
     with refused(SpecificationError, "shard-000001.nc", "missing"):
         data.isel(record=9).load()
     (some / "shard-000002.nc").write_bytes(b"no NetCDF")
-    with refused(SpecificationError, "shard-000002.nc", "SHA-256"):
+    with refused(SpecificationError, "shard-000002.nc", "9 bytes"):
         data.isel(record=20).load()
     data.isel(record=3).load()
 
@@ -184,10 +184,11 @@ def test_a_changed_number_is_refused_and_a_file_put_back_is_read(folder, tmp_pat
 
 
 def forged(folder, change):
-    """Write a manifest with other entries of its first shard, and with a checksum of its own that is right."""
+    """Write a manifest with other entries, of its first shard if that has them, and with its own checksum right."""
     table = json.loads((folder / "manifest.json").read_text())
     table.pop("sha256")
-    table["shards"][0] |= change
+    for name, value in change.items():
+        (table["shards"][0] if name in table["shards"][0] else table)[name] = value
     (folder / "manifest.json").write_bytes(manifest_module._content(table))
 
 
@@ -206,7 +207,17 @@ def forged(folder, change):
         {"sha256": None},
         {"redrawn": ["out of reach"]},
         {"redrawn": {"out of reach": "often"}},
+        {"redrawn": {"out of reach": -1}},
+        {"redrawn": {"out of reach": 1}},
         {"untouched": "none"},
+        {"untouched": 1},
+        {"strained": 9},
+        {"name": "circles"},
+        {"seed": 8},
+        {"shard_records": 24},
+        {"complete": False},
+        {"specification": "records = 24"},
+        {"specification": "no TOML"},
     ],
     ids=str,
 )
@@ -220,6 +231,28 @@ def test_a_manifest_lists_nothing_but_the_shards_of_its_data_set(folder, tmp_pat
         with pytest.raises(SpecificationError, match=r"manifest\.json is no manifest") as error:
             act(some)
         assert "delete" not in str(error.value)
+
+
+@pytest.mark.parametrize("records", [0, 16, 25, 10**30])
+def test_the_number_of_records_is_that_of_the_specification(folder, tmp_path, records):
+    """Whether shards are missing or not, and whatever else is made to agree with it."""
+    some = tmp_path / "some"
+    shutil.copytree(folder, some)
+    manifest = read_manifest(some)
+    for shards in (manifest.shards[:2], manifest.shards):
+        write_manifest(dataclasses.replace(manifest, records=records, shards=shards), some)
+        for act in (tb.datasets.open, tb.datasets.verify, lambda path: tb.datasets.record(path, 0)):
+            with refused(SpecificationError, "manifest.json", records):
+                act(some)
+
+
+def test_the_size_of_a_file_is_that_of_the_manifest(folder, tmp_path):
+    some = tmp_path / "some"
+    shutil.copytree(folder, some)
+    forged(some, {"bytes": 7})
+    for act in (tb.datasets.open, tb.datasets.verify):
+        with refused(SpecificationError, "shard-000000.nc"):
+            act(some)
 
 
 @pytest.mark.parametrize("name", ["shard-000000.nc", "README.md", "manifest.json"])

@@ -508,12 +508,13 @@ def test_a_script_without_guard_is_told_so(tmp_path):
 
 
 MEMORY = """
-import resource, sys
+import sys
 from helpers.data_sets import PLAIN, changed
+from helpers.memory import own_peak
 from tactile_bayes.datasets import generate
 spec = changed(PLAIN, records=int(sys.argv[2]), shard_records=50, scan__samples=180)
 generate(spec, sys.argv[1], workers=1)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+print(own_peak())
 """
 
 

@@ -65,8 +65,13 @@ SENSIBLE = {
     "path": a_kind(str, Path),
     "out": a_kind(str, Path),
     **dict.fromkeys(("progress", "keep", "stop"), callable_or_none),
+    "plotting.pairs(truth)": lambda value: value is None or (isinstance(value, dict) and set(value) <= {"a", "q"}),
 }
-"""What an accepted value of an argument can be, wherever it is an argument."""
+"""What an accepted value of an argument can be: of one function, or wherever it is an argument."""
+
+
+def sensible(name, argument):
+    return SENSIBLE.get(f"{name}({argument})", SENSIBLE.get(argument, lambda value: True))
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +166,7 @@ def test_a_wrong_argument_gets_a_clear_error(calls, wrong, fuzz_seed, request):
         if found not in ("fine", "clear"):
             kept = worst if is_on_first_pages(name, *first_pages) else obscure
             kept.append(f"{name}({argument}={shown(value)}): {found}")
-        elif found == "fine" and not SENSIBLE.get(argument, lambda value: True)(value):
+        elif found == "fine" and not sensible(name, argument)(value):
             nonsense.append(f"{name}({argument}={shown(value)})")
     assert not nonsense, "accepted: " + "\n".join(nonsense)
     assert not worst, "of the first pages:\n" + "\n".join(worst)

@@ -125,7 +125,8 @@ def cheap(monkeypatch):
         monkeypatch.setattr(module, name, returned(make))
 
 
-GENERATED = types.SimpleNamespace(redrawn={}, index=np.arange(2), strained=0, untouched=0)
+COUNTS = {"redrawn": {}, "strained": 0, "untouched": 0}
+GENERATED = types.SimpleNamespace(index=np.arange(2), counts=COUNTS)
 
 
 def designed(k):

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from helpers.memory import COUNTING, own_peak
 from helpers.record_tables import WIRE, columns
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.result import read_result, write_result
-from tactile_bayes.record import make_record, read_record, write_record
+from tactile_bayes.record import make_record, netcdf_content, read_record, write_record
 
 SEALED, FOREIGN = 100, 4
 """Number of files with a checksum, and of those without, whose reading takes half a second, each of two kinds."""
@@ -21,7 +22,10 @@ SEAL = b"\ntactile_bayes: SHA-256"
 """Beginning of the last line of a file with a checksum."""
 
 SECONDS, BYTES = 200.0, 1e9
-"""Longest time for a small file on a machine that does other work, and most memory of all processes."""
+"""Longest time for a small file on a machine that does other work, and most memory of a process that reads it."""
+
+LARGE = 400_000_000
+"""Memory of a large process [bytes]: more than a reader of a small file takes, and less than it may take."""
 
 
 @pytest.fixture(scope="module")
@@ -84,18 +88,41 @@ def test_files_with_a_checksum_are_refused_or_read_as_they_were(tmp_path, origin
     assert found["refused"] > 0.8 * SEALED
 
 
-def largest_child():
-    """Memory of the largest process that this one has waited for [bytes], on Linux: one of another test, maybe."""
-    if sys.platform != "linux":
-        return 0
-    import resource
+def counted(reader, folder):
+    """A script that runs another, and counts its memory from a small process, which starts it."""
+    command = [str(folder / "used"), sys.executable, *("-P", "-W", "ignore"), str(reader)]
+    script = folder / "counted.py"
+    script.write_text(f"import sys\nsys.argv[1:1] = {command}\n{COUNTING}")
+    return str(script)
 
-    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
+
+@pytest.fixture
+def peaks(tmp_path, monkeypatch):
+    """Memory of the processes that have read a file so far [bytes]."""
+    if sys.platform == "win32":  # there is no wait4
+        return list
+    monkeypatch.setattr(netcdf_content, "__file__", counted(netcdf_content.__file__, tmp_path))
+    return lambda: [int(line.split()[1]) for line in (tmp_path / "used").read_text().splitlines()]
 
 
-def test_files_without_a_checksum_are_refused_or_read_within_limits(tmp_path, originals, fuzz_seed):
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is counted otherwise there")
+def test_the_memory_of_readers_is_their_own(tmp_path, originals, peaks, monkeypatch):
+    """Not that of a large process which has a file read; and a reader that takes as much is found."""
+    read, whole, content = originals[0]
+    content = content[: content.rindex(SEAL)]
+    mine = np.ones(LARGE // 8)
+    assert own_peak() > mine.nbytes == LARGE
+    assert outcome(tmp_path / "a.nc", content, read, whole) == "as it was"
+    assert 1e7 < peaks()[-1] < LARGE
+    (tmp_path / "greedy.py").write_text(f"import numpy as np\nnp.ones({LARGE // 8})\n")
+    monkeypatch.setattr(netcdf_content, "__file__", counted(tmp_path / "greedy.py", tmp_path))
+    assert outcome(tmp_path / "a.nc", content, read, whole) == "refused"
+    assert peaks()[-1] > LARGE
+
+
+def test_files_without_a_checksum_are_refused_or_read_within_limits(tmp_path, originals, peaks, fuzz_seed):
     """A changed name or unit cannot be noticed, so that they may be read otherwise."""
-    rng, tasks, before = np.random.default_rng([fuzz_seed, 1]), [], largest_child()
+    rng, tasks = np.random.default_rng([fuzz_seed, 1]), []
     for read, whole, content in originals:
         content = content[: content.rindex(SEAL)]
         assert outcome(tmp_path / "whole.nc", content, read, whole) == "as it was"
@@ -105,4 +132,4 @@ def test_files_without_a_checksum_are_refused_or_read_within_limits(tmp_path, or
     with ThreadPoolExecutor(2) as pool:
         found = Counter(pool.map(lambda task: outcome(*task), tasks))
     assert set(found) <= {"refused", "as it was", "otherwise"}
-    assert largest_child() < BYTES or largest_child() == before
+    assert all(peak < BYTES for peak in peaks())

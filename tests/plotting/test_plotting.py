@@ -664,8 +664,10 @@ def test_unknown_names_are_refused(posterior):
             function(posterior, names=["b"])
         with refused(ParameterError, "axes"):
             function(posterior, names=["a"], axes=panels(2, 2))
-    with refused(ParameterError, "truth", "b"):
-        plotting.pairs(posterior, truth={"b": 0.5})
+    for names in (None, ["a"]):
+        with refused(ParameterError, "truth", "b"):
+            plotting.pairs(posterior, names=names, truth={"b": 0.5})
+    plotting.pairs(posterior, names=["a"], truth={"a": 0.5, "x_c": 0.1})
 
 
 def test_a_gap_is_taken_as_it_comes():

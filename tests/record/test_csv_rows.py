@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import hypothesis.strategies as st
 import numpy as np
@@ -13,6 +14,7 @@ from tactile_bayes.errors import RecordError
 from tactile_bayes.record import csv_rows, parsing, read_record
 from tactile_bayes.record.csv_format import read_csv
 
+TESTS = Path(__file__).parents[1]
 NAMES = ["sweep", "direction", "drive_angle", "force_x", "note", "count"]
 USUAL = {
     "sweep": ["0", "1"],
@@ -143,15 +145,13 @@ def test_a_refusal_far_down_names_its_line(tmp_path):
 
 READING = """
 import sys
+from helpers.memory import own_peak
 from tactile_bayes.record import read_record
 
-def peak():
-    return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmHWM:")) * 1024
-
 read_record(sys.argv[2])  # what reading loads
-before = peak()
+before = own_peak()
 record = read_record(sys.argv[1])
-print(peak() - before, record.sizes["sample"])
+print(own_peak() - before, record.sizes["sample"])
 """
 
 
@@ -174,7 +174,8 @@ def test_a_file_is_read_in_less_memory_than_four_times_its_size(tmp_path):
     first.write_text(
         "sweep,direction,drive_angle,holding_moment,force_x,force_y\n0,forward,1,0,0,0\n", encoding="utf-8"
     )
-    done = subprocess.run([sys.executable, "-c", READING, path, first], capture_output=True, text=True, timeout=100)
+    command = [sys.executable, "-c", READING, path, first]
+    done = subprocess.run(command, cwd=TESTS, capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr
     peak, read = map(int, done.stdout.split())
     assert read == samples * sweeps + 1

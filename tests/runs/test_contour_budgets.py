@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from helpers.contour_posteriors import CELL
+from helpers.memory import COUNTING
 from tactile_bayes.contours import Contour, Parabola, from_function
 from tactile_bayes.record import write_record
 from tactile_bayes.sweep import scan
@@ -20,18 +21,6 @@ SECONDS = 20
 
 COMPILERS, ALLOWANCE = 45.0, 25.0
 """Processor time beside it [s]: of compilers, if these have not run before, and of all that is not bounded."""
-
-
-COUNTING = """
-import os, subprocess, sys
-
-process = subprocess.Popen(sys.argv[1:])
-_, status, used = os.wait4(process.pid, 0)
-process.returncode = os.waitstatus_to_exitcode(status)
-print(used.ru_utime + used.ru_stime, used.ru_maxrss * (1 if sys.platform == "darwin" else 1024))
-sys.exit(process.returncode)
-"""
-"""Run a command, and print its seconds and bytes. A peak counts that of the process which starts it: this is small."""
 
 
 def superellipse() -> Contour:
@@ -76,14 +65,14 @@ def test_a_run_keeps_its_time_and_its_memory(shape, samples, family, gigabytes, 
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     infer = [sys.executable, "-m", "tactile_bayes.cli", *command]
     done = subprocess.run(
-        [sys.executable, "-c", COUNTING, *infer],
+        [sys.executable, "-c", COUNTING, "used", *infer],
         cwd=tmp_path,
         env=os.environ | threads,
         capture_output=True,
         text=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    spent, peak = map(float, done.stdout.splitlines()[-1].split())
+    spent, peak = map(float, (tmp_path / "used").read_text().split())
     assert (tmp_path / "run" / "posterior.nc").exists()
     assert (tmp_path / "run" / "band.csv").exists()
     assert peak < gigabytes * 1e9

@@ -16,6 +16,7 @@ from tactile_bayes.inference.parameters.nuisances import BIASES, DRIFTS, GAINS, 
 from tactile_bayes.inference.parameters.priors import Prior, check_priors
 from tactile_bayes.inference.record_likelihood.rig import Rig
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 
 __all__ = ["NUMBERS", "Misspecification"]
 
@@ -114,7 +115,9 @@ class Misspecification:
                 f"{name} of the misspecification", getattr(self, name), correction, shape=shape
             ).tolist()
             object.__setattr__(self, name, tuple(numbers) if size > 1 else numbers)
-        check_number("friction of the misspecification", self.friction, "give a coefficient from 0 up", least=0.0)
+        most = float(np.tan(MAX_FRICTION_ANGLE))
+        correction = f"give a coefficient from 0 to {most:.2f}"
+        check_number("friction of the misspecification", self.friction, correction, least=0.0, most=most)
         if not self.rigidity_scale > 0.0 or (self.flat_spot is not None and not self.flat_spot[1] > 0.0):
             raise ParameterError(
                 "rigidity_scale or the factor of a flat spot of the misspecification is not positive: "

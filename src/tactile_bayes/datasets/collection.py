@@ -146,6 +146,8 @@ def _unchanged(folder: Path, shard: Written) -> Path:
     path = file_in(folder, shard.file)
     try:
         stat = path.stat()
+        if stat.st_size != shard.bytes:
+            raise _refusal(path)(f"has {stat.st_size} bytes in place of {shard.bytes}")
         sha256 = _sha256(path, stat.st_ino, stat.st_size, stat.st_mtime_ns)
     except FileNotFoundError:
         raise SpecificationError(f"{path} is missing: dataset generate makes it again") from None

@@ -71,6 +71,12 @@ class Records:
         """Number of sweeps without a sample in contact."""
         return int(np.count_nonzero(~np.any(self.sample["truth_contact_phase"], axis=2)))
 
+    @property
+    def counts(self) -> dict[str, Any]:
+        """Counts that the manifest states of a shard, by its names for them."""
+        redrawn = {reason: count for reason, count in sorted(self.redrawn.items()) if count}
+        return {"redrawn": redrawn, "strained": self.strained, "untouched": self.untouched}
+
 
 _NOT_CLEAR = "not clear after snap-off"
 _NO_CONTOUR = "no contour"

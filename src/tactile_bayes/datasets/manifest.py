@@ -15,6 +15,7 @@ from typing import Any
 
 from tactile_bayes.datasets.shard import Written, file_in, shard_file
 from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.specification_reading import read_text
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.tasks.documents import read_json
@@ -29,6 +30,7 @@ _CORRECTION = (
     "put a copy of it back, or run dataset generate with the same specification into another folder, which makes the "
     "same files again"
 )
+_OF_SPECIFICATION = ("name", "specification_sha256", "seed", "records", "shard_records")
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "xarray", "h5netcdf", "h5py")
 
 
@@ -69,11 +71,6 @@ class Manifest:
         """Return the manifest of a data set without files."""
         return cls(spec.name, spec.text, spec.sha256, spec.seed, spec.records, spec.shard_records, versions_here())
 
-    def is_of(self, spec: Specification) -> bool:
-        """Return whether the manifest states what follows from a specification, which may have another text."""
-        stated = (self.specification_sha256, self.seed, self.records, self.shard_records)
-        return stated == (spec.sha256, spec.seed, spec.records, spec.shard_records)
-
     def having(self, written: Iterable[Written]) -> Manifest:
         """Return the manifest with further files."""
         return replace(self, shards=tuple(sorted([*self.shards, *written], key=lambda shard: shard.first)))
@@ -104,11 +101,15 @@ def versions_here() -> dict[str, str]:
 
 def write_manifest(manifest: Manifest, folder: Path) -> None:
     """Write a manifest atomically."""
-    table = {"format": _FORMAT, "complete": manifest.is_complete, "redrawn": dict(sorted(manifest.redrawn.items()))}
-    table |= {"strained": manifest.strained, "untouched": manifest.untouched}
-    table |= {**asdict(manifest), "shards": [shard._asdict() for shard in manifest.shards]}
     with write_atomically(file_in(folder, MANIFEST)) as temporary:
-        temporary.write_bytes(_content(table))
+        temporary.write_bytes(_content(_table(manifest)))
+
+
+def _table(manifest: Manifest) -> dict[str, Any]:
+    """Return the entries of the file, without its checksum."""
+    sums = {"complete": manifest.is_complete, "redrawn": dict(sorted(manifest.redrawn.items()))}
+    sums |= {"strained": manifest.strained, "untouched": manifest.untouched}
+    return {"format": _FORMAT, **sums, **asdict(manifest), "shards": [shard._asdict() for shard in manifest.shards]}
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -117,7 +118,8 @@ def read_manifest(folder: Path) -> Manifest:
     Raises
     ------
     SpecificationError
-        If there is none, it has changed since it was written, or it lists other files than shards.
+        If there is none, it has changed since it was written, its numbers contradict its specification or each other,
+        or it lists other files than shards.
     """
     path = file_in(folder, MANIFEST)
     try:
@@ -133,7 +135,10 @@ def read_manifest(folder: Path) -> Manifest:
             )
         shards = tuple(Written(**shard) for shard in table["shards"])
         rest = {name: table[name] for name in Manifest.__dataclass_fields__ if name != "shards"}
-        return _checked(Manifest(**rest, shards=shards))
+        manifest = Manifest(**rest, shards=shards)
+        _check(manifest)
+        _refuse_other(table, _table(manifest))
+        return manifest
     except (FileNotFoundError, NotADirectoryError):
         lost = f", but shards: {_CORRECTION}" if any(folder.glob("shard-*.nc")) else ""
         raise SpecificationError(f"{folder} holds no data set: there is no {MANIFEST}{lost}") from None
@@ -143,8 +148,8 @@ def read_manifest(folder: Path) -> Manifest:
         raise SpecificationError(f"{path} is no manifest of a data set ({error}): {_CORRECTION}") from error
 
 
-def _checked(manifest: Manifest) -> Manifest:
-    """Return a manifest if its entries have the types of such, and its shards are those of its records, in order.
+def _check(manifest: Manifest) -> None:
+    """Check that entries have their types, and that shards are those of the records of the specification, in order.
 
     Raises
     ------
@@ -155,6 +160,11 @@ def _checked(manifest: Manifest) -> Manifest:
     _refuse_unless_typed(manifest, counts=("seed", "records", "shard_records"))
     if not all(isinstance(text, str) for text in [*manifest.versions.keys(), *manifest.versions.values()]):
         raise ValueError("its versions are not texts")
+    try:
+        stated = vars(Manifest.of(read_text(manifest.specification)))
+    except SpecificationError as error:
+        raise ValueError(f"its specification is none: {error}") from error
+    _refuse_other(vars(manifest), {name: stated[name] for name in _OF_SPECIFICATION})
     before = -1
     for shard in manifest.shards:
         _refuse_unless_typed(shard, texts=("file", "sha256"))
@@ -165,8 +175,16 @@ def _checked(manifest: Manifest) -> Manifest:
             raise ValueError(f"{shard.file!r} from record {shard.first} on is no file of this data set")
         if not re.fullmatch("[0-9a-f]{64}", shard.sha256):
             raise ValueError(f"{shard.file} has no SHA-256")
+        if shard.strained > shard.records:
+            raise ValueError(f"{shard.file} has {shard.records} records, and {shard.strained} of them are strained")
         before = number
-    return manifest
+
+
+def _refuse_other(entries: Mapping[str, Any], right: Mapping[str, Any]) -> None:
+    """Refuse entries that differ from those which follow from the rest of the manifest."""
+    for name, value in right.items():
+        if entries[name] != value or isinstance(entries[name], bool) is not isinstance(value, bool):
+            raise ValueError(f"its {name} is {entries[name]!r}, and {value!r} follows from its other entries")
 
 
 def _refuse_unless_typed(of: Manifest | Written, texts: Sequence[str] = (), counts: Sequence[str] = ()) -> None:
@@ -174,6 +192,8 @@ def _refuse_unless_typed(of: Manifest | Written, texts: Sequence[str] = (), coun
     for names, kind in ((texts, str), (counts, int)):
         if wrong := [name for name in names if type(entries[name]) is not kind]:
             raise ValueError(f"its {wrong[0]} is {entries[wrong[0]]!r}")
+    if negative := [name for name in counts if entries[name] < 0]:
+        raise ValueError(f"its {negative[0]} is {entries[negative[0]]!r}")
 
 
 def _content(table: Mapping[str, Any]) -> bytes:

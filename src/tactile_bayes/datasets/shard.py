@@ -90,17 +90,8 @@ def write_shard(task: tuple[str, int, str]) -> Written:
         digest = beside.submit(_sha256, content)
         with write_atomically(path) as temporary, open(temporary, "wb") as file:
             file.writelines(content)
-    redrawn = {reason: count for reason, count in sorted(records.redrawn.items()) if count}
-    return Written(
-        path.name,
-        begin,
-        records.index.size,
-        sum(map(len, content)),
-        digest.result(),
-        redrawn,
-        records.strained,
-        records.untouched,
-    )
+    size = sum(map(len, content))
+    return Written(path.name, begin, records.index.size, size, digest.result(), **records.counts)
 
 
 def _sha256(content: Iterable[memoryview]) -> str:

@@ -108,7 +108,8 @@ def pairs(
     names : sequence of str, optional
         Names of the variables; by default all.
     truth : mapping of str to float, optional
-        True values by name of the parameter, in its unit; drawn as dashed lines.
+        True values by name of the parameter, in its unit; drawn as dashed lines. It may have more parameters than
+        `names`, and none that the posterior lacks.
     axes : array_like of Axes, shape (parameters, parameters), optional
         One for each pair of parameters; a variable with further dimensions is one parameter for each of its elements.
         Above the diagonal None will do.
@@ -122,7 +123,7 @@ def pairs(
     Raises
     ------
     ParameterError
-        If a name is unknown, or the axes have another shape.
+        If a name is unknown, in `names` or in `truth`, or the axes have another shape.
 
     Examples
     --------
@@ -136,11 +137,9 @@ def pairs(
     check_mapping("truth", truth, "give true values by the names of parameters")
     truth = {name: check_number(f"truth of {name}", value) for name, value in (truth or {}).items()}
     parameters = _parameters(posterior, names)
-    unknown = set(truth) - {parameter.name for parameter in parameters}
-    if unknown and names is None:
-        raise ParameterError(
-            f"truth names {', '.join(sorted(unknown))}, and the parameters are {', '.join(p.name for p in parameters)}"
-        )
+    known = [parameter.name for parameter in _parameters(posterior, None)]
+    if unknown := sorted(set(truth) - set(known)):
+        raise ParameterError(f"truth names {', '.join(unknown)}, and the parameters are {', '.join(known)}")
     size = len(parameters)
     side = max(2.6, min(7.0, 1.75 * size), 0.115 * rcParams["font.size"] * size)
     grid = new_panels(size, size, side, side) if axes is None else check_panels(axes, (size, size), _ROWS, lower=True)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_mapping, check_names, check_optional, refused
+from tactile_bayes.checks import check_mapping, check_names, check_optional, refused, unmasked
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attributes import completed_attributes
 from tactile_bayes.record.cell import number_in
@@ -77,7 +77,7 @@ def make_record(
         raise refused("columns", columns, "give arrays by name of a column")
     check_mapping("attrs", attrs, "give strings and numbers by name")
     check_optional("the rod", rod, Rod)
-    cells = {str(name): (np.array(_unmasked(values)), getattr(values, "attrs", {})) for name, values in columns.items()}
+    cells = {str(name): (np.array(unmasked(values)), getattr(values, "attrs", {})) for name, values in columns.items()}
     source = Source()
     lengths = [len(values) for values, _ in cells.values() if values.ndim == 1]
     shape = (lengths[0] if lengths else 0,)
@@ -114,7 +114,3 @@ def _with_missing(table: Table, missing: Collection[str]) -> dict[str, Cells]:
 def _is_empty(cell: Any) -> bool:
     number = number_in(cell)
     return number is not None and math.isnan(number)
-
-
-def _unmasked(values: Any) -> Any:
-    return np.ma.filled(values.astype(float), np.nan) if isinstance(values, np.ma.MaskedArray) else values
