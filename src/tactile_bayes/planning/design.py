@@ -198,9 +198,9 @@ def design(
         if taken:
             raise ParameterError(f"{', '.join(taken)} and a posterior, which has its own: leave one of the two")
         knowledge = known_from_posterior(known, draws=int(draws), rng=rng)
-    correction = "give positive angles in radians, at most 0.5"
+    correction = "give angles in radians, from 1e-5 to 0.5"
     several = drive_steps if np.iterable(drive_steps) else [drive_steps]
-    steps = check_numbers("drive_steps", several, correction, shape=(None,), least=TINY, most=0.5)
+    steps = check_numbers("drive_steps", several, correction, shape=(None,), least=1e-5, most=0.5)
     pivots = [] if bases is None and drives is not None else _bases(bases, knowledge)
     choices: list[tuple[Drive, ...]] = [(Rotation(base),) for base in pivots]
     choices += [tuple(drives_of(drive, (0.0, 0.0))) for drive in _several(drives)]

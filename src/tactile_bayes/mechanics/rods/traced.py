@@ -151,6 +151,11 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None, leng
             f"{fit.length:.3g} long: trace one rod, its points in order"
         )
     if scatter is not None:
+        if not scatter <= _THICKEST * fit.length:
+            raise ParameterError(
+                f"scatter is {scatter:.3g}, and the rod is {fit.length:.3g} long: give at most a twentieth of that, in "
+                "the unit of x and y"
+            )
         if fit.posterior.probability_below(scatter / fit.length) < _FALSE_ALARM:
             raise ParameterError(
                 f"the points are off a smooth rod by {found:.3g} (root mean square), and their scatter is given as "
