@@ -16,7 +16,6 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
-    TINY,
     check_choice,
     check_names,
     check_numbers,
