@@ -28,7 +28,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.inference.ensembles import spawn
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.record import make_record
@@ -179,9 +179,10 @@ def contour_posterior() -> tuple[Row, str]:
     These get the start, the same log-probability, vectorised, and enough steps to forget the start; their
     effective draws are those of the second half.
     """
-    measured = LOAD_CELL.measure(tb.scan(DEMONSTRATED, rod=ROD).record, seed=1)
+    measured = LOAD_CELL.measure(tb.scan(DEMONSTRATED, tb.Rig(rod=ROD)).record, seed=1)
     results: list[xr.DataTree] = []
-    ours = best_time(lambda: results.append(tb.infer_contour(measured, nuisances=[], seed=1)), 3)
+    rig = tb.Rig(unknown="nothing")
+    ours = best_time(lambda: results.append(tb.infer_contour(measured, rig=rig, seed=1)), 3)
     model = demonstration()
     start = started(walk_of(model, spawn(1, 1)[0], tb.SamplerSettings()))
     began = time.perf_counter()
@@ -236,7 +237,7 @@ CARRIED = {
 def other_rods() -> str:
     """Time log-likelihoods of other rods than a straight one that is turned, and of other drives, once compiled."""
     rng, walkers = np.random.default_rng(1), contours(64)
-    sampled = Rig(taper=rng.normal(0.0, 0.05, 64), friction=abs(rng.normal(0.0, 0.2, 64)))
+    sampled = RigValues(taper=rng.normal(0.0, 0.05, 64), friction=abs(rng.normal(0.0, 0.2, 64)))
     rods = {
         "straight": (tb.Rod(), None),
         "arc": (tb.Rod(rest_curvature=0.5), None),
@@ -246,7 +247,7 @@ def other_rods() -> str:
     }
     times = {}
     for name, (rod, rig) in rods.items():
-        measured = CELL.measure(tb.scan(CONTOUR, drive_angles=ANGLES, rod=rod).record, seed=1)
+        measured = CELL.measure(tb.scan(CONTOUR, tb.Rig(rod=rod), drive_angles=ANGLES).record, seed=1)
         likelihood = RecordLikelihood(measured, CELL)
         times[name] = best_time(lambda of=likelihood, rig=rig: of.log_likelihood(walkers, rig=rig), 50) / 64
     for name, drive in CARRIED.items():
@@ -288,7 +289,7 @@ def time_by_hand(sweep: xr.Dataset) -> float:
 
 def states(slopes: np.ndarray, rod: tb.Rod | None = None) -> np.ndarray:
     """Return drive angle, holding moment, force and arc length of the contact."""
-    found = tb.equilibria(CONTOUR, slopes, rod=rod)
+    found = tb.equilibria(CONTOUR, slopes, rig=tb.Rig(rod=rod))
     force = np.hypot(found.force_x, found.force_y)
     return np.stack([found.drive_angle, found.holding_moment, force, found.contact_arclength], axis=1)
 
@@ -323,8 +324,8 @@ def record(count: int) -> xr.Dataset:
 
 
 def equilibria(count: int, rod: tb.Rod | None = None) -> Callable[[], Any]:
-    slopes = np.linspace(*SLOPES, count)
-    return lambda: tb.equilibria(CONTOUR, slopes, rod=rod)
+    slopes, rig = np.linspace(*SLOPES, count), tb.Rig(rod=rod)
+    return lambda: tb.equilibria(CONTOUR, slopes, rig=rig)
 
 
 def reconstruct(count: int) -> Callable[[], Any]:

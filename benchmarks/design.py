@@ -18,12 +18,12 @@ import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import Experiment, usual_load_cell
+from tactile_bayes.inference.experiment import usual_load_cell
 from tactile_bayes.planning.candidate import measured_of
-from tactile_bayes.planning.knowledge import COARSE, empty_record, known_from_prior
+from tactile_bayes.planning.knowledge import known_from_prior
 from tactile_bayes.tasks import run_tasks
 
-PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.35, 0.3), "x_c": stats.norm(0.0, 0.1)}
+FAMILY = tb.Family("parabola", a=stats.lognorm(s=0.4, scale=0.6), q=stats.uniform(0.35, 0.3), x_c=stats.norm(0.0, 0.1))
 STEP = float(np.radians(2.0))
 ACROSS, ABOVE = np.linspace(-0.5, 0.5, 11), (-0.1, 0.0, 0.1)
 SETTINGS = SamplerSettings(ensembles=2, walkers=32, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
@@ -76,13 +76,11 @@ def _spread(ratio: Floats) -> str:
 
 def compared(number: int) -> Outcome:
     rng = np.random.default_rng([2031, number])
-    cell = usual_load_cell(tb.Rod())
-    empty = empty_record([(0.0, 0.0)], COARSE, None, cell)
-    known = known_from_prior(Experiment(empty, "parabola", cell, PRIORS, friction=0.0), draws=1, rng=rng)
+    known = known_from_prior(tb.Rig(unknown={"friction": 0.0}), FAMILY, draws=1, rng=rng)
     point = known.points[0]
     nan = float("nan")
     try:
-        first = measured_of(known.model_from([(0.0, 0.0)], STEP), point, rng)
+        first = measured_of(known.model_from([tb.Rotation()], STEP), point, rng)
         posterior = _inferred(first, number)
         gap = tb.gap(posterior)
         x = np.linspace(*_span(posterior), PLACES)
@@ -97,7 +95,8 @@ def compared(number: int) -> Outcome:
         }
         widths = {"first": _width(posterior, x)}
         for name, base in bases.items():
-            second = measured_of(known.model_from([base], STEP), point, np.random.default_rng([2032, number]))
+            model = known.model_from([tb.Rotation(base)], STEP)
+            second = measured_of(model, point, np.random.default_rng([2032, number]))
             both = xr.concat([first, second.assign(sweep=second.sweep + 2)], "sample", combine_attrs="override")
             widths[name] = _width(_inferred(both, number), x)
     except TactileBayesError as error:
@@ -107,8 +106,8 @@ def compared(number: int) -> Outcome:
 
 
 def _inferred(record: xr.Dataset, seed: int) -> xr.DataTree:
-    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-    return tb.infer_contour(record, load_cell=cell, priors=PRIORS, settings=SETTINGS, seed=seed)
+    rig = tb.Rig(load_cell=usual_load_cell(tb.Rod()))
+    return tb.infer_contour(record, family=FAMILY, rig=rig, settings=SETTINGS, seed=seed)
 
 
 def _span(posterior: xr.DataTree) -> tuple[float, float]:

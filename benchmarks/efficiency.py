@@ -20,11 +20,8 @@ FACTORS = (3.0, 1.0, 0.1, 0.01)
 """Factors on a noise of 0.05 EI/L² and 0.02 EI/L."""
 DRAWS = 2500.0
 SETTINGS = tb.SamplerSettings(ensembles=4, walkers=32, max_r_hat=1.01, min_ess=DRAWS, max_steps=4000)
-PLAN = tb.Plan(
-    tb.contours.paper_profile("II", q=0.5),
-    load_cell=tb.LoadCell(force_noise=0.05, moment_noise=0.02),
-    drive_step=float(np.radians(2.0)),
-)
+RIG = tb.Rig(load_cell=tb.LoadCell(force_noise=0.05, moment_noise=0.02))
+PLAN = tb.Plan(tb.contours.paper_profile("II", q=0.5), RIG, drive_step=float(np.radians(2.0)))
 
 
 def main(records: int = 8) -> None:
@@ -43,7 +40,7 @@ def compared(task: tuple[float, int]) -> Floats:
     factor, seed = task
     plan = PLAN.with_noise(factor)
     measured = plan.cell.measure(plan.scan.record, seed=seed)
-    posterior = tb.infer_contour(measured, family=plan.family, load_cell=plan.cell, seed=seed, settings=SETTINGS)
+    posterior = tb.infer_contour(measured, rig=plan.rig, seed=seed, settings=SETTINGS)
     draws = posterior["posterior"].to_dataset()
     of_record = plan.with_noise(float(draws.noise_scale.mean()))
     bounds = information(of_record).bound_with_priors.sel(parameter=list(PLAN.model.names)).values

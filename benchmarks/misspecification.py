@@ -3,7 +3,7 @@
 Every row is a calibration: parabolas are drawn from the default prior, swept, measured and inferred as `infer` does by
 default, and their bands are compared with the truth. Noise is as stated; other unknowns of the rig are drawn
 from their default priors. An indented row repeats the case above it with other arguments of inference. If the default
-infers the property that is wrong, everything is taken as stated instead (--as-stated); otherwise the row names the
+infers the property that is wrong, everything is taken as stated instead; otherwise the row names the
 property that is inferred, or stated, in correction. Replicates are kept in results/misspecification, from which a
 stopped run resumes.
 
@@ -25,7 +25,7 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
-from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.rig import NOTHING
 
 OUT = Path("results/misspecification")
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -39,66 +39,74 @@ CHANCE, SCORE = 1e-3, 4.0
 """Probability of the misfit, and size of the axial score, that raise an alarm."""
 
 
+INFERRED = tb.Rig(load_cell=CELL)
+AS_STATED = tb.Rig(load_cell=CELL, unknown="nothing")
+
+
 class Run(NamedTuple):
-    """A misspecified rig, and arguments of inference other than the defaults."""
+    """The rig that is simulated, the one that inference assumes, and other options of `calibrate`."""
 
-    world: dict[str, Any]
-    asked: Mapping[str, Any] = MappingProxyType({})
-
-
-def _known_to_vary(exactly: dict[str, float], beside: dict[str, Any]) -> dict[str, Run]:
-    """Return runs with one value of properties that are inferred by default, and with everything taken as stated."""
-    priors = {name: stats.norm(value, 1e-9) for name, value in exactly.items()}
-    return {"": Run({"priors": priors}), "--as-stated": Run(beside, {"nuisances": ()})}
+    truth: tb.Rig
+    rig: tb.Rig = INFERRED
+    options: Mapping[str, Any] = MappingProxyType({})
 
 
-def _untold(world: dict[str, Any], asked: dict[str, Any], **others: dict[str, Any]) -> dict[str, Run]:
+def _real(load_cell: tb.LoadCell = CELL, **known: float) -> tb.Rig:
+    """Return a rig with noise as its load cell states it."""
+    return tb.Rig(load_cell=load_cell, unknown={"noise_scale": 1.0, **known})
+
+
+def _known_to_vary(**known: float) -> dict[str, Run]:
+    """Return runs with values of properties that are inferred by default, and with everything taken as stated."""
+    return {"": Run(_real(**known)), "as stated": Run(_real(**{**NOTHING, **known}), AS_STATED)}
+
+
+def _untold(truth: tb.Rig, *, options: Mapping[str, Any] = MappingProxyType({}), **rigs: tb.Rig) -> dict[str, Run]:
     """Return runs with properties that are not inferred by default, and with these inferred or stated."""
-    return {"": Run(world, asked)} | {
-        other.replace("_", " "): Run(world, asked | more) for other, more in others.items()
+    return {"": Run(truth, options=options)} | {
+        other.replace("_", " "): Run(truth, rig, options) for other, rig in rigs.items()
     }
 
 
-OF_UNKNOWN_SHAPE = {
-    "nuisances": (*STANDARD, "rest_curvature"),
-    "priors": {"rest_curvature": stats.norm(0.0, 0.5)},
-}
-OF_UNKNOWN_TAPER = {"nuisances": (*STANDARD, "taper"), "priors": {"taper": stats.uniform(0.0, 0.9)}}
-BIASES = (0.02, 0.05, 0.05)
-OUTLIERS = {"load_cell": replace(CELL, degrees_of_freedom=2.5)}
+def _spotted(at: float) -> dict[str, Run]:
+    """Return runs with a flat spot; a shape-free family takes parabolas for any smooth contour."""
+    spotted = tb.Misspecification(flat_spot=(at, 2.0))
+    free = {"family": "shape-free", "misspecification": replace(spotted, family="parabola")}
+    return {"": Run(_real(), options={"misspecification": spotted}), "shape free": Run(_real(), options=free)}
+
+
+BIASES = {"moment_bias": 0.02, "force_x_bias": 0.05, "force_y_bias": 0.05}
+DRIFTS = {"moment_drift": 0.04, "force_x_drift": 0.1, "force_y_drift": 0.1}
+OUTLIERS = replace(CELL, degrees_of_freedom=2.5)
 CASES: Mapping[str, Mapping[str, Run]] = {
-    "as assumed": _known_to_vary({}, {}),
-    **{f"friction {mu}": _known_to_vary({"friction": mu}, {"friction": mu}) for mu in (0.1, 0.3, 0.5)},
-    "base off by 1 % L, across": _untold({"base_shift": (0.01, 0.0)}, {}),
-    "base off by 1 % L, along": _untold({"base_shift": (0.0, 0.01)}, {}),
-    "second base off by 1 % L": _untold(
-        {"further_base_shift": (0.01, 0.0)}, {"base": TWO_BASES}, base_inferred={"nuisances": (*STANDARD, "base")}
-    ),
-    "EI off by 5 %": _known_to_vary({"rigidity_scale": 1.05}, {"rigidity_scale": 1.05}),
-    "encoder off by 1°": _known_to_vary(
-        {"drive_angle_offset": np.radians(1.0)}, {"drive_angle_offset": np.radians(1.0)}
-    ),
-    "backlash of 0.5°": _known_to_vary(
-        {"backlash": np.radians(0.5)}, {"load_cell": replace(CELL, drive_angle_backlash=np.radians(0.5))}
-    ),
-    "load cell off by 1 % L": _known_to_vary(
-        {"lever_x": 0.01, "lever_y": 0.01}, {"load_cell": replace(CELL, lever=(0.01, 0.01))}
-    ),
-    "biases of one noise": _known_to_vary(
-        dict(zip(("moment_bias", "force_x_bias", "force_y_bias"), BIASES, strict=True)), {"bias": BIASES}
-    ),
-    "curved by 0.05/L": _untold(
-        {"rest_curvature": 0.05}, {}, rest_curvature_inferred={"nuisances": (*STANDARD, "rest_curvature")}
-    ),
-    "curved by 0.4/L": _untold({"rest_curvature": 0.4}, {}, rest_curvature_inferred=OF_UNKNOWN_SHAPE),
-    "tapered by 10 %": _untold({"taper": 0.1}, {}, taper_inferred={"nuisances": (*STANDARD, "taper")}),
-    "tapered by 50 %": _untold({"taper": 0.5}, {}, taper_inferred=OF_UNKNOWN_TAPER),
-    "drift of two noises": _untold({"drift": (0.04, 0.1, 0.1)}, {}, drift_inferred={"nuisances": (*STANDARD, "drift")}),
-    "outliers (t, 2.5)": _untold(OUTLIERS, {}, told_of_them=OUTLIERS),
+    "as assumed": _known_to_vary(),
+    **{f"friction {mu}": _known_to_vary(friction=mu) for mu in (0.1, 0.3, 0.5)},
     **{
-        name: _untold({"flat_spot": (at, 2.0)}, {}, shape_free={"family": "shape-free"})
-        for name, at in (("flat spot in the gap", 0.0), ("flat spot beside it", 0.4))
+        f"base off by 1 % L, {way}": _untold(
+            _real(), options={"misspecification": tb.Misspecification(base_shift=shift)}
+        )
+        for way, shift in (("across", (0.01, 0.0)), ("along", (0.0, 0.01)))
     },
+    "second base off by 1 % L": _untold(
+        _real(base_2_x=0.01), options={"base": TWO_BASES}, base_inferred=INFERRED.with_unknown(base="default")
+    ),
+    "EI off by 5 %": _known_to_vary(rigidity_scale=1.05),
+    "encoder off by 1°": _known_to_vary(drive_angle_offset=float(np.radians(1.0))),
+    "backlash of 0.5°": _known_to_vary(backlash=float(np.radians(0.5))),
+    "load cell off by 1 % L": _known_to_vary(lever_x=0.01, lever_y=0.01),
+    "biases of one noise": _known_to_vary(**BIASES),
+    "curved by 0.05/L": _untold(
+        _real(rest_curvature=0.05), rest_curvature_inferred=INFERRED.with_unknown(rest_curvature="default")
+    ),
+    "curved by 0.4/L": _untold(
+        _real(rest_curvature=0.4), rest_curvature_inferred=INFERRED.with_unknown(rest_curvature=stats.norm(0.0, 0.5))
+    ),
+    "tapered by 10 %": _untold(_real(taper=0.1), taper_inferred=INFERRED.with_unknown(taper="default")),
+    "tapered by 50 %": _untold(_real(taper=0.5), taper_inferred=INFERRED.with_unknown(taper=stats.uniform(0.0, 0.9))),
+    "drift of two noises": _untold(_real(**DRIFTS), drift_inferred=INFERRED.with_unknown(drift="default")),
+    "outliers (t, 2.5)": _untold(_real(OUTLIERS), told_of_them=tb.Rig(load_cell=OUTLIERS)),
+    "flat spot in the gap": _spotted(0.0),
+    "flat spot beside it": _spotted(0.4),
 }
 
 
@@ -115,7 +123,7 @@ def main(replicates: int = 40, *names: str, discrepancy: bool = False) -> None:
     for name in names or CASES:
         runs = beside_discrepancy(CASES[name]) if discrepancy else CASES[name]
         for k, (other, run) in enumerate(runs.items()):
-            few = max(1, replicates // (FEWER if run.asked.get("family") else 1))
+            few = max(1, replicates // (FEWER if run.options.get("family") else 1))
             count = f" ({few})" if few < replicates else ""
             title = f"  {other}{count}" if k else f"{name} {other}".strip()
             print(row(title, calibrated(f"{name} {other}", run, few)), flush=True)
@@ -123,24 +131,17 @@ def main(replicates: int = 40, *names: str, discrepancy: bool = False) -> None:
 
 def beside_discrepancy(runs: Mapping[str, Run]) -> dict[str, Run]:
     """Return the run without correction, and the same with a discrepancy, of which the simulated rig has none."""
-    which = "--as-stated" if "--as-stated" in runs else ""
+    which = "as stated" if "as stated" in runs else ""
     run = runs[which]
-    nothing = {"discrepancy_scale": stats.lognorm(s=1e-9, scale=1e-12)}
-    world = {**run.world, "priors": {**run.world.get("priors", {}), **nothing}}
-    asked = {**run.asked, "nuisances": (*run.asked.get("nuisances", STANDARD), "discrepancy")}
-    return {which: run, f"{which} with discrepancy".strip(): Run(world, asked)}
+    beside = run._replace(rig=run.rig.with_unknown(discrepancy="default"))
+    return {which: run, f"{which} with discrepancy".strip(): beside}
 
 
 def calibrated(name: str, run: Run, replicates: int) -> xr.Dataset:
     folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in name.strip())
-    options = {"load_cell": CELL, **run.asked}
-    as_stated = {"noise_scale": stats.lognorm(s=1e-9)}
-    world = tb.Misspecification(**{**run.world, "priors": as_stated | run.world.get("priors", {})})
-    if options.get("family") == "shape-free":  # which takes parabolas for any smooth contour
-        world = replace(world, family="parabola")
-    else:
-        options["settings"] = SETTINGS
-    return tb.calibrate(seed=2029, replicates=replicates, world=world, out=folder, **options)
+    settings = None if run.options.get("family") == "shape-free" else SETTINGS
+    options = {"rig": run.rig, "truth": run.truth, "settings": settings, **run.options}
+    return tb.calibrate(seed=2029, replicates=replicates, out=folder, **options)
 
 
 def row(name: str, found: xr.Dataset) -> str:

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 
 import tactile_bayes as tb
-from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.planning.information import information
-from tactile_bayes.planning.plan import Plan
+from tactile_bayes.rig.parameters import STANDARD
+from tactile_bayes.rig.rig import DEFAULT, NOTHING, Unknown
 
 CONTOUR = tb.contours.Parabola(a=0.5, q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -22,18 +22,18 @@ PROBABILITY = 0.9
 PARAMETERS = ("a", "q", "x_c")
 
 
-def sets() -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Return sets of nuisances by name."""
-    yield "default", STANDARD
-    yield from ((f"without {name}", tuple(other for other in STANDARD if other != name)) for name in STANDARD)
-    yield from ((f"with {name}", (*STANDARD, name)) for name in FURTHER)
-    yield "gain for rigidity_scale", ("gain", *(name for name in STANDARD if name != "rigidity_scale"))
-    yield "none", ()
+def sets() -> Iterator[tuple[str, dict[str, Unknown]]]:
+    """Return unknowns by name."""
+    yield "default", {}
+    yield from ((f"without {name}", {name: NOTHING[name]}) for name in STANDARD)
+    yield from ((f"with {name}", {name: DEFAULT}) for name in FURTHER)
+    yield "gain for rigidity_scale", {"gain": DEFAULT, "rigidity_scale": 1.0}
+    yield "none", dict(NOTHING)
 
 
-def row(nuisances: tuple[str, ...]) -> dict[str, float]:
+def row(unknown: dict[str, Unknown]) -> dict[str, float]:
     """Return widths and standard deviations in thousandths of the rod's length."""
-    plan = Plan(CONTOUR, CELL, drive_step=float(np.radians(2.0)), nuisances=nuisances)
+    plan = tb.Plan(CONTOUR, tb.Rig(load_cell=CELL, unknown=unknown), drive_step=float(np.radians(2.0)))
     told = information(plan, probability=PROBABILITY)
     deviation = told.bound_with_priors.sel(parameter=list(PARAMETERS)).values
     widths = {"gap": float(told.gap_width), "beside": float(told.touched_width)}
@@ -43,8 +43,8 @@ def row(nuisances: tuple[str, ...]) -> dict[str, float]:
 def main() -> None:
     print(f"| inferred | band in the gap | beside it | {' | '.join(f'sd of {name}' for name in PARAMETERS)} |")
     print("|---|" + "---|" * 5)
-    for name, nuisances in sets():
-        print(f"| {name} | " + " | ".join(f"{value:.2f}" for value in row(nuisances).values()) + " |")
+    for name, unknown in sets():
+        print(f"| {name} | " + " | ".join(f"{value:.2f}" for value in row(unknown).values()) + " |")
 
 
 if __name__ == "__main__":

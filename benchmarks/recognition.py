@@ -22,6 +22,7 @@ from tactile_bayes.contours import Circle, Contour, Joined
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.matched_priors import matched_priors
+from tactile_bayes.rig import NOTHING
 from tactile_bayes.tasks import run_tasks
 
 FAMILIES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
@@ -34,7 +35,7 @@ NOISES = {"quiet": (0.02, 0.008), "strong": (0.15, 0.06)}
 
 ANGLES = np.radians(np.arange(0.0, 200.0, 2.0))
 VERTEX = {"q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
-NUISANCES = ("bias",)
+UNKNOWN = {**NOTHING, "bias": "default"}
 SETTINGS = SamplerSettings(ensembles=2, min_ess=300.0, max_r_hat=1.03, max_steps=300)
 BINS = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
 
@@ -126,11 +127,9 @@ def recognised(task: tuple[str, str, int]) -> Outcome:
     began = time.perf_counter()
     result = tb.compare_families(
         measured,
-        families=FAMILIES,
-        load_cell=cell,
-        priors=dict.fromkeys(FAMILIES, VERTEX),
+        [tb.Family(family, **VERTEX) for family in FAMILIES],
+        tb.Rig(load_cell=cell, unknown=UNKNOWN),
         seed=int(rng.integers(2**32)),
-        nuisances=NUISANCES,
         leave_one_out=False,
         settings=SETTINGS,
     )
@@ -141,7 +140,7 @@ def _drawn(family: str, cell: tb.LoadCell, rng: np.random.Generator) -> Contour:
     """Draw from the prior, within reach."""
     record = tb.scan(tb.contours.Parabola(0.5, 0.5), drive_angles=ANGLES).record
     priors = {**matched_priors(family, 1.0), **VERTEX}
-    model = Experiment(record, family, cell, priors, friction=0.0, nuisances=NUISANCES).model
+    model = Experiment(record, tb.Rig(load_cell=cell, unknown=UNKNOWN), tb.Family(family, **priors)).model
     points, _ = model.draw_prior(rng, 1)
     return model.contours(points).take(0)
 

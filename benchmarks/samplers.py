@@ -26,13 +26,10 @@ from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
-from tactile_bayes.contours.families import family_named
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import sample, spawn
 from tactile_bayes.inference.ensembles.diagnosis import walker_major
-from tactile_bayes.inference.experiment import default_priors
-from tactile_bayes.inference.parameters.noise import noise_of
-from tactile_bayes.inference.parameters.nuisances import nuisances_of
+from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.tasks import one_thread
@@ -86,11 +83,8 @@ def started(walk: Walk) -> Floats:
 
 
 def demonstration() -> ContourModel:
-    measured = LOAD_CELL.measure(tb.scan(CONTOUR, rod=ROD).record, seed=1)
-    noise = noise_of(measured, None)
-    nuisances = nuisances_of(measured, (), {}, noise.cell, 0.0)
-    priors = default_priors(measured, "parabola", nuisances=())
-    return ContourModel(measured, family_named("parabola"), nuisances, noise, priors)
+    measured = LOAD_CELL.measure(tb.scan(CONTOUR, tb.Rig(rod=ROD)).record, seed=1)
+    return Experiment(measured, tb.Rig(unknown="nothing")).model
 
 
 def installed(package: tuple[str, str]) -> bool:

@@ -108,14 +108,15 @@ def record(task: tuple[str, str, int]) -> Outcome:
     scan = tb.scan(contour, drive_angles=ANGLES + rng.uniform(0.0, np.radians(1.0)))
     measured = cell.measure(scan.record, seed=rng)
     began = time.perf_counter()
-    result = tb.infer_contour(measured, family="shape-free", load_cell=cell, seed=number, settings=SETTINGS)
+    rig = tb.Rig(load_cell=cell)
+    result = tb.infer_contour(measured, family="shape-free", rig=rig, seed=number, settings=SETTINGS)
     seconds = time.perf_counter() - began
     gap, touched = gap_and_touched(scan)
     in_gap, width, off = compared(result, contour, gap)
     out_of_gap, _, _ = compared(result, contour, touched)
     known_width = np.nan
     if truth.family is not None:
-        known = tb.infer_contour(measured, family=truth.family, load_cell=cell, seed=number, settings=SETTINGS)
+        known = tb.infer_contour(measured, family=truth.family, rig=rig, seed=number, settings=SETTINGS)
         _, known_width, _ = compared(known, contour, gap)
     passed = bool(tb.check_record(result).attrs["passed"])
     return Outcome(in_gap, out_of_gap, width, off, known_width, seconds, bool(result.attrs["converged"]), passed)

@@ -30,7 +30,6 @@ from tactile_bayes.calibration.calibrate import calibration_replicate, experimen
 from tactile_bayes.calibration.ranks import uniformity_p_value
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.errors import StudyError, TactileBayesError
-from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.inference.streams.particles import LOST_ONCE
 from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
 
@@ -45,15 +44,16 @@ TOLERANCES = (0.02, 0.01, 0.005)
 ALARMS = (0.2, 0.05, 0.01, 0.001)
 """Rates of false alarms that an e-value may have at most."""
 
-WORLDS: Mapping[str, dict[str, Any]] = {
+SMOOTH = tb.Rig(load_cell=CELL, unknown={"friction": 0.0, "backlash": 0.0})
+WRONG: Mapping[str, dict[str, Any]] = {
     "none": {},
-    "friction of 0.1, not inferred": {"friction": 0.1},
-    "friction of 0.3, not inferred": {"friction": 0.3},
-    "rod tapered by 30 %": {"taper": 0.3},
-    "rod curved by 0.2/L": {"rest_curvature": 0.2},
-    "circle": {"family": "circle"},
-    "flat spot in the gap": {"flat_spot": (0.0, 2.0)},
-    "outliers (t, 2.5)": {"load_cell": replace(CELL, degrees_of_freedom=2.5)},
+    "friction of 0.1, not inferred": {"truth": SMOOTH.with_unknown(friction=0.1)},
+    "friction of 0.3, not inferred": {"truth": SMOOTH.with_unknown(friction=0.3)},
+    "rod tapered by 30 %": {"truth": SMOOTH.with_unknown(taper=0.3)},
+    "rod curved by 0.2/L": {"truth": SMOOTH.with_unknown(rest_curvature=0.2)},
+    "circle": {"misspecification": tb.Misspecification(family="circle")},
+    "flat spot in the gap": {"misspecification": tb.Misspecification(flat_spot=(0.0, 2.0))},
+    "outliers (t, 2.5)": {"truth": replace(SMOOTH, load_cell=replace(CELL, degrees_of_freedom=2.5))},
 }
 """What the model does not have: it takes all for parabolas without friction and backlash."""
 
@@ -73,7 +73,7 @@ def one(task: tuple[tuple[()], int]) -> Row:
     """Return ranks, bands and times of one record."""
     _, number = task
     try:
-        replicate = calibration_replicate(number, seed=SEED, load_cell=CELL)
+        replicate = calibration_replicate(number, rig=tb.Rig(load_cell=CELL), seed=SEED)
     except TactileBayesError as error:
         return {"error": f"{number}: {error}"}
     assert replicate.measured is not None
@@ -89,9 +89,9 @@ def wrong(records: int = 20) -> None:
     print(
         f"{'what the model does not have':<32}{'told (1,000)':>13}{'after':>8}{'told (20)':>11}{'no particle left':>18}"
     )
-    for name in WORLDS:
+    for name in WRONG:
         folder = OUT / ("without-" + "".join(c if c.isalnum() else "-" for c in name))
-        with open_results_store({"world": repr(WORLDS[name]), "seed": str(SEED)}, folder, RECORDS) as store:
+        with open_results_store({"without": name, "seed": str(SEED)}, folder, RECORDS) as store:
             kept = keep_outcomes(store, wrong_one, name, records, workers=None, scheduler=None, progress=None)
         every = [row["e_values"] for row in kept.values() if row.get("e_values")]
         values = np.array([row + [row[-1]] * (BLOCKS - len(row)) for row in every])
@@ -104,18 +104,15 @@ def wrong(records: int = 20) -> None:
 
 
 def wrong_one(task: tuple[str, int]) -> Row:
-    """Return the e-values of one record of a world, and whether no particle explained it."""
+    """Return the e-values of one record, and whether no particle explained it."""
     name, number = task
-    nuisances = tuple(each for each in STANDARD if each not in ("friction", "backlash"))
-    experiment = experiment_of(
-        seed=SEED, load_cell=CELL, nuisances=nuisances, world=tb.Misspecification(**WORLDS[name])
-    )
+    experiment = experiment_of(rig=SMOOTH, seed=SEED, **WRONG[name])
     random = np.random.default_rng(np.random.SeedSequence(SEED, spawn_key=(number,)))
     try:
         measured = simulate(experiment, random).measured
     except TactileBayesError as error:
         return {"error": f"{number}: {error}"}
-    stream = tb.Stream(load_cell=CELL, nuisances=nuisances, seed=number, particles=PARTICLES)
+    stream = tb.Stream(rig=SMOOTH, seed=number, particles=PARTICLES)
     row: dict[str, Any] = {"e_values": [], "shifts": [], "ended": False}
     for block in np.array_split(np.arange(measured.sizes["sample"]), BLOCKS):
         try:
@@ -130,7 +127,7 @@ def wrong_one(task: tuple[str, int]) -> Row:
 
 def compared(measured: xr.Dataset, truth: Mapping[str, float], posterior: xr.DataTree, number: int) -> Row:
     x = float(posterior["posterior"]["x_c"].median()) + AROUND
-    stream = tb.Stream(load_cell=CELL, seed=number, particles=PARTICLES, x=x)
+    stream = tb.Stream(rig=tb.Rig(load_cell=CELL), seed=number, particles=PARTICLES, x=x)
     height = tb.contours.Parabola(truth["a"], truth["q"], truth["x_c"]).height(x)
     row: dict[str, Any] = {"ranks": [], "held": [], "width": [], "seconds": [], "stages": []}
     for k, block in enumerate(np.array_split(np.arange(measured.sizes["sample"]), BLOCKS), start=1):

@@ -12,15 +12,12 @@ import math
 import sys
 from collections import Counter
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
-import tactile_bayes as tb
-from benchmarks.misspecification import CASES, CELL, SETTINGS
+from benchmarks.misspecification import CASES, SETTINGS
 from tactile_bayes.assessment.trust import trust
 from tactile_bayes.calibration.calibrate import calibration_replicate
 from tactile_bayes.errors import StudyError, TactileBayesError
@@ -30,7 +27,7 @@ OUT = Path("results/trust")
 PROBABILITY = 0.95
 LOST = "lost"
 
-CHOSEN = [(name, other) for name, runs in CASES.items() for other, run in runs.items() if "family" not in run.asked]
+CHOSEN = [(name, other) for name, runs in CASES.items() for other, run in runs.items() if "family" not in run.options]
 """Cases, with the ways to infer them that take parabolas."""
 
 Row = Mapping[str, Any]
@@ -68,12 +65,10 @@ def one(task: tuple[tuple[str, str], int]) -> Row:
     """Return the conclusion on one record, and whether its band held."""
     (name, other), number = task
     run = CASES[name][other]
-    as_stated = {"noise_scale": stats.lognorm(s=1e-9)}
-    world = tb.Misspecification(**{**run.world, "priors": as_stated | run.world.get("priors", {})})
-    options = {"load_cell": CELL, "settings": SETTINGS, **run.asked}
+    options = {"rig": run.rig, "truth": run.truth, "settings": SETTINGS, **run.options}
     try:
-        replicate = partial(calibration_replicate, seed=2031, world=world, probability=PROBABILITY, **options)(number)
-        found = trust(replicate.posterior, replicates=0, assumptions=False, priors=run.asked.get("priors"))
+        replicate = calibration_replicate(number, seed=2031, probability=PROBABILITY, **options)
+        found = trust(replicate.posterior, replicates=0, assumptions=False)
     except TactileBayesError as error:
         return {"conclusion": LOST, "summary": str(error)}
     numbers = replicate.outcome.numbers

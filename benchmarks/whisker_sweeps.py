@@ -37,6 +37,8 @@ from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.parameters.nuisances import Nuisances
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.inference.result import known_of
+from tactile_bayes.rig import NOTHING
 
 ROOT = Path(__file__).resolve().parents[1]
 MEASURED = Path(os.environ.get("TACTILE_BAYES_MEASURED", ROOT.parent / "shared" / "data")) / "whisker-sweeps"
@@ -157,48 +159,50 @@ def _table(name: str) -> Floats:
     return np.genfromtxt(MEASURED / name, delimiter=",", names=NAMES, skip_header=1)
 
 
-def calibrated(folder: Path, rod: tb.Rod) -> xr.DataTree:
-    """Return the rig, from the probe, whose place is uncertain by some millimetres."""
-    path = folder / "rig.nc"
+def calibrated(folder: Path, rod: tb.Rod) -> tuple[tb.Rig, xr.DataTree]:
+    """Return the rig and its posterior, from the probe, whose place is uncertain by some millimetres."""
+    file, path = folder / "rig.toml", folder / "rig.nc"
     if not path.exists():
         unit = rod.moment_unit
-        priors = {
+        unknown = {
+            **NOTHING,
+            **dict.fromkeys(("drive_angle_offset", "friction", "rest_curvature"), "default"),
             "moment_gain": stats.lognorm(s=0.5),
             "moment_curve_quadratic": stats.norm(0.0, 0.2 / unit),
             "moment_curve_cubic": stats.norm(0.0, 0.1 / unit**2),
             "suspension_compliance": stats.halfnorm(scale=0.3 / unit),
             **dict.fromkeys(("gauge_x", "gauge_y"), stats.norm(0.0, 3e-3)),
         }
-        known: dict[str, Any] = {"nuisances": ("drive_angle_offset", "friction", "rest_curvature"), "seed": 1}
+        options: dict[str, Any] = {}
         if rod.stem:
-            priors |= dict.fromkeys(("gauge_x", "gauge_y"), stats.norm(0.0, 5e-3)) | hysteresis(AT_POINTS, rod)
-            priors["noise_scale"] = stats.lognorm(s=0.2)  # beside a discrepancy 30 readings do not tell it
-            priors["stem"] = stats.truncnorm(-STEM[0] / STEM[1], np.inf, *STEM)
-            known |= {"nuisances": (*known["nuisances"], "discrepancy"), "checkpoint": folder / "rig", "settings": LONG}
+            unknown |= dict.fromkeys(("gauge_x", "gauge_y"), stats.norm(0.0, 5e-3)) | hysteresis(AT_POINTS, rod)
+            unknown["noise_scale"] = stats.lognorm(s=0.2)  # beside a discrepancy 30 readings do not tell it
+            unknown["stem"] = stats.truncnorm(-STEM[0] / STEM[1], np.inf, *STEM)
+            options = {"checkpoint": folder / "rig", "settings": LONG}
         probe = tb.contours.Circle(r=1e-5, q=-1e-5)
-        rig = tb.infer_rig(points(rod), contour=probe, load_cell=SENSOR, priors=priors, **known)
-        if not rig.attrs["converged"]:
-            raise SystemExit(f"rig: {rig.attrs['message']}; the same command goes on")
-        tb.write_result(rig, path)
-    return tb.read_result(path)
+        rig = tb.Rig(load_cell=SENSOR, unknown=unknown)
+        rig = tb.calibrate_rig(points(rod), contour=probe, rig=rig, seed=1, **options)
+        assert rig.calibration is not None
+        assert rig.calibration.posterior is not None
+        rig.write(file)
+        tb.write_result(rig.calibration.posterior, path)
+    return tb.Rig.read(file), tb.read_result(path)
 
 
 def measured(
-    folder: Path, name: str, rod: tb.Rod, rig: xr.DataTree, of_any_length: bool = False, of_any_shape: bool = False
+    folder: Path, name: str, rod: tb.Rod, rig: tb.Rig, of_any_length: bool = False, of_any_shape: bool = False
 ) -> xr.DataTree:
     """Return the posterior of the cylinder of a sweep, or of all sweeps of a session."""
     path = folder / f"{file_name(name, of_any_length, of_any_shape)}.nc"
     if not path.exists():
-        priors = {"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(ON_SWEEPS, rod)}
+        unknown: dict[str, Any] = dict.fromkeys(("moment_bias", "friction", "noise_scale"), "default")
+        unknown |= {"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(ON_SWEEPS, rod)}
         if of_any_length:
-            priors["length"] = stats.norm(rod.length, FREE)
+            unknown["length"] = stats.norm(rod.length, FREE)
         found = tb.infer_contour(
             record_of(name, rod),
             family="shape-free" if of_any_shape else "circle",
-            load_cell=SENSOR,
-            nuisances=("moment_bias", "friction", "discrepancy"),
-            priors=priors,
-            rig=rig,
+            rig=rig.with_unknown(**unknown),
             seed=1,
             settings=ENOUGH_OF_ANY_SHAPE if of_any_shape else ENOUGH,
         )
@@ -243,7 +247,7 @@ def releases(found: xr.DataTree, name: str, rod: tb.Rod) -> list[str]:
     draws = found["posterior"].dataset.stack(every=("chain", "draw"))
     draws = draws.isel(every=slice(None, None, max(1, draws.sizes["every"] // 200)))
     inferred = [one for one in json.loads(found.attrs["nuisances"]) if not one.startswith("discrepancy")]
-    nuisances = Nuisances(tuple(inferred), {}, rod, found.attrs["friction"])
+    nuisances = Nuisances(tuple(inferred), {}, rod, known_of(found.attrs))
     rig = nuisances.rig({one: draws[one].values for one in inferred})
     record = record_of(name, rod, whole=True)
     contours = contours_of(draws, found.attrs["family"])
@@ -296,10 +300,10 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     rod, began = whisker(on_stem="--stem" in sys.argv), perf_counter()
     free = "--length" in sys.argv, "--shape-free" in sys.argv
-    rig = calibrated(folder, rod)
-    print(f"rig: {rig.attrs['message']} ({perf_counter() - began:.0f} s)")
-    for name, draws in rig["posterior"].mean().items():
-        print(f"  {name:24s} {float(draws):12.5g} ± {float(rig['posterior'][name].std()):.2g}")
+    rig, of_rig = calibrated(folder, rod)
+    print(f"rig: {of_rig.attrs['message']} ({perf_counter() - began:.0f} s)")
+    for name, draws in of_rig["posterior"].mean().items():
+        print(f"  {name:24s} {float(draws):12.5g} ± {float(of_rig['posterior'][name].std()):.2g}")
     for name in names:
         began = perf_counter()
         found = measured(folder, name, rod, rig, *free)

@@ -67,7 +67,7 @@ def whisker() -> Figure:
     true = tb.Rod(0.1, rigidity, rest_curvature=lambda s: 2.0 + 40.0 * s, taper=0.5)
     parabola = tb.contours.Parabola(a=5.0, q=0.07)
     cell = tb.LoadCell(force_noise=3e-4, moment_noise=1.5e-5)
-    measured = cell.measure(tb.scan(parabola, rod=true, drive_step=np.radians(3)).record, seed=2)
+    measured = cell.measure(tb.scan(parabola, tb.Rig(rod=true), drive_step=np.radians(3)).record, seed=2)
 
     figure = Figure(figsize=(8.0, 6.5), layout="constrained")
     above, below = figure.subplots(2, 1)
@@ -87,7 +87,7 @@ def whisker() -> Figure:
     straight = tb.Rod(traced.length, rigidity, taper=0.5)
     drawn_for = (("traced rod", traced, "o", "#0072B2"), ("straight rod", straight, "^", "#D55E00"))
     for name, rod, marker, colour in drawn_for:
-        found = tb.reconstruct(measured, method="constrained", rod=rod, load_cell=cell)
+        found = tb.reconstruct(measured, tb.Rig(rod=rod, load_cell=cell), method="constrained")
         below.plot(
             1e3 * found.contact_x, 1e3 * found.contact_y, marker, markersize=4.0, color=colour, label=name, mfc="none"
         )

@@ -14,6 +14,7 @@ from hypothesis import settings
 from helpers.contour_posteriors import QUICK
 from tactile_bayes.contours import Circle
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import Translation, scan
 
@@ -30,10 +31,10 @@ def pytest_configure(config):
 
 CARRIED = Translation(base=(0.9, 0.0), heading=np.pi, drive_angle=1.5, travel=1.8)
 FORWARD_MODELS = (
-    {"rod": Rod(taper=0.5), "drive": [CARRIED]},
+    {"rig": Rig(rod=Rod(taper=0.5)), "drive": [CARRIED]},
     {"drive": [CARRIED]},
     {"direction": "forward"},
-    {"rod": Rod(taper=0.5), "direction": "forward"},
+    {"rig": Rig(rod=Rod(taper=0.5)), "direction": "forward"},
 )
 """Arguments of sweeps for which numba compiles different functions, a quarter of a minute each."""
 
@@ -84,7 +85,7 @@ def commands_built_once():
 @pytest.fixture(scope="session")
 def measured():
     """The demonstration's record, in coarse steps: SI, both directions, all channels."""
-    record = LOAD_CELL.measure(scan(CONTOUR, rod=ROD, drive_step=0.05).record, seed=1)
+    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.05).record, seed=1)
     return record.drop_vars([name for name in record.data_vars if name.startswith("truth_")])
 
 
@@ -94,7 +95,7 @@ def analysed(measured, tmp_path_factory):
     from tactile_bayes.runs.contour import analyse
 
     folder = tmp_path_factory.mktemp("analysed") / "made" / "on the way"
-    return analyse(measured, folder, nuisances=[], settings=QUICK, truth=CONTOUR), folder
+    return analyse(measured, folder, rig=Rig(unknown="nothing"), settings=QUICK, truth=CONTOUR), folder
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Ellipse, Parabola
 from tactile_bayes.errors import ReachError, RecordError
 from tactile_bayes.record import present_channels, read_record, write_record
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 NAMES = ["sweep", "direction", "base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y"]
@@ -49,11 +50,11 @@ FIRST_ROW = 9
 MISTAKES = {
     "a missing column": (
         lambda rows: (NAMES[:-1], without_last(rows)),
-        ["column 'force_y'", "columns={'force_y': 'NAME[UNIT]'}", "--column 'force_y=NAME[UNIT]'", "--missing force_y"],
+        ["column 'force_y'", "columns={'force_y': 'NAME[UNIT]'}", 'force_y = "NAME[UNIT]"', 'missing = ["force_y"]'],
     ),
     "a misspelt column": (
         lambda rows: ([name.replace("drive_angle", "drive_angel") for name in NAMES], rows),
-        ["column 'drive_angel'", "columns={'drive_angle': 'drive_angel'}", "--column drive_angle=drive_angel"],
+        ["column 'drive_angel'", "columns={'drive_angle': 'drive_angel'}", 'drive_angle = "drive_angel"'],
     ),
     "text in a row": (
         lambda rows: (NAMES, edited(rows, 3, "force_x", "overload")),
@@ -88,12 +89,13 @@ def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
     header, rows = table
     if way == "no column":
         path = written(tmp_path / "record.csv", header, NAMES[:-1], without_last(rows))
-        options = ["--missing", "force_y"]
+        missing = ["force_y"]
     else:
         path = written(tmp_path / "record.csv", header, NAMES, mapped(rows, "force_y", lambda cell: ""))
-        options = []
-    assert present_channels(read_record(path, missing=options[1:])) == ("holding_moment", "force_x")
-    result = commands.call("infer", path, "--out", tmp_path / "run", "-q", "--as-stated", *options)
+        missing = []
+    assert present_channels(read_record(path, missing=missing)) == ("holding_moment", "force_x")
+    (tmp_path / "rig.toml").write_text(f'unknown = "nothing"\n[file]\nmissing = {missing}\n')
+    result = commands.call("infer", path, "--out", tmp_path / "run", "-q", "--rig", tmp_path / "rig.toml")
     assert result.exit_code == 0, result.output
     assert "No contact points: Step 2 needs all three load channels." in result.stdout
 
@@ -104,7 +106,7 @@ def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 def test_a_contour_that_is_hardly_touched_is_refused(direction):
     with refused(ReachError, "rounding"):
-        scan(Ellipse(0.25, 8e5, 1.0 - 2e-11), direction=direction, friction=0.3)
+        scan(Ellipse(0.25, 8e5, 1.0 - 2e-11), direction=direction, rig=Rig(unknown={"friction": 0.3}))
 
 
 def test_a_contour_at_the_end_of_reach_but_for_rounding_is_out_of_it():

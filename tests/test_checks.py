@@ -109,14 +109,14 @@ NAMED_BY = {
     **dict.fromkeys(("posterior", "without_events"), "posterior|draws|infer_contour"),
     **dict.fromkeys(("diameter", "youngs_modulus"), "diameter|youngs_modulus|flexural_rigidity"),
     "path": "path|record|folder",
-    "priors": "priors?",
-    "nuisances": "nuisances|nuisance parameter",
     "families": "families|family",
+    "unknown": "unknown|rig|prior",
+    "r": "r|circle",
     "false_alarm": "false_alarm|record",
 }
 """What a refusal calls arguments that it does not call by their names."""
 NAMES = [["left"], ["bias", None], ["bias", 1], "bias", ["bias", ["gain"]], {"bias": 1.0}]
-PRIORS = [{"q": 0.5}, {"q": None}, {"q": "norm"}, {"left": stats.norm()}, {"q": stats.norm}, {1: stats.norm()}]
+UNKNOWN = [{"friction": None}, {"friction": "wide"}, {"left": 0.1}, {"friction": stats.norm}, {1: 0.1}, "everything"]
 
 
 # --- What is right: of these a call may be accepted -----------------------------------------------------------------
@@ -176,6 +176,11 @@ def vacuous(wrong):
     return len(wrong) > 1 and any(empty(list)(value) or getattr(value, "size", 1) == 0 for value in wrong.values())
 
 
+def frozen(value):
+    """A distribution with a width."""
+    return hasattr(value, "logpdf") and hasattr(value, "args") and value.std() > 0.0
+
+
 def nothing(value):
     return value is None
 
@@ -188,7 +193,6 @@ TINY = math.ulp(0.0)
 AT_LEAST_0, POSITIVE = number(0.0), number(TINY)
 SHARE = number(TINY, math.nextafter(1.0, 0.0))
 NO_SHARES = [0.0, 1.0, 90.0]
-FRICTION = number(0.0, 0.85)
 FLAG = kind(bool | np.bool_)
 SEED = whole(0)
 CELL_OR_NONE = either(nothing, kind(tb.LoadCell))
@@ -205,28 +209,20 @@ def cases(tmp_path):
     tb.write_record(ideal(), good)
     paths = {"path": ["\0", "folder/\0.csv", tmp_path, tmp_path / "record.txt", 3]}
     of_record, of_posterior = {"measured": no_records()}, {"posterior": no_posteriors()}
-    of_rig = {
+    of_seed = {
         "measured": (measured(), never),
-        "load_cell": (CELL, CELL_OR_NONE),
         "seed": (1, SEED),
-        "rod": (None, ROD_OR_NONE),
-        "friction": (0.0, FRICTION),
         "settings": (None, SETTINGS_OR_NONE),
         "progress": (None, PROGRESS),
     }
     of_scan = {
         "contour": (tb.contours.Parabola(0.5, 0.5), kind(tb.contours.Circle, shape=())),
         "base": ((0.0, 0.0), pair),
-        "rod": (None, ROD_OR_NONE),
-        "friction": (0.0, FRICTION),
+        "rig": (None, either(nothing, kind(tb.Rig))),
     }
     no_bases = [[(0, 0), (1,)], [0.0, None], "here", (0.0,), (0.0, 0.0, 0.0), [(0.0, math.nan)], (math.nan, 0)]
-    of_contour = {
-        **of_rig,
-        "friction": (None, either(nothing, FRICTION)),
-        "priors": (None, NO_PRIORS),
-        "nuisances": ([], NONE_NAMED),
-    }
+    stated = tb.Rig(load_cell=CELL, unknown="nothing")
+    of_contour = {**of_seed, "rig": (stated, either(nothing, kind(tb.Rig)))}
     place = {"q": (0.5, numbers), "x_c": (0.0, numbers)}
     contours = {
         "Parabola": {"a": (0.5, numbers), **place},
@@ -250,6 +246,7 @@ def cases(tmp_path):
         "max_r_hat": number(1.1),
         "min_ess": POSITIVE,
         "max_seconds": either(nothing, POSITIVE),
+        "events": FLAG,
     }
     of_rod = {
         "length": (0.1, number(0.1, 10.0)),
@@ -274,7 +271,6 @@ def cases(tmp_path):
                 **of_scan,
                 "slope_angles": ([0.1], row),
                 "direction": ("forward", one_of("forward", "backward")),
-                "rod": (None, either(nothing, kind(tb.Rod))),
             },
             {"base": [*no_bases, [(0, 0), (1, 0)]], "slope_angles": [[10.0], [[0.1]]], "direction": ["both"]},
         ),
@@ -321,22 +317,32 @@ def cases(tmp_path):
             {
                 "measured": (measured(), never),
                 "method": ("constrained", one_of("raw", "constrained")),
-                "load_cell": (CELL, CELL_OR_NONE),
-                "rod": (None, ROD_OR_NONE),
-                "friction": (0.0, FRICTION),
-                "suspension_compliance": (0.0, number(0.0, 2.0)),
+                "rig": (stated, either(nothing, kind(tb.Rig))),
             },
-            {**of_record, "measured": [*no_records(), ideal().drop_vars("force_y")], "friction": [1.0]},
+            {**of_record, "measured": [*no_records(), ideal().drop_vars("force_y")]},
         ),
         "infer_contour": (
             tb.infer_contour,
             {
                 **of_contour,
                 "family": ("parabola", never),
-                "events": (True, FLAG),
                 "checkpoint": (None, either(nothing, one_of("left", "0.1"))),
             },
-            {**of_record, "priors": PRIORS, "nuisances": NAMES, "checkpoint": ["\0"]},
+            {**of_record, "checkpoint": ["\0"]},
+        ),
+        "Rig": (
+            tb.Rig,
+            {
+                "rod": (None, either(nothing, kind(tb.Rod))),
+                "load_cell": (CELL, CELL_OR_NONE),
+                "unknown": ({}, either(empty(dict), one_of("nothing"))),
+            },
+            {"unknown": UNKNOWN},
+        ),
+        "Family": (
+            functools.partial(tb.Family, "circle"),
+            {"r": (0.2, either(POSITIVE, frozen)), "x_c": (0.0, either(number(), frozen))},
+            {"r": [0.0, -1.0, stats.norm, stats.norm(0.1, 0.0)]},
         ),
         "SamplerSettings": (
             tb.SamplerSettings,
@@ -373,7 +379,8 @@ def cases(tmp_path):
         "compare_families": (
             tb.compare_families,
             {
-                **of_contour,
+                **{name: of_seed[name] for name in ("measured", "seed", "settings", "progress")},
+                "rig": (stated, either(nothing, kind(tb.Rig))),
                 "families": (["parabola", "circle"], never),
                 "leave_one_out": (False, FLAG),
                 "false_alarm": (1e-3, SHARE),
@@ -381,19 +388,18 @@ def cases(tmp_path):
             {
                 **of_record,
                 "families": [["parabola"], ["parabola", 1], ["parabola", "left"], ["circle"] * 2],
-                "priors": [*({"circle": priors} for priors in PRIORS), {"circle": 1}],
-                "nuisances": NAMES,
             },
         ),
         "infer_contacts": (
             tb.infer_contacts,
             {
-                **of_rig,
+                **of_seed,
+                "rig": (stated, either(nothing, kind(tb.Rig))),
                 "prior": ("flat", one_of("flat", "polar")),
                 "draws": (4, lambda value: whole(4, 10**6)(value) and value % 4 == 0),
                 "method": ("importance", one_of("auto", "importance", "emcee")),
             },
-            {**of_record, "draws": [2, 10, 4.0, "4"], "method": ["nuts"], "friction": [2.0], "seed": [-1]},
+            {**of_record, "draws": [2, 10, 4.0, "4"], "method": ["nuts"], "seed": [-1]},
         ),
     }
     assert set(made) == set(CASES)
@@ -412,6 +418,8 @@ CASES = (
     "write_record",
     "reconstruct",
     "infer_contour",
+    "Rig",
+    "Family",
     "SamplerSettings",
     "contour_band",
     "predictive_interval",
@@ -488,8 +496,8 @@ def test_wrong_arguments_in_pairs_are_refused_in_words(name, before_sampling, tm
 
 
 def test_an_unknown_keyword_is_python_s_to_refuse(tmp_path):
-    for call, arguments, _ in cases(tmp_path).values():
-        with refused(TypeError, "'left'"):
+    for name, (call, arguments, _) in cases(tmp_path).items():
+        with refused(ParameterError if name == "Family" else TypeError, "left"):
             call(**{argument: value for argument, (value, _) in arguments.items()}, left=1)
 
 

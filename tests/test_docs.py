@@ -55,17 +55,21 @@ def test_slow_blocks_run_and_print_what_the_page_says(path: Path, clone: Path) -
 
 def test_a_rigs_file_says_what_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    section = TEXTS[DOCS / "howto" / "your-record.md"].split("## From a rig's file to a report\n")[1]
+    after = TEXTS[DOCS / "howto" / "your-record.md"].split("## From a rig's file to a report\n")[1]
+    section = after.partition("\n## ")[0]
     shown = [block.code for block in blocks(section) if block.language == "text"]
     assert Path("data/synthetic/rig.csv").read_text(encoding="utf-8").startswith(shown[0])
     (asked,) = (words for block in blocks(section) for words in commands(block.code) if words[0] == "inspect")
+    asked = [word.replace("inspection/", str(tmp_path)) for word in asked]
     first, *_ = call(*asked).stdout.splitlines(keepends=True)
     assert first == shown[1]
     asked = [word.replace("force_x=Fx", "force_x=-Fx") for word in asked]
     inspected = call(*asked).stdout
     for part in shown[2].split("\n\n"):
         assert part in inspected
-    found = call("reconstruct", *asked[1:], "--out", tmp_path).stdout
+    (file,) = (block.code for block in blocks(section) if block.language == "toml")
+    assert file in (tmp_path / "rig.toml").read_text(encoding="utf-8")
+    found = call("reconstruct", asked[1], "--rig", tmp_path / "rig.toml", "--out", tmp_path).stdout
     assert found.startswith(shown[3])
 
 

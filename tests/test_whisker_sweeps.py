@@ -5,9 +5,11 @@ import pytest
 from benchmarks import whisker_sweeps
 from scipy.optimize import least_squares
 
+from helpers.contour_posteriors import only
 from tactile_bayes.contours import Circle
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.rig import Rig
 
 RIG = {
     "moment_gain": 0.928,
@@ -37,8 +39,9 @@ ON_STEM = {
 """The likeliest rig with a stem before the whisker, with the benchmark's priors and white noise of 7 counts."""
 
 
-def model_of(record, nuisances, **contour):
-    model = Experiment(record, load_cell=whisker_sweeps.SENSOR, nuisances=list(nuisances), **contour).model
+def model_of(record, unknown, **contour):
+    rig = Rig(load_cell=whisker_sweeps.SENSOR, unknown=only(*unknown))
+    model = Experiment(record, rig, **contour).model
     model.likelihood.exact = True  # a table would pay from a thousand evaluations on
     return model
 

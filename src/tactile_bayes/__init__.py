@@ -20,12 +20,14 @@ __version__ = "0.1.0"
 _MODULES = ("contours", "datasets", "errors", "paper_figures", "plotting")
 
 _HOMES = {
+    "Family": "inference.family",
     "LoadCell": "load_cell",
     "Misspecification": "calibration.misspecification",
     "Motion": "sweep",
     "OrnsteinUhlenbeck": "load_cell",
     "Plan": "planning.plan",
     "RandomWalk": "load_cell",
+    "Rig": "rig.rig",
     "Rod": "mechanics.rods.rod",
     "Rotation": "sweep",
     "SamplerSettings": "inference.ensembles",
@@ -33,6 +35,7 @@ _HOMES = {
     "StreamComparison": "comparison.streams",
     "Translation": "sweep",
     "calibrate": "calibration.calibrate",
+    "calibrate_rig": "inference.contour",
     "calibration_replicate": "calibration.calibrate",
     "check_record": "diagnostics.record_check",
     "check_units_and_signs": "diagnostics.units_and_signs",
@@ -49,8 +52,8 @@ _HOMES = {
     "in_frame": "record",
     "infer_contacts": "inference.contact_posterior",
     "infer_contour": "inference.contour",
+    "infer_contours": "runs.many",
     "infer_point_load": "inference.point_load",
-    "infer_rig": "inference.contour",
     "inspect_record": "diagnostics.inspection",
     "make_record": "record",
     "normal_band": "uncertainty.normal_band",
@@ -92,9 +95,10 @@ if TYPE_CHECKING:
     from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs as check_units_and_signs
     from tactile_bayes.diagnostics.verdicts import verdicts as verdicts
     from tactile_bayes.inference.contact_posterior import infer_contacts as infer_contacts
+    from tactile_bayes.inference.contour import calibrate_rig as calibrate_rig
     from tactile_bayes.inference.contour import infer_contour as infer_contour
-    from tactile_bayes.inference.contour import infer_rig as infer_rig
     from tactile_bayes.inference.ensembles import SamplerSettings as SamplerSettings
+    from tactile_bayes.inference.family import Family as Family
     from tactile_bayes.inference.point_load import infer_point_load as infer_point_load
     from tactile_bayes.inference.result import read_result as read_result
     from tactile_bayes.inference.result import to_arviz as to_arviz
@@ -119,6 +123,8 @@ if TYPE_CHECKING:
     from tactile_bayes.record import read_record as read_record
     from tactile_bayes.record import write_record as write_record
     from tactile_bayes.report import write_report as write_report
+    from tactile_bayes.rig.rig import Rig as Rig
+    from tactile_bayes.runs.many import infer_contours as infer_contours
     from tactile_bayes.sweep import Motion as Motion
     from tactile_bayes.sweep import Rotation as Rotation
     from tactile_bayes.sweep import Translation as Translation
@@ -137,8 +143,6 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return importlib.import_module(f"tactile_bayes.{name}")
-    if name == "World":  # its name in unreleased versions, for one release
-        return importlib.import_module("tactile_bayes.calibration.misspecification").Misspecification
     if name in _HOMES:
         value = getattr(importlib.import_module(f"tactile_bayes.{_HOMES[name]}"), name)
         globals()[name] = value

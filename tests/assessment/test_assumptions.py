@@ -1,64 +1,103 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy import stats
 
 from helpers.contour_posteriors import posterior, swept
 from tactile_bayes.assessment import assumptions as module
 from tactile_bayes.assessment.assumptions import alternatives_of, band_by_assumption
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.rig import expanded
+from tactile_bayes.rig.rig_prior import RigPrior
 
 
-def names_of(nuisances, bases=((0.0, 0.0),), **options):
+def only(*names):
+    """The rig of which these parameters are unknown."""
+    return Rig(unknown={**NOTHING, **dict.fromkeys(names, "default")})
+
+
+def names_of(rig, bases=((0.0, 0.0),), **options):
     record = swept(Parabola(0.5, 0.5), step=0.1, bases=bases)
-    return {each.name: each for each in alternatives_of(Experiment(record, nuisances=nuisances, **options))}
+    return {each.name: each for each in alternatives_of(Experiment(record, rig, **options))}
+
+
+def unknown_of(alternative):
+    return alternative.experiment.nuisances.names
 
 
 def test_each_nuisance_is_added_or_fixed_and_each_other_family_tried():
-    found = names_of(["bias", "friction"])
-    assert found["bias as stated"].experiment.rig.names == ("friction",)
-    assert found["friction as stated"].experiment.rig.friction == 0.0
+    found = names_of(only("bias", "friction"))
+    assert unknown_of(found["bias as stated"]) == ("friction",)
+    assert found["friction as stated"].experiment.nuisances.friction == 0.0
     assert found["lever inferred"].kind == "added"
-    assert found["family circle"].experiment.family == "circle"
+    assert found["family circle"].experiment.own_family == Family("circle")
     assert "family parabola" not in found
     assert "base inferred" not in found  # there is one pivot
-    assert "base inferred" in names_of([], bases=((0.0, 0.0), (0.2, 0.0)))
+    assert "base inferred" in names_of(only(), bases=((0.0, 0.0), (0.2, 0.0)))
+
+
+def test_what_is_fixed_has_the_value_that_rod_and_load_cell_state():
+    rod = Rod(rest_curvature=0.1, stem=0.02)
+    rig = replace(only("rest_curvature", "stem", "moment_curve", "base"), rod=rod)
+    found = names_of(rig, bases=((0.0, 0.0), (0.2, 0.0)))
+    for group in ("rest_curvature", "stem", "base"):
+        fixed = found[f"{group} as stated"].experiment
+        assert set(names_of_group(group)).isdisjoint(fixed.nuisances.names)
+        assert len(fixed.nuisances.names) == len(Experiment(fixed.record, rig).nuisances.names) - len(
+            names_of_group(group)
+        )
+        assert fixed.nuisances.known == {}  # none deviates from what is stated
+
+
+def names_of_group(group):
+    return ("base_2_x", "base_2_y") if group == "base" else (group,)
 
 
 def test_gains_take_the_place_of_the_rigidity_which_has_the_same_effect():
-    found = names_of(["rigidity_scale"])["gain inferred for rigidity_scale"].experiment
-    assert found.rig.names == ("moment_gain", "force_x_gain", "force_y_gain")
+    found = names_of(only("rigidity_scale"))["gain inferred for rigidity_scale"]
+    assert unknown_of(found) == ("moment_gain", "force_x_gain", "force_y_gain")
+
+
+def test_a_discrepancy_stays_in_every_alternative():
+    found = names_of(only("bias", "discrepancy"))
+    for name in ("bias as stated", "lever inferred", "family circle"):
+        assert found[name].experiment.noise.of_discrepancy == ("discrepancy_scale", "discrepancy_length"), name
 
 
 def test_a_calibrated_rig_does_not_add_what_is_fixed():
-    from scipy import stats
-
-    from tactile_bayes.inference.parameters.rig_prior import RigPrior
-
     priors = {"rigidity_scale": stats.lognorm(s=0.01), "lever_x": stats.norm(0.0, 0.01)}
     joint = RigPrior(priors, np.array([[1.0, 0.8], [0.8, 1.0]]), 0.1, "0")
-    found = names_of([], joint=joint)
-    assert found["rigidity_scale as stated"].experiment.rig.names == ("lever_x",)
-    assert found["lever as stated"].experiment.rig.names == ("rigidity_scale",)
-    added = found["backlash inferred"].experiment.rig
+    known = {name: value for name, value in expanded(NOTHING).items() if name not in priors}
+    found = names_of(Rig(unknown=known, calibration=joint))
+    assert unknown_of(found["rigidity_scale as stated"]) == ("lever_x",)
+    assert unknown_of(found["lever as stated"]) == ("rigidity_scale",)
+    added = found["backlash inferred"].experiment.nuisances
     assert set(added.names) == {"rigidity_scale", "lever_x", "backlash"}
     assert added.joint is not None
-    assert set(found["family circle"].experiment.rig.names) == set(priors)
-    gains = found["gain inferred for rigidity_scale"].experiment.rig.names
+    assert set(unknown_of(found["family circle"])) == set(priors)
+    gains = unknown_of(found["gain inferred for rigidity_scale"])
     assert set(gains) == {"lever_x", "moment_gain", "force_x_gain", "force_y_gain"}
 
 
 def test_friction_that_is_known_is_not_inferred():
-    assert "friction inferred" not in names_of([], friction=0.2)
+    assert "friction inferred" in names_of(only())
+    assert "friction inferred" not in names_of(only().with_unknown(friction=0.2))
 
 
 def test_priors_of_what_remains_are_kept():
-    from scipy import stats
-
-    priors = {"q": stats.uniform(0.4, 0.2), "friction": stats.halfnorm(scale=0.1)}
-    found = names_of(["friction"], priors=priors)
-    assert set(found["friction as stated"].experiment.priors) == {"q"}
-    assert set(found["family circle"].experiment.priors) == {"friction"}
+    of_q, of_friction = stats.uniform(0.4, 0.2), stats.halfnorm(scale=0.1)
+    found = names_of(only().with_unknown(friction=of_friction), family=Family("parabola", q=of_q))
+    fixed, circle = (found[name].experiment.priors for name in ("friction as stated", "family circle"))
+    assert fixed["q"] is of_q
+    assert "friction" not in fixed
+    assert circle["friction"] is of_friction
+    assert circle["q"] is not of_q
 
 
 @pytest.mark.slow

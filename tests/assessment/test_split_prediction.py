@@ -6,8 +6,10 @@ from helpers.contour_posteriors import CELL, SOUND, infer_as_stated, measured, p
 from tactile_bayes.assessment.split_prediction import parts_of, split_prediction
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.rig import NOTHING, Rig
 
 
 def found_of(tree):
@@ -39,26 +41,26 @@ def test_a_zero_that_moves_between_sweeps_shows_though_zeros_are_not_inferred():
 
 @pytest.mark.slow
 def test_noise_that_is_known_and_larger_than_stated_shows():
-    from scipy import stats
-
     louder = type(CELL)(force_noise=1.25 * CELL.force_noise, moment_noise=1.25 * CELL.moment_noise)
     record = louder.measure(swept(Parabola(0.5, 0.5)), seed=4)
-    known = {"noise_scale": stats.lognorm(s=1e-6)}
-    tree = infer_as_stated(record, load_cell=CELL, priors=known, seed=1, settings=SOUND)
-    found = split_prediction(tree, experiment_of(tree, known).model)
+    rig = Rig(load_cell=CELL, unknown={**NOTHING, "noise_scale": 1.0})
+    found = found_of(infer_contour(record, rig=rig, seed=1, settings=SOUND))
     assert found.attrs["passed"] == 0
     assert float(found["sd"].sel(part="noise")) > 4.0
 
 
 def test_parts_are_sweeps_pivots_and_halves():
     record = swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.2, 0.0)), step=0.1)
-    parts = parts_of(Experiment(record, load_cell=CELL, nuisances=[]).model)
+    parts = parts_of(Experiment(record, rig=Rig(load_cell=CELL, unknown="nothing")).model)
     names = ["sweep 1", "sweep 2", "sweep 3", "sweep 4", "pivot 1", "pivot 2", "earlier half", "later half"]
     assert list(parts) == names
     assert (parts["pivot 1"] == (record.base_x.values == 0.0)).all()
     assert (parts["earlier half"] == ~parts["later half"]).all()
     one = record.isel(sample=record.sweep.values == record.sweep.values[0])
-    assert list(parts_of(Experiment(one, load_cell=CELL, nuisances=[]).model)) == ["earlier half", "later half"]
+    assert list(parts_of(Experiment(one, rig=Rig(load_cell=CELL, unknown="nothing")).model)) == [
+        "earlier half",
+        "later half",
+    ]
 
 
 def test_too_few_predictions_are_refused():

@@ -42,9 +42,9 @@ def test_a_wrong_family_is_not_to_be_relied_on():
 @pytest.mark.slow
 def test_a_narrow_prior_of_the_vertex_sets_the_gap():
     deviation = float(posterior()["posterior"]["q"].std())
-    priors = {"q": stats.norm(0.5, 0.2 * deviation)}
-    tree = infer_as_stated(measured(), load_cell=CELL, priors=priors, seed=1, settings=SOUND)
-    found = trust(tree, replicates=0, assumptions=False, priors=priors)
+    family = tb.Family("parabola", q=stats.norm(0.5, 0.2 * deviation))
+    tree = infer_as_stated(measured(), load_cell=CELL, family=family, seed=1, settings=SOUND)
+    found = trust(tree, replicates=0, assumptions=False)
     assert found.attrs["conclusion"] == "holds, but the prior sets the gap"
     assert "The band in the gap is set by the prior, that of the contour." in found.attrs["words"]
     *_, said, _ = tb.verdicts(tree, trust=found)  # the last one names q, of which the record adds little
@@ -92,7 +92,7 @@ def test_a_run_and_its_file_are_taken_and_other_things_refused(tmp_path):
     assert trust(tmp_path, replicates=0, assumptions=False).equals(right())
     with pytest.raises(InferenceError, match="there is no file"):
         trust(str(tmp_path / "nothing"))
-    with pytest.raises(ParameterError, match="this is int"):
+    with pytest.raises(ParameterError, match="run_or_posterior is 3"):
         trust(3)
     with pytest.raises(ParameterError, match="replicates"):
         trust(posterior(), replicates=-1)
@@ -103,6 +103,16 @@ def test_a_posterior_of_contacts_alone_is_refused():
     tree.attrs = {**tree.attrs, "events": 0}
     with pytest.raises(InferenceError, match="events=False"):
         trust(tree)
+
+
+def test_a_distribution_that_is_none_of_scipys_has_to_be_given_again():
+    """A histogram of q: the posterior states that it was one, and not its numbers."""
+    heights = stats.rv_histogram(np.histogram(np.linspace(0.3, 0.7, 50), bins=5), density=True)()
+    family = tb.Family("parabola", q=heights)
+    tree = infer_as_stated(measured(), load_cell=CELL, family=family, seed=1, settings=SOUND)
+    with pytest.raises(ParameterError, match="does not state its family"):
+        trust(tree, replicates=0, assumptions=False)
+    assert trust(tree, family=family, replicates=0, assumptions=False).attrs["conclusion"] == "holds"
 
 
 def test_too_few_loaded_samples_are_refused_with_the_reason():

@@ -13,43 +13,51 @@ from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola
-from tactile_bayes.errors import ReachError
+from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.family import Family
+from tactile_bayes.inference.parameters.nuisances import BIASES, DRIFTS
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.rig_prior import RigPrior
 
 QUIET = LoadCell(force_noise=1e-12, moment_noise=1e-12)
 NOISY = LoadCell(force_noise=0.05, moment_noise=0.02)
 ANGLES = np.radians(np.arange(-30.0, 211.0, 5.0))
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
+FAMILY = Family("parabola", **PRIORS)
 SI = Rod(length=0.1, flexural_rigidity=1e-5)
 
 
-def experiment(*, nuisances=(), priors=PRIORS, load_cell=QUIET, drive_angles=ANGLES, friction=0.0, **options):
-    return experiment_of(
-        seed=1,
-        nuisances=nuisances,
-        priors=priors,
-        load_cell=load_cell,
-        drive_angles=drive_angles,
-        friction=friction,
-        **options,
-    )
+def experiment(family=FAMILY, *, unknown="nothing", load_cell=QUIET, rod=None, drive_angles=ANGLES, **options):
+    rig = Rig(rod=rod, load_cell=load_cell, unknown=unknown)
+    return experiment_of(family, rig, seed=1, drive_angles=drive_angles, **options)
 
 
 def simulated(seed=0, **options):
     return simulate(experiment(**options), np.random.default_rng(seed))
 
 
+def among(*names):
+    """Unknowns of a rig of which these are unknown, and all else is as stated."""
+    return {**NOTHING, **dict.fromkeys(names, "default")}
+
+
+def real(load_cell=None, **known):
+    """A rig that is as stated, but for this."""
+    return Rig(load_cell=load_cell, unknown={**NOTHING, **known})
+
+
 def loads_of(record):
     return np.stack([record[name].values for name in CHANNELS], axis=-1)
 
 
-def scanned(made, *, offset=0.0, **options):
+def scanned(made, *, offset=0.0, friction=0.0, rod=None, **options):
     """A scan of the same contour, at the angles at which the rod was."""
     contour = Parabola(a=made.truth["a"], q=made.truth["q"], x_c=made.truth["x_c"])
-    return tb.scan(contour, drive_angles=ANGLES - offset, **options)
+    return tb.scan(contour, Rig(rod=rod, unknown={"friction": friction}), drive_angles=ANGLES - offset, **options)
 
 
 def agree(made, scan, *, rigidity=1.0, zeros=0.0):
@@ -86,7 +94,7 @@ def test_of_one_direction(direction):
 
 def test_what_is_drawn_of_the_rig():
     """Rigidity, the encoder's offset and biases; the angles read are those of the truth and the offset."""
-    made = simulated(nuisances=("rigidity_scale", "drive_angle_offset", "bias", "drift"))
+    made = simulated(unknown=among("rigidity_scale", "drive_angle_offset", "bias", "drift"))
     truth = made.truth
     biases, drifts = (
         np.array([truth[f"{name}_{what}"] for name in ("moment", "force_x", "force_y")]) for what in ("bias", "drift")
@@ -112,7 +120,7 @@ def read_with(made, lever, backlash):
 
 
 def test_a_lever_and_a_backlash_that_are_drawn():
-    made = simulated(nuisances=("lever", "backlash"))
+    made = simulated(unknown=among("lever", "backlash"))
     lever, backlash = (made.truth["lever_x"], made.truth["lever_y"]), made.truth["backlash"]
     assert min(map(abs, (*lever, backlash))) > 1e-4
     np.testing.assert_allclose(loads_of(made.measured), read_with(made, lever, backlash), atol=1e-7)
@@ -124,41 +132,56 @@ def test_a_lever_and_a_backlash_of_the_cell_that_measures(told):
     true, known = (
         replace(QUIET, lever=(0.03 * share, -0.02 * share), drive_angle_backlash=0.02 * share) for share in (1.0, told)
     )
-    made = simulated(load_cell=known, world=Misspecification(load_cell=true))
+    made = simulated(load_cell=known, truth=real(true))
     way = np.where(made.measured.direction == "forward", 0.5, -0.5)
     np.testing.assert_allclose(made.measured.drive_angle - 0.02 * told * way, np.r_[ANGLES, ANGLES[::-1]], atol=1e-12)
     np.testing.assert_allclose(loads_of(made.measured), read_with(made, (0.03, -0.02), 0.02 * (1.0 - told)), atol=1e-7)
 
 
-def test_the_world_has_the_same_on_top():
-    world = Misspecification(
-        rigidity_scale=1.1,
-        drive_angle_offset=0.05,
-        bias=(0.1, 0.2, 0.3),
-        drift=(-0.1, 0.0, 0.4),
-        base_shift=(0.03, -0.02),
+def test_the_truth_has_what_is_known_of_it():
+    """The truth of what is inferred is drawn no more."""
+    biases, drifts = (0.1, 0.2, 0.3), (-0.1, 0.0, 0.4)
+    known = {"rigidity_scale": 1.1, "drive_angle_offset": 0.05}
+    for names, values in ((BIASES, biases), (DRIFTS, drifts)):
+        known |= dict(zip(names, values, strict=True))
+    made = simulated(
+        unknown=among("rigidity_scale", "bias", "drift", "taper"),
+        truth=real(**known),
+        misspecification=Misspecification(base_shift=(0.03, -0.02)),
     )
-    made = simulated(world=world)
     way = np.linspace(-0.5, 0.5, made.measured.sizes["sample"])[:, None]
     contour = Parabola(a=made.truth["a"], q=made.truth["q"] + 0.02, x_c=made.truth["x_c"] - 0.03)
     scan = tb.scan(contour, drive_angles=ANGLES - 0.05)  # as seen from the pivot where it is
-    agree(made, scan, rigidity=1.1, zeros=np.array(world.bias) + np.array(world.drift) * way)
+    agree(made, scan, rigidity=1.1, zeros=np.array(biases) + np.array(drifts) * way)
+    inferred = {name: value for name, value in known.items() if name != "drive_angle_offset"}
+    assert {name: made.truth[name] for name in inferred} == pytest.approx(inferred, abs=1e-12)
+    assert made.truth["taper"] == 0.0  # as stated
 
 
-@pytest.mark.parametrize(
-    ("told", "further"),
-    [pytest.param(0.0, 0.3, marks=pytest.mark.slow), (0.1, 0.2), pytest.param(0.3, 0.0, marks=pytest.mark.slow)],
-)
-def test_friction(told, further):
-    made = simulated(friction=told, world=Misspecification(friction=further))
+@pytest.mark.parametrize("told", [pytest.param(0.0, marks=pytest.mark.slow), 0.1])
+def test_friction(told):
+    made = simulated(unknown={**NOTHING, "friction": told}, truth=real(friction=0.3))
     agree(made, scanned(made, friction=0.3))
+
+
+def test_a_truth_of_which_nothing_is_said_is_a_real_rig():
+    """All that is unknown of one is drawn; the load cell is that which inference assumes."""
+    asked = experiment(truth=Rig())
+    assert asked.simulated.nuisances.names == Experiment(asked.assumed.record, Rig(load_cell=QUIET)).nuisances.names
+    made = simulate(asked, np.random.default_rng(1))
+    assert asked.problem_of(made.measured).model.names == ("a", "q", "x_c", "noise_scale")
+    assert abs(made.truth["lever_x"]) > 1e-6
+    assert made.truth["friction"] > 0.0
+    assert not asked.is_as_assumed
+    assert asked.is_of_family
 
 
 def test_pivots_are_shifted():
     """All by the same, and those after the first besides."""
     stated = [(0.0, 0.0), (0.2, 0.0), (-0.2, 0.05)]
     shift, further = np.array([0.03, -0.02]), np.array([0.01, 0.02])
-    made = simulated(base=stated, world=Misspecification(base_shift=tuple(shift), further_base_shift=tuple(further)))
+    truth = real(base_x=further[0], base_y=further[1])
+    made = simulated(base=stated, truth=truth, misspecification=Misspecification(base_shift=tuple(shift)))
     moved = np.array(stated) + shift + further * np.array([[0.0], [1.0], [1.0]])
     scan = scanned(made, base=[tuple(pivot) for pivot in moved])
     assert made.measured.sizes["sample"] == scan.record.sizes["sample"]
@@ -168,18 +191,17 @@ def test_pivots_are_shifted():
 
 def test_of_an_si_rod():
     cell = LoadCell(force_noise=1e-12 * SI.force_unit, moment_noise=1e-12 * SI.moment_unit)
-    priors = {"a": stats.uniform(4.0, 4.0), "q": stats.uniform(0.03, 0.04), "x_c": stats.norm(0.0, 0.01)}
-    biases = (1e-5, 2e-4, -1e-4)
+    family = Family("parabola", a=stats.uniform(4.0, 4.0), q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01))
     made = simulated(
+        family=family,
         rod=SI,
         load_cell=cell,
-        priors=priors,
-        nuisances=("rigidity_scale", "bias"),
-        world=Misspecification(bias=biases, base_shift=(0.003, 0.0)),
+        unknown=among("rigidity_scale", "bias"),
+        misspecification=Misspecification(base_shift=(0.003, 0.0)),
     )
     found = [made.truth[f"{name}_bias"] for name in ("moment", "force_x", "force_y")]
     contour = Parabola(a=made.truth["a"], q=made.truth["q"], x_c=made.truth["x_c"] - 0.003)
-    scan = tb.scan(contour, drive_angles=ANGLES, rod=SI)
+    scan = tb.scan(contour, drive_angles=ANGLES, rig=Rig(rod=SI))
     agree(made, scan, rigidity=made.truth["rigidity_scale"], zeros=np.array(found))
     assert made.measured.attrs["units"] == "SI"
 
@@ -195,7 +217,7 @@ def test_forces_in_the_frame_of_a_cell_that_turns():
 
 def test_a_flat_spot_is_felt():
     """The object is what the simulation says it is."""
-    made = simulated(world=Misspecification(flat_spot=(0.3, 2.0)))
+    made = simulated(misspecification=Misspecification(flat_spot=(0.3, 2.0)))
     scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
     np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
     assert np.max(np.abs(loads_of(made.measured) - loads_of(scanned(made).record))) > 1e-3
@@ -203,7 +225,7 @@ def test_a_flat_spot_is_felt():
 
 def test_contours_of_another_family():
     """With priors of its own; what is inferred is of the family that it is taken for."""
-    asked = experiment(priors={}, world=Misspecification(family="circle"))
+    asked = experiment("parabola", misspecification=Misspecification(family="circle"))
     made = simulate(asked, np.random.default_rng(2))
     scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
     np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
@@ -218,7 +240,7 @@ def test_contours_of_another_family():
 
 @pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_events_are_those_of_a_scan(friction):
-    made = simulated(world=Misspecification(friction=friction))
+    made = simulated(truth=real(friction=friction))
     scan = scanned(made, friction=friction)
     for segment, direction in enumerate(("forward", "backward")):
         sweep = scan.events[direction]
@@ -242,16 +264,18 @@ def test_noise_is_what_the_load_cell_that_measures_makes():
     """Of the same random numbers twice the noise is twice the noise; the scale that is inferred is on top of both."""
     told = noise_of(simulated(load_cell=NOISY))
     other = LoadCell(force_noise=0.1, moment_noise=0.04)
-    made = simulated(load_cell=NOISY, world=Misspecification(load_cell=other))
+    made = simulated(load_cell=NOISY, truth=Rig(load_cell=other, unknown="nothing"))
     np.testing.assert_allclose(noise_of(made), 2.0 * told, atol=1e-8)
-    fixed = simulated(load_cell=NOISY, world=Misspecification(priors={"noise_scale": stats.lognorm(s=1e-9, scale=3.0)}))
+    assert made.truth["noise_scale"] == pytest.approx(2.0 * simulated(load_cell=NOISY).truth["noise_scale"])
+    fixed = simulated(load_cell=NOISY, truth=real(noise_scale=3.0))
+    assert fixed.truth["noise_scale"] == pytest.approx(3.0)
     deviations = noise_of(fixed) / (3.0 * np.array([0.02, 0.05, 0.05]))
     assert abs(np.mean(deviations**2) - 1.0) < 5.0 * np.sqrt(2.0 / deviations.size)  # false alarm 1e-6
 
 
 def test_bias_and_gain_of_the_cell_that_measures():
     gain = ((1.1, 0.0, 0.0), (0.0, 1.0, 0.02), (0.0, 0.0, 0.9))
-    made = simulated(world=Misspecification(load_cell=replace(QUIET, bias=(0.1, 0.0, -0.2), gain=gain)))
+    made = simulated(truth=real(replace(QUIET, bias=(0.1, 0.0, -0.2), gain=gain)))
     expected = loads_of(scanned(made).record) @ np.array(gain).T + [0.1, 0.0, -0.2]
     np.testing.assert_allclose(loads_of(made.measured), expected, atol=1e-8)
 
@@ -272,10 +296,10 @@ def test_the_encoder_of_a_cell_that_is_told():
 
 @pytest.mark.parametrize("told", [pytest.param(0.0, marks=pytest.mark.slow), 0.02])
 def test_the_encoder_of_a_cell_that_measures(told):
-    """An offset of 0.05 rad where `told` is known is one of the world's besides."""
+    """An offset of 0.05 rad where `told` is known is one of the rig's besides."""
     cell = replace(QUIET, drive_angle_offset=told)
-    one = simulated(load_cell=cell, world=Misspecification(load_cell=replace(cell, drive_angle_offset=0.05)))
-    other = simulated(load_cell=cell, world=Misspecification(drive_angle_offset=0.05 - told))
+    one = simulated(load_cell=cell, truth=real(replace(cell, drive_angle_offset=0.05)))
+    other = simulated(load_cell=cell, truth=real(drive_angle_offset=0.05 - told))
     np.testing.assert_allclose(one.measured.drive_angle, other.measured.drive_angle, atol=1e-12)
     np.testing.assert_allclose(loads_of(one.measured), loads_of(other.measured), atol=1e-8)
 
@@ -283,16 +307,26 @@ def test_the_encoder_of_a_cell_that_measures(told):
 # ---- truths
 
 
-def test_truths_come_from_the_worlds_priors_and_inference_takes_its_own():
-    asked = experiment(world=Misspecification(priors={"a": stats.uniform(2.0, 0.1)}))
+def test_truths_come_from_the_other_family_and_inference_takes_its_own():
+    other = Family("parabola", **PRIORS | {"a": stats.uniform(2.0, 0.1)})
+    asked = experiment(misspecification=Misspecification(family=other))
     made = simulate(asked, np.random.default_rng(1))
     assert 2.0 < made.truth["a"] < 2.1
+    assert asked.is_of_family
     assert asked.problem_of(made.measured).model.priors["a"] is PRIORS["a"]
+
+
+def test_what_is_known_of_a_family_is_not_drawn():
+    known = Family("parabola", a=0.7, q=PRIORS["q"])
+    asked = experiment(misspecification=Misspecification(family=known))
+    assert simulate(asked, np.random.default_rng(1)).truth["a"] == 0.7
+    assert asked.is_of_family
+    assert not experiment(known, misspecification=Misspecification(family="parabola")).is_of_family
 
 
 def test_truths_have_the_distribution_of_the_prior():
     """Where the rod reaches all of it; false alarm 1e-6 each."""
-    asked = experiment(priors=PRIORS | {"x_c": stats.uniform(-0.1, 0.2)})
+    asked = experiment(Family("parabola", **PRIORS | {"x_c": stats.uniform(-0.1, 0.2)}))
     rng = np.random.default_rng(4)
     truths = [simulate(asked, rng).truth for _ in range(12)]
     for name, prior in asked.assumed.priors.items():
@@ -305,52 +339,80 @@ def test_the_same_numbers_again():
     assert one.truth == other.truth != third.truth
 
 
-def test_a_world_out_of_reach_is_told(monkeypatch):
+def test_a_rig_out_of_reach_is_told(monkeypatch):
     monkeypatch.setattr(simulation, "_TRIALS", 3)
     with refused(ReachError, "3 contours"):
-        simulated(world=Misspecification(base_shift=(0.0, -5.0)))
+        simulated(misspecification=Misspecification(base_shift=(0.0, -5.0)))
 
 
-def test_friction_beyond_what_a_rod_slides_with_is_drawn_again():
-    """Half of what is drawn beside that of the world would be too much; the truth is both together."""
-    options = {
-        "nuisances": ["friction"],
-        "priors": PRIORS | {"friction": stats.uniform(0.1, 0.3)},
-        "world": Misspecification(friction=0.6),
-    }
-    drawn = [simulated(seed, **options).truth["friction"] for seed in range(4)]
-    assert all(0.7 <= friction <= np.tan(0.7) for friction in drawn)
+def test_noise_that_differs_between_channels_has_no_true_scale():
+    made = simulated(load_cell=NOISY, truth=real(replace(NOISY, force_noise=0.1)))
+    assert "noise_scale" not in made.truth
 
 
-def test_the_truth_of_what_is_inferred_is_what_the_misspecified_rig_has():
-    """With it the model of inference explains the record, whatever is misspecified of its parameters."""
-    world = Misspecification(
-        friction=0.3,
-        rigidity_scale=1.2,
-        drive_angle_offset=0.05,
-        rest_curvature=0.1,
-        taper=0.02,
-        bias=(1e-6, 0.0, -2e-5),
-        drift=(0.0, 1e-5, 0.0),
-        further_base_shift=(1e-3, -2e-3),
-        load_cell=replace(
-            QUIET,
-            drive_angle_backlash=0.02,
-            drive_angle_offset=-0.01,
-            bias=(0.0, 2e-5, 0.0),
-            lever=(1e-4, -2e-4),
-            gain=((1.05, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-        ),
+@pytest.mark.parametrize(
+    ("truth", "named"),
+    [
+        ({"load_cell": LoadCell()}, ["truth", "no noise"]),
+        ({"rod": SI}, ["dimensionless"]),
+    ],
+)
+def test_a_truth_that_does_not_fit_is_refused(truth, named):
+    with refused(ParameterError, *named):
+        experiment(truth=Rig(**truth))
+
+
+def test_the_true_value_of_what_is_inferred_is_that_of_the_simulated_rig():
+    """With it the model of inference explains the record, whatever differs of its parameters."""
+    cell = replace(
+        QUIET,
+        drive_angle_backlash=0.02,
+        drive_angle_offset=-0.01,
+        bias=(0.0, 2e-5, 0.0),
+        lever=(1e-4, -2e-4),
+        gain=((1.05, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        moment_curve=(30.0, 0.0),
     )
-    shape = ("rest_curvature", "taper", "base")
-    of_cell = ("drive_angle_offset", "backlash", "bias", "drift", "lever", "moment_gain")
-    names = ("friction", "rigidity_scale", *of_cell, *shape)
-    priors = {"a": stats.lognorm(s=0.4, scale=6.0), "q": stats.uniform(0.03, 0.04), "x_c": stats.norm(0.0, 0.01)}
-    options = {"rod": SI, "base": [(0.0, 0.0), (0.02, 0.0)], "nuisances": names, "priors": priors, "friction": None}
-    made = simulated(world=world, **options)
-    model = Experiment(made.measured, load_cell=QUIET, nuisances=names).model
+    rod = Rod(length=0.1005, flexural_rigidity=1.1e-5, rest_curvature=0.2, taper=0.01)
+    known = {
+        "friction": 0.3,
+        "rigidity_scale": 1.2,
+        "drive_angle_offset": 0.05,
+        "taper": 0.02,
+        "moment_bias": 1e-6,
+        "force_y_bias": -2e-5,
+        "force_x_drift": 1e-5,
+        "base_2_x": 1e-3,
+        "base_2_y": -2e-3,
+    }
+    of_cell = ("drive_angle_offset", "backlash", "bias", "drift", "lever", "moment_gain", "moment_curve")
+    names = ("friction", "rigidity_scale", *of_cell, "rest_curvature", "taper", "length", "base")
+    family = Family(
+        "parabola", a=stats.lognorm(s=0.4, scale=6.0), q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01)
+    )
+    truth = Rig(rod=rod, load_cell=cell, unknown={**NOTHING, **known})
+    base = [(0.0, 0.0), (0.02, 0.0)]
+    made = simulated(family=family, rod=SI, base=base, unknown=among(*names), truth=truth)
+    model = Experiment(made.measured, Rig(load_cell=QUIET, unknown=among(*names))).model
     model.likelihood.exact = True
-    point = np.array([[made.truth.get(name, 1.0) for name in model.names]])
+    assert set(model.names) <= set(made.truth)
+    point = np.array([[made.truth[name] for name in model.names]])
     loads = model.loads_and_discrepancy(point)[0][0]
     off = np.abs(loads * SI.load_units - loads_of(made.measured))
     assert off.max() < 1e-7 * np.abs(loads_of(made.measured)).max()
+    assert made.truth["rigidity_scale"] == pytest.approx(1.2 * 1.1)
+    assert made.truth["length"] == pytest.approx(0.1005)
+
+
+def test_records_are_simulated_from_a_calibrated_rig():
+    """What its calibration has found is drawn jointly."""
+    joint = RigPrior(
+        {"lever_x": stats.norm(0.01, 1e-3), "lever_y": stats.norm(-0.01, 1e-3)},
+        np.array([[1.0, 0.999], [0.999, 1.0]]),
+        0.0,
+        "",
+    )
+    unknown = {name: value for name, value in NOTHING.items() if name != "lever"}
+    made = simulated(unknown=among("lever"), truth=Rig(unknown=unknown, calibration=joint))
+    scores = [(made.truth[name] - mean) / 1e-3 for name, mean in (("lever_x", 0.01), ("lever_y", -0.01))]
+    assert abs(scores[0] - scores[1]) < 0.3  # 6 standard deviations

@@ -11,8 +11,9 @@ from tactile_bayes.calibration.coverage import noticed_coverage
 from tactile_bayes.calibration.ranks import noticed_ranks
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
 from tactile_bayes.calibration.summary import CLAIMS, FALSE_ALARM, summary
+from tactile_bayes.rig import Rig
 
-EXPERIMENT = experiment_of(seed=1, nuisances=[], friction=0.0)
+EXPERIMENT = experiment_of(rig=Rig(unknown="nothing"), seed=1)
 
 NAMES = ("a", "q", "x_c", "rigidity_scale", "noise_scale", LOG_LIKELIHOOD, "snap_off_backward", "snap_off_forward")
 
@@ -74,7 +75,7 @@ def test_right_posteriors_are_calibrated():
     assert verdict.endswith("The check of the record raises an alarm in 0.0% of 100.")
     assert found.sizes == {"replicate": 100, "quantity": 8, "claim": 6}
     assert found.attrs["false_alarm"] == FALSE_ALARM == 0.01
-    assert (found.attrs["family"], found.attrs["seed"], found.attrs["probability"]) == ("parabola", "1", 0.9)
+    assert (found.attrs["family"], found.attrs["seed"], found.attrs["probability"]) == ("Family('parabola')", "1", 0.9)
 
 
 def false_verdicts(sets, count):

@@ -9,19 +9,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 from helpers.commands import assert_misused, assert_refused, call, plain
 from helpers.interrupts import interrupted_while_sampling
 from helpers.report_pages import FEW
 from tactile_bayes import __version__, read_record
+from tactile_bayes.cli import app
 from tactile_bayes.cli.sampling_bar import remaining_seconds
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import Progress
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.record import rod_of
+from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.runs import contour as contour_run
 from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
 
 HEAVY = {"scipy", "xarray", "matplotlib", "emcee", "numpy", "arviz_stats"}
-COMMANDS = ["scan", "measure", "inspect", "reconstruct", "infer", "compare", "calibrate", "sensitivity", "design"]
+COMMANDS = ["scan", "measure", "rig", "inspect", "reconstruct", "infer", "compare", "calibrate", "sensitivity"]
 """In the order in which a record goes through them."""
 
 ROD_OPTIONS = ["--length", str(ROD.length), "--flexural-rigidity", repr(ROD.flexural_rigidity)]
@@ -49,7 +55,7 @@ def bare(record):
 @pytest.fixture(scope="session")
 def posterior(record):
     """What that record is taken for, after few steps."""
-    return infer_contour(read_record(record), seed=1, nuisances=[], settings=FEW)
+    return infer_contour(read_record(record), rig=Rig(unknown="nothing"), seed=1, settings=FEW)
 
 
 @pytest.fixture
@@ -109,11 +115,11 @@ def test_what_is_heavy_is_loaded_when_used(code):
 
 
 @pytest.mark.slow
-def test_a_record_too_short_of_steps_is_said_not_to_have_converged(record, tmp_path):
+def test_a_record_too_short_of_time_is_said_not_to_have_converged(record, tmp_path):
     """As a stranger starts it, figures and all."""
-    out, errors = start("infer", record, "--out", "run", "--max-steps", 8, "--quiet", cwd=tmp_path)
+    out, errors = start("infer", record, "--out", "run", "--max-seconds", 1, "--quiet", cwd=tmp_path)
     assert errors == ""
-    assert out.startswith("NOT CONVERGED, the steps allowed ran out after 8 steps: largest R̂ ")
+    assert out.startswith("NOT CONVERGED, the time allowed ran out after ")
     assert out.lower().count("not converged") == 1
     assert "\nSamples: " in out
     for name in ("a", "q", "x_c", "noise_scale", "gap width"):
@@ -200,9 +206,10 @@ def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_p
 def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
     result = call("demo", "--out", tmp_path / "demo")
     assert result.exit_code == 0, result.output
-    assert "for your own record: tactile-bayes infer RECORD --as-stated" in result.stdout
+    assert "for your own record:\ntactile-bayes infer RECORD --rig rig.toml --out RUN" in result.stdout
     assert "truth" in result.stdout
     assert f"record       {tmp_path / 'demo' / 'record.csv'}" in result.stdout
+    assert Rig.read(tmp_path / "demo" / "rig.toml").entries == dict(NOTHING)
 
 
 @pytest.mark.slow
@@ -216,7 +223,7 @@ def test_a_file_without_header_is_told_its_rod_and_cell(record, bare, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:.*no unit is stated")
-def test_a_rig_tells_its_names_units_signs_and_sweeps_by_options(at_once, bare, tmp_path):
+def test_a_rig_tells_its_names_units_signs_and_sweeps_by_its_file(at_once, bare, rig_file, tmp_path):
     names, *rows = (line.split(",") for line in bare.read_text(encoding="utf-8").splitlines())
     place = names.index
     table = [["Winkel", "Mz [mN m]", "Fx", "Fy"]]
@@ -225,9 +232,9 @@ def test_a_rig_tells_its_names_units_signs_and_sweeps_by_options(at_once, bare, 
         table.append([repr(90 - math.degrees(angle)), repr(1e3 * moment), repr(-1e3 * x), repr(y)])
     path = tmp_path / "rig.csv"
     path.write_text("\n".join([*map(";".join, table), ""]).replace(".", ","), encoding="utf-8")
-    options = ["drive_angle=90-Winkel[deg]", "holding_moment=Mz", "force_x = -Fx[mN]", "force_y=Fy[N]"]
-    options = ["--split-sweeps", *(word for option in options for word in ("--column", option))]
-    told = call("infer", path, "--out", tmp_path / "2", "-q", *ROD_OPTIONS, *CELL_OPTIONS, *options)
+    columns = {"drive_angle": "90-Winkel[deg]", "holding_moment": "Mz", "force_x": "-1e-3*Fx[N]", "force_y": "Fy[N]"}
+    file = rig_file("[file]\nsplit_sweeps = true\n" + "".join(f'{name} = "{of}"\n' for name, of in columns.items()))
+    told = call("infer", path, "--out", tmp_path / "2", "-q", *ROD_OPTIONS, *CELL_OPTIONS, "--rig", file)
     assert told.exit_code == 0, told.output
     plain = call("infer", bare, "--out", tmp_path / "1", "-q", *ROD_OPTIONS, *CELL_OPTIONS)
     assert told.stdout.split("\n\n")[:2] == plain.stdout.split("\n\n")[:2]
@@ -261,7 +268,7 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
     result = call("infer", path, "--out", tmp_path / "run", "-q")
     assert result.exit_code == 0, result.output
     assert result.stderr.startswith("The record states no units: its numbers are taken as dimensionless")
-    assert "give --length and --flexural-rigidity" in result.stderr
+    assert "give --length and --flexural-rigidity, or a [rod] in rig.toml" in result.stderr
     assert "No contact points: Step 2 needs all three load channels." in result.stdout
 
 
@@ -272,23 +279,15 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
     ("options", "message"),
     [
         (["--length", "0.1"], "--length and --flexural-rigidity go together"),
+        (["--rig", __file__], "not TOML"),
+        (["--rig", "nowhere.toml"], "nowhere.toml: No such file or directory"),
         (["--flexural-rigidity", "0.1"], "--length and --flexural-rigidity go together"),
         (["--diameter", "0.001"], "--diameter needs --length and --flexural-rigidity beside it"),
         (["--length", "-1", "--flexural-rigidity", "1"], "the rod's length is -1.0"),
         (["--length", "0.3", "--flexural-rigidity", "1"], "but Rod(length=0.3, flexural_rigidity=1.0, diameter=0.0) w"),
         (["--family", "blob"], "there is no family 'blob'"),
         (["--probability", "1"], "probability is 1.0: give a number between 0 and 1, like 0.95"),
-        (["--force-noise", "0.1"], "holding_moment is measured too: give --moment-noise"),
-        (["--moment-noise", "0.1"], "force_x is measured too: give --force-noise"),
         (["--force-noise", "-1"], "the load cell's force_noise is -1.0"),
-        (["--missing", "force_z"], "'force_z' is no channel; the channels are holding_moment, force_x, force_y"),
-        (["--missing", "force_x"], "column 'force_x' has values, but is declared missing"),
-        (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
-        (["--column", "force_x=a", "--column", "force_x=b"], "--column force_x= is given twice: keep one of them"),
-        (["--column", "force=Fx"], "columns: 'force' is no column of a record: did you mean 'force_"),
-        (["--column", "force_x=Fx[mN]"], "there is no column 'Fx', which is given for 'force_x' (columns: sweep, "),
-        (["--column", "force_x=force_x[mm]"], "column 'force_x' is in [N], but [mm] is given for it"),
-        (["--split-sweeps"], "column 'sweep' is there already: do without split_sweeps, or remove the column"),
     ],
 )
 def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, options, message):
@@ -296,11 +295,89 @@ def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, opt
 
 
 @pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ('missing = ["force_z"]', "'force_z' is no channel; the channels are holding_moment, force_x, force_y"),
+        ('missing = ["force_x"]', "column 'force_x' has values, but is declared missing"),
+        ('force = "Fx"', "[file] has no entry 'force': did you mean 'force_"),
+        ('force_x = "Fx[mN]"', "there is no column 'Fx', which is given for 'force_x' (columns: sweep, "),
+        ('force_x = "force_x[mm]"', "column 'force_x' is in [N], but [mm] is given for it"),
+        ("split_sweeps = true", "column 'sweep' is there already: do without split_sweeps, or remove the column"),
+    ],
+)
+@pytest.mark.parametrize("command", ["infer", "inspect", "reconstruct"])
+def test_a_rigs_file_that_does_not_fit_the_record_is_refused_in_a_line(
+    record, tmp_path, rig_file, command, entry, message
+):
+    options = ("--rig", rig_file(f"[file]\n{entry}\n"), "--out", tmp_path / "out")
+    assert_refused(call(command, record, *options), message)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
+        (["--column", "force_x=a", "--column", "force_x=b"], "--column force_x= is given twice: keep one of them"),
+        (["--column", "force=Fx"], "columns: 'force' is no column of a record: did you mean 'force_"),
+        (["--missing", "force_z"], "'force_z' is no channel"),
+        (["--split-sweeps"], "column 'sweep' is there already"),
+    ],
+)
+def test_options_of_an_inspection_that_do_not_fit_are_refused(record, options, message):
+    assert_refused(call("inspect", record, *options), message)
+
+
+@pytest.mark.filterwarnings("ignore:.*no unit is stated")
+@pytest.mark.parametrize("option", ["force", "moment"])
+def test_half_a_noise_is_refused_where_nobody_states_the_other(bare, tmp_path, option):
+    other = {"force": "holding_moment is measured too: give --moment-noise", "moment": "give --force-noise"}[option]
+    result = call("infer", bare, *ROD_OPTIONS, f"--{option}-noise", 0.1, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert other in result.stderr
+
+
+@pytest.mark.filterwarnings("ignore:.*no unit is stated")
+def test_an_option_replaces_one_number_of_the_rigs_file(bare, rig_file, tmp_path, monkeypatch):
+    """The others stay as they are in the file."""
+    stated = rig_file(
+        "[rod]\nlength = 0.1\nflexural_rigidity = 1e-3\ntaper = 0.2\n"
+        "[load_cell]\nforce_noise = 0.1\nmoment_noise = 0.2\n[unknown]\nfriction = 0.1\n"
+    )
+    asked = []
+
+    def analyse(measured, out, *, rig, **options):
+        asked.append((rod_of(measured), rig))
+        raise InferenceError("that is enough")
+
+    monkeypatch.setattr(contour_run, "analyse", analyse)
+    call("infer", bare, "--rig", stated, "--length", 0.2, "--force-noise", 0.3, "--out", tmp_path / "run")
+    ((rod, rig),) = asked
+    assert rod == rig.rod == Rod(0.2, 1e-3, taper=0.2)
+    assert (rig.load_cell.force_noise, rig.load_cell.moment_noise) == (0.3, 0.2)
+    assert rig.known == {"friction": 0.1}
+
+
+def test_no_command_has_more_than_14_options():
+    def counts(group, prefix=""):
+        for name, command in group.commands.items():
+            if hasattr(command, "commands"):
+                yield from counts(command, f"{name} ")
+            else:
+                options = [each for each in command.params if each.param_type_name == "option" and each.name != "help"]
+                yield prefix + name, len(options)
+
+    found = dict(counts(typer.main.get_command(app)))
+    assert set(COMMANDS) <= set(found)
+    assert {name: count for name, count in found.items() if count > 14} == {}
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["infer", "record.csv", "--out", "run", "--famly", "circle"], "No such option: --famly"),
-        (["infer", "record.csv", "--out", "run", "--max-steps", "many"], "--max-steps"),
-        (["infer", "record.csv", "--out", "run", "--friction", "1"], "--friction"),
+        (["infer", "record.csv", "--out", "run", "--max-seconds", "many"], "--max-seconds"),
+        (["infer", "record.csv", "--out", "run", "--nuisance", "bias"], "No such option: --nuisance"),
         (["infer", "record.csv", "--out", "run", "--seed", "-1"], "--seed"),
         (["infer", "record.csv"], "Missing option '--out'"),
         (["infer", "--out", "run"], "Missing argument 'record'"),
@@ -355,7 +432,7 @@ def test_an_error_that_nobody_foresaw_is_no_traceback_unless_asked(record, tmp_p
     def broken(*arguments, **options):
         raise ZeroDivisionError("float division by zero\nand more")
 
-    monkeypatch.setattr(reconstruction_run, "reconstruct", broken)
+    monkeypatch.setattr(reconstruction_run, "known_cell", broken)
     result = call(*(["--debug"] if debug else []), "reconstruct", record, "--out", tmp_path)
     assert result.exit_code == 1
     assert result.stdout == ""
@@ -370,9 +447,9 @@ def test_an_error_that_nobody_foresaw_is_no_traceback_unless_asked(record, tmp_p
 
 
 @pytest.mark.filterwarnings("always::tactile_bayes.errors.StrainWarning")
-def test_a_warning_is_a_line(tmp_path):
-    rod = ["--length", 0.2, "--flexural-rigidity", 1e-2, "--diameter", 0.02]
-    result = call("scan", *rod, "--drive-step", 10, "--direction", "forward", "--out", tmp_path / "record.csv")
+def test_a_warning_is_a_line(rig_file, tmp_path):
+    rod = rig_file("[rod]\nlength = 0.2\nflexural_rigidity = 1e-2\ndiameter = 0.02\n")
+    result = call("scan", "--rig", rod, "--drive-step", 10, "--direction", "forward", "--out", tmp_path / "record.csv")
     assert result.exit_code == 0, result.output
     (line,) = result.stderr.splitlines()
     assert line.startswith("tactile-bayes: warning: in the forward sweep from (0, 0) the rod is strained by ")

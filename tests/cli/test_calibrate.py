@@ -10,22 +10,25 @@ import typer
 import xarray as xr
 
 from helpers import commands
-from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.cli.interrupts import resumable
+from tactile_bayes.errors import CalibrationError
+from tactile_bayes.rig import NOTHING
 
 making = importlib.import_module("tactile_bayes.calibration.replicate")
 
-QUICK = ("--as-stated", "--drive-step", "8", "--workers", "1", "-q")
+QUICK = ("--drive-step", "8", "--workers", "1", "-q")
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 
-call = partial(commands.call, "calibrate")
+@pytest.fixture(scope="module")
+def call(as_stated):
+    return partial(commands.call, "calibrate", "--rig", as_stated)
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory, coarse_pictures):
+def done(call, tmp_path_factory, coarse_pictures):
     """Two replicates, and what was said of them."""
     out = tmp_path_factory.mktemp("calibration") / "run"
     result = call("--out", out, "--replicates", 2, *QUICK)
@@ -60,7 +63,7 @@ def test_the_file_holds_what_was_found(done):
         assert found.attrs["calibrated"] == 0
 
 
-def test_the_same_command_makes_nothing_again(done):
+def test_the_same_command_makes_nothing_again(call, done):
     out, said = done
     before = (out / REPLICATES.file).read_bytes()
     again = call("--out", out, "--replicates", 2, *QUICK)
@@ -68,26 +71,26 @@ def test_the_same_command_makes_nothing_again(done):
     assert (out / REPLICATES.file).read_bytes() == before
 
 
-def test_another_experiment_is_refused(done):
+def test_another_experiment_is_refused(call, done):
     out, _ = done
     message = "holds replicates of another experiment: seed is 1 there and 2 here"
     commands.assert_refused(call("--out", out, "--replicates", 2, "--seed", 2, *QUICK), message)
 
 
-def test_a_misspecification_is_passed_on_and_kept(tmp_path, monkeypatch):
-    made = []
+def test_the_rig_of_the_truth_is_passed_on(call, tmp_path, rig_file, monkeypatch):
+    asked = []
 
-    def replicate(task):
-        made.append(task[0].world)
-        return Outcome({"a": 50}, {"seconds": 0.0, "converged": 1.0, "check_passed": 1.0}, "converged")
+    def calibrate_into(out, **options):
+        asked.append(options)
+        raise CalibrationError("that is enough")
 
-    monkeypatch.setattr(importlib.import_module("tactile_bayes.calibration.calibrate"), "replicate", replicate)
-    worlds = ("--world", "friction=0.3", "--world", "base_shift=0.01,-0.02")
-    result = call("--out", tmp_path, "--replicates", 1, *worlds, *QUICK)
-    assert result.exit_code == 0, result.output
-    words = json.loads((tmp_path / REPLICATES.file).read_text(encoding="utf-8"))["experiment"]
-    assert [(world.friction, tuple(world.base_shift)) for world in made] == [(0.3, (0.01, -0.02))]
-    assert (words["world_friction"], words["world_base_shift"]) == ("0.3", "(0.01, -0.02)")
+    monkeypatch.setattr("tactile_bayes.runs.calibration.calibrate_into", calibrate_into)
+    truth = rig_file("[unknown]\nfriction = 0.3\nbase_2_x = 0.01\n", "truth.toml")
+    commands.assert_refused(call("--out", tmp_path, "--truth", truth, *QUICK), "that is enough")
+    ((options),) = asked
+    assert options["truth"].known == {"friction": 0.3, "base_2_x": 0.01}
+    assert options["rig"].entries == dict(NOTHING)
+    assert options["workers"] == 1
 
 
 # ---- one replicate again
@@ -97,7 +100,7 @@ def fail(*arguments, **options):
     raise ZeroDivisionError("nothing left")
 
 
-def test_a_replicate_again_is_the_one_of_the_run(done):
+def test_a_replicate_again_is_the_one_of_the_run(call, done):
     out, _ = done
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     result = call("--out", out, "--replicates", 2, "--replicate", 1, *QUICK)
@@ -114,7 +117,7 @@ def test_a_replicate_again_is_the_one_of_the_run(done):
 
 
 @pytest.mark.slow
-def test_a_replicate_again_as_json(done):
+def test_a_replicate_again_as_json(call, done):
     out, _ = done
     result = call("--out", out, "--replicate", 0, "--json", *QUICK)
     told = json.loads(result.stdout)
@@ -123,7 +126,7 @@ def test_a_replicate_again_as_json(done):
     assert list(told["truth"]) == ["a", "q", "x_c", "noise_scale"]
 
 
-def test_a_lost_replicate_is_said_to_be(tmp_path, monkeypatch):
+def test_a_lost_replicate_is_said_to_be(call, tmp_path, monkeypatch):
     monkeypatch.setattr(making, "sampled", fail)
     result = call("--out", tmp_path / "out", "--replicate", 3, *QUICK)
     assert result.exit_code == 0, result.output
@@ -134,9 +137,9 @@ def test_a_lost_replicate_is_said_to_be(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("words", [("calibrate", "--debug"), ("--debug", "calibrate")])
-def test_debug_lets_its_error_through(tmp_path, monkeypatch, words):
+def test_debug_lets_its_error_through(as_stated, tmp_path, monkeypatch, words):
     monkeypatch.setattr(making, "sampled", fail)
-    options = ("--out", tmp_path, "--replicate", 3, *QUICK)
+    options = ("--out", tmp_path, "--rig", as_stated, "--replicate", 3, *QUICK)
     result = commands.call(*words, *options)
     assert result.exit_code == 1
     assert "Traceback (most recent call last)" in result.stderr
@@ -144,7 +147,7 @@ def test_debug_lets_its_error_through(tmp_path, monkeypatch, words):
     assert result.stderr.splitlines()[-1] == "tactile-bayes: unexpected error, ZeroDivisionError: nothing left"
 
 
-def test_lost_replicates_end_no_run(tmp_path, monkeypatch):
+def test_lost_replicates_end_no_run(call, tmp_path, monkeypatch):
     monkeypatch.setattr(making, "sampled", fail)
     result = call("--out", tmp_path, "--replicates", 2, *QUICK)
     assert result.exit_code == 0, result.output
@@ -174,15 +177,12 @@ def test_a_termination_that_the_sampler_answers_is_still_one():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--world", "friktion=1"], "--world friktion=1: write NAME=VALUE, with one of friction, rigidity_scale"),
-        (["--world", "bias=1,2"], "--world bias is '1,2': give 3 numbers with commas between them"),
+        (["--truth", "nowhere.toml"], "nowhere.toml: No such file or directory"),
         (["--base", "0"], "--base is '0': give 2 numbers with commas between them"),
-        (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
-        (["--length", "0.2"], "--length and --flexural-rigidity go together"),
         (["--family", "cube"], "cube"),
-        (["--scheduler", "tcp://a:1"], "--workers and --scheduler exclude each other"),
+        (["--workers", "few"], "--workers is 'few'"),
     ],
 )
-def test_refusals(tmp_path, options, words):
-    commands.assert_refused(call("--out", tmp_path / "out", *options, *QUICK), words)
+def test_refusals(call, tmp_path, options, words):
+    commands.assert_refused(call("--out", tmp_path / "out", *QUICK, *options), words)
     assert not (tmp_path / "out").exists()

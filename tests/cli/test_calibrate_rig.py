@@ -12,7 +12,9 @@ from tactile_bayes.inference.result import read_result
 from tactile_bayes.record import write_record
 
 PIN = ("--family", "circle", "--parameter", "r=0.2", "--parameter", "q=0.5")
-ONE = ("--nuisance", "rigidity_scale", "--quiet")
+KNOWN = "".join(f"{name} = 0.0\n" for name in ("drive_angle_offset", "bias", "lever", "backlash", "friction"))
+ONE = f'[unknown]\nrigidity_scale = "default"\n{KNOWN}'
+"""A rig of which the stiffness alone is unknown."""
 
 
 @pytest.fixture(scope="module")
@@ -28,13 +30,14 @@ def records(tmp_path_factory):
         for channel in ("holding_moment", "force_x", "force_y"):
             ideal[channel] = 1.04 * ideal[channel]
         write_record(CELL.measure(ideal, seed=seed), folder / f"{name}.nc")
+    (folder / "rig.toml").write_text(ONE, encoding="utf-8")
     return folder
 
 
 @pytest.fixture(scope="module")
 def calibrated(records, tmp_path_factory):
     folder = tmp_path_factory.mktemp("rig") / "made"
-    return call("calibrate-rig", records / "pin.nc", *PIN, "--out", folder, *ONE), folder
+    return call("calibrate-rig", records / "pin.nc", *PIN, "--rig", records / "rig.toml", "--out", folder, "-q"), folder
 
 
 def test_words_come_first_then_the_table_then_the_files(calibrated):
@@ -42,13 +45,13 @@ def test_words_come_first_then_the_table_then_the_files(calibrated):
     assert result.exit_code == 0, result.output
     words, table, files = result.stdout.split("\n\n")
     assert words.startswith("All is well: the ensembles agree")
-    assert words.splitlines()[-1].startswith("infer --rig takes over rigidity_scale, as a density")
+    assert "With rig.toml, later records take over rigidity_scale, as a density" in words.splitlines()[-1]
     rows = {line.split()[0]: line.split()[1:] for line in table.splitlines()}
     assert list(rows) == ["quantity", "rigidity_scale", "noise_scale"]
     estimate, low, high = map(float, rows["rigidity_scale"][:3])
     assert low < estimate < high
     assert abs(estimate - 1.04) < 1.5 * (high - low)  # six standard deviations
-    assert {path.name for path in folder.iterdir()} == {"rig.nc", "summary.txt", "summary.csv"}
+    assert {path.name for path in folder.iterdir()} == {"rig.toml", "rig.nc", "summary.txt", "summary.csv"}
     assert {line.split(maxsplit=1)[1] for line in files.splitlines()} == {str(path) for path in folder.iterdir()}
     assert (folder / "summary.txt").read_text(encoding="utf-8").startswith(words)
 
@@ -56,15 +59,17 @@ def test_words_come_first_then_the_table_then_the_files(calibrated):
 @pytest.mark.slow
 def test_several_records_add_up(records, calibrated, tmp_path):
     """At once, or one after the other with --rig: the same numbers."""
-    asked = ("calibrate-rig", records / "pin.nc", records / "again.nc", *PIN, *ONE, "--json")
+    asked = ("calibrate-rig", records / "pin.nc", records / "again.nc", *PIN, "--rig", records / "rig.toml", "--json")
     at_once = call(*asked, "--out", tmp_path / "both")
-    added = call("calibrate-rig", asked[2], *PIN, *ONE, "--rig", calibrated[1] / "rig.nc", "--out", tmp_path / "added")
+    added = call(
+        "calibrate-rig", asked[2], *PIN, "-q", "--rig", calibrated[1] / "rig.toml", "--out", tmp_path / "added"
+    )
     assert at_once.exit_code == added.exit_code == 0, at_once.output + added.output
     said = json.loads(at_once.stdout)
     assert [word[:10] for word in said["words"][:2]] == ["Record 1: ", "Record 2: "]
     assert said["converged"]
     assert said["gauge"] == repr(Circle(r=0.2, q=0.5))
-    assert said["files"]["rig"] == str(tmp_path / "both" / "rig.nc")
+    assert said["files"]["rig"] == str(tmp_path / "both" / "rig.toml")
     both, after, first = (
         read_result(folder / "rig.nc") for folder in (tmp_path / "both", tmp_path / "added", calibrated[1])
     )
@@ -78,7 +83,7 @@ def test_several_records_add_up(records, calibrated, tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_infer_takes_the_rig_over(records, calibrated, tmp_path):
     folder = calibrated[1]
-    options = ("--as-stated", "--rig", folder / "rig.nc", "--out", tmp_path, "--quiet")
+    options = ("--rig", folder / "rig.toml", "--out", tmp_path, "--quiet")
     result = call("infer", records / "object.nc", *options)
     assert result.exit_code == 0, result.output
     run = read_result(tmp_path / "posterior.nc")
@@ -94,7 +99,7 @@ def test_infer_takes_the_rig_over(records, calibrated, tmp_path):
 @pytest.mark.slow
 def test_a_wrong_gauge_is_the_first_thing_said(records, tmp_path):
     wrong = ("--family", "circle", "--parameter", "r=0.3", "--parameter", "q=0.5")
-    result = call("calibrate-rig", records / "pin.nc", *wrong, "--out", tmp_path, *ONE)
+    result = call("calibrate-rig", records / "pin.nc", *wrong, "--rig", records / "rig.toml", "--out", tmp_path, "-q")
     assert result.exit_code == 0, result.output
     first = result.stdout.splitlines()[0]
     assert first.startswith("The gauge and the rig as assumed do not describe the record: ")
@@ -102,12 +107,14 @@ def test_a_wrong_gauge_is_the_first_thing_said(records, tmp_path):
 
 
 def test_what_is_not_possible_is_refused(records, calibrated, tmp_path):
-    pin, out = records / "pin.nc", ("--out", tmp_path / "no", *ONE)
+    pin, out = records / "pin.nc", ("--out", tmp_path / "no", "--quiet")
     assert_refused(call("calibrate-rig", pin, *PIN[:4], *out), "give --parameter q=... as well")
-    assert_refused(call("calibrate-rig", pin, *PIN, "--out", tmp_path, "--as-stated"), "name at least one parameter")
-    twice = call("calibrate-rig", pin, *PIN, "--rig", calibrated[1] / "rig.nc", *out)
+    (tmp_path / "rig.toml").write_text('unknown = "nothing"\n', encoding="utf-8")
+    nothing = call("calibrate-rig", pin, *PIN, "--rig", tmp_path / "rig.toml", *out)
+    assert_refused(nothing, "nothing of the rig is unknown")
+    twice = call("calibrate-rig", pin, *PIN, "--rig", calibrated[1] / "rig.toml", *out)
     assert_refused(twice, "was inferred from this very record")
-    absent = call("infer", pin, "--rig", tmp_path / "rig.nc", *out)
-    assert_refused(absent, f"there is no file {tmp_path / 'rig.nc'}")
+    absent = call("infer", pin, "--rig", tmp_path / "none.toml", *out)
+    assert_refused(absent, f"{tmp_path / 'none.toml'}: No such file or directory")
     assert_misused(call("calibrate-rig", pin, *out), "Missing option '--family'")
     assert not (tmp_path / "no").exists()

@@ -22,13 +22,18 @@ CARRY = ["--carry", "0.8,0,180,68.75,1.6", *CIRCLE]
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 
+def as_stated_in(folder):
+    (folder / "rig.toml").write_text('unknown = "nothing"\n', encoding="utf-8")
+    return folder / "rig.toml"
+
+
 def run_of(folder, *options):
     """A run of commands from a scan to a report."""
     ideal, measured, run = folder / "ideal.csv", folder / "measured.csv", folder / "run"
     for arguments in (
         ("scan", *CARRY, *options, "--out", ideal),
         ("measure", ideal, "--force-noise", 0.05, "--moment-noise", 0.02, "--out", measured),
-        ("infer", measured, "--family", "circle", "--as-stated", "--max-steps", 60, "--out", run),
+        ("infer", measured, "--family", "circle", "--rig", as_stated_in(folder), "--out", run),
     ):
         result = call(*arguments)
         assert result.exit_code == 0, result.output
@@ -54,7 +59,7 @@ def test_a_scan_prints_travels_and_how_contact_ends(tmp_path):
     expected = tb.scan(tb.contours.Circle(0.3, 0.8), drive=drive)
     assert f"{expected.events['forward'].snap_off.travel:.4f}" in result.stdout
     np.testing.assert_allclose(tb.read_record(out).base_x, expected.record.base_x, atol=1e-15)
-    short = call("scan", *CIRCLE, "--carry", "0.8,0,180,68.75,1.1", "--travel-step", 0.05, "--out", out)
+    short = call("scan", *CIRCLE, "--carry", "0.8,0,180,68.75,1.1", "--drive-step", 0.05, "--out", out)
     assert "still in contact at the end" in short.stdout
     assert tb.read_record(out).sizes["sample"] == 23
     (sweep,) = json.loads(call("scan", *CARRY, "--out", out, "--json").stdout)["sweeps"]
@@ -65,7 +70,7 @@ def test_a_scan_prints_travels_and_how_contact_ends(tmp_path):
 def test_poses_are_read_from_a_file(tmp_path):
     poses, out = tmp_path / "poses.csv", tmp_path / "scan.csv"
     poses.write_text("x,y,drive_angle\n0.8,0,52\n-0.8,0,97\n")
-    assert call("scan", *CIRCLE, "--poses", poses, "--out", out).exit_code == 0
+    assert call("scan", *CIRCLE, "--carry", poses, "--out", out).exit_code == 0
     record = tb.read_record(out)
     assert np.degrees(record.drive_angle.values[[0, -1]]) == pytest.approx([52.0, 97.0])
 
@@ -74,9 +79,9 @@ def test_poses_are_read_from_a_file(tmp_path):
     ("options", "words"),
     [
         (["--carry", "0.8,0,180"], "5 numbers"),
-        ([*CARRY[:2], "--drive-step", 2], "--drive-step is for rotations"),
-        (["--travel-step", 0.1], "--travel-step is for --carry"),
-        ([*CARRY[:2], "--base", "0,0", "--travel-step", 0.1], "one by one"),
+        (["--carry", "nowhere.csv"], "nowhere.csv: the poses cannot be read"),
+        (["--drive-step", 1e-4], "--drive-step is 0.0001: give a step of rotations from 0.001 to 28 degrees"),
+        ([*CARRY[:2], "--base", "0,0", "--drive-step", 0.1], "one by one"),
     ],
 )
 def test_drives_that_contradict_each_other_are_refused(tmp_path, options, words):
@@ -151,6 +156,6 @@ def test_a_misfit_of_a_carried_sweep_is_placed_by_its_travel(carried, tmp_path):
     record = tb.read_record(measured)
     bent = tmp_path / "bent.csv"
     tb.write_record(record.assign(force_y=record.force_y + 0.15 * np.sin(40.0 * record.base_x)), bent)
-    result = call("infer", bent, "--family", "circle", "--as-stated", "--out", tmp_path / "run")
+    result = call("infer", bent, "--family", "circle", "--rig", as_stated_in(tmp_path), "--out", tmp_path / "run")
     assert "do not describe the record" in result.stdout
     assert " L of travel it is off" in result.stdout.replace("\n", " ")

@@ -18,9 +18,9 @@ FILES = {"comparison.nc", "comparison.csv", "families.png"}
 
 
 @pytest.fixture(scope="module")
-def compared(record, tmp_path_factory, coarse_pictures):
+def compared(record, as_stated, tmp_path_factory, coarse_pictures):
     folder = tmp_path_factory.mktemp("compared") / "made" / "on the way"
-    two = ["--family", "parabola", "--family", "circle", "--as-stated"]
+    two = ["--family", "parabola", "--family", "circle", "--rig", as_stated]
     options = [*two, "--no-leave-one-out", "--max-seconds", 0.5, "--quiet"]
     return call("compare", record, "--out", folder, *options), folder
 
@@ -139,10 +139,9 @@ def test_progress_names_the_family(instead, record, tmp_path, monkeypatch):
     [
         (["--family", "circle"], "families are circle"),
         (["--family", "circle", "--family", "blob"], "there is no family 'blob'"),
-        (["--as-stated", "--nuisance", "bias"], "--as-stated and --nuisance contradict each other"),
+        (["--rig", "nowhere.toml"], "nowhere.toml: No such file or directory"),
         (["--length", "0.1"], "--length and --flexural-rigidity go together"),
-        (["--force-noise", "0.1"], "holding_moment is measured too: give --moment-noise"),
-        (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
+        (["--force-noise", "-1"], "the load cell's force_noise is -1.0"),
         (["--max-seconds", "0"], "max_seconds is 0.0"),
         (["--out", __file__ + "/run"], "Not a directory"),
     ],
@@ -156,7 +155,7 @@ def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, opt
     ("options", "message"),
     [
         (["--out", "run", "--max-steps", "50"], "No such option: --max-steps"),
-        (["--out", "run", "--friction", "1"], "--friction"),
+        (["--out", "run", "--friction", "1"], "No such option: --friction"),
         ([], "Missing option '--out'"),
         (["--out", __file__], "is a file"),
     ],

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,15 +15,16 @@ from tactile_bayes.plotting import design as draw
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
-ASKED = ["design", "--base", "0,0", "--base", "0.2,0", "--drive-step", "6", "--draws", "2", "--as-stated"]
-
-
-def run(*arguments):
-    return commands.call(*ASKED, "--workers", 1, *arguments)
+ASKED = ["design", "--base", "0,0", "--base", "0.2,0", "--drive-step", "6", "--draws", "2"]
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory, coarse_pictures):
+def run(as_stated):
+    return partial(commands.call, *ASKED, "--rig", as_stated, "--workers", 1)
+
+
+@pytest.fixture(scope="module")
+def made(run, tmp_path_factory, coarse_pictures):
     out = tmp_path_factory.mktemp("design")
     result = run("--out", out, "--quiet")
     assert result.exit_code == 0, result.output
@@ -39,10 +41,10 @@ def test_it_says_where_and_writes_what_it_found(made):
     np.testing.assert_allclose(table["base_x"], [0.0, 0.2])
 
 
-def test_drives_that_carry_the_base_are_candidates(tmp_path):
+def test_drives_that_carry_the_base_are_candidates(run, tmp_path):
     poses = tmp_path / "poses.csv"
     poses.write_text("x,y,drive_angle\n0.8,0,65\n0,0.05,85\n-0.8,0,115\n")
-    result = run("--carry", "0.8,0,180,65,1.6", "--poses", poses, "--out", tmp_path, "--json")
+    result = run("--carry", "0.8,0,180,65,1.6", "--carry", poses, "--out", tmp_path, "--json")
     assert result.exit_code == 0, result.output
     candidates = json.loads(result.stdout)["candidates"]
     assert [one["is_pivot"] for one in candidates] == [True, True, False, False]
@@ -54,7 +56,7 @@ def test_drives_that_carry_the_base_are_candidates(tmp_path):
     np.testing.assert_allclose([float(row["width"]) for row in rows], [one["width"] for one in candidates], rtol=1e-8)
 
 
-def test_json_for_scripts(tmp_path):
+def test_json_for_scripts(run, tmp_path):
     result = run("--out", tmp_path, "--json")
     answer = json.loads(result.stdout)
     assert result.exit_code == 0
@@ -67,15 +69,25 @@ def test_json_for_scripts(tmp_path):
     ("wrong", "message"),
     [
         (["--base", "0"], "--base is '0': give 2 numbers"),
-        (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
+        (["."], "a run has its rig"),
         (["--family", "square"], "there is no family 'square'"),
-        (["nowhere.nc"], "there is no file nowhere.nc"),
-        (["nowhere"], "there is no folder nowhere"),
-        (["."], ". holds no posterior.nc"),
     ],
 )
-def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
+def test_what_is_wrong_is_said_in_a_line(run, tmp_path, wrong, message):
     commands.assert_refused(run("--out", tmp_path / "out", *wrong), message)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("known", "message"),
+    [
+        ("nowhere.nc", "there is no file nowhere.nc"),
+        ("nowhere", "there is no folder nowhere"),
+        (".", ". holds no posterior.nc"),
+    ],
+)
+def test_a_run_that_is_not_there(tmp_path, known, message):
+    commands.assert_refused(commands.call(*ASKED, known, "--out", tmp_path / "out"), message)
     assert not (tmp_path / "out").exists()
 
 
@@ -86,7 +98,7 @@ def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
         (["--nested"], "0 of 2 candidates are in {}/nested: the same command resumes"),
     ],
 )
-def test_an_interrupt_says_what_the_same_command_does(tmp_path, monkeypatch, nested, told):
+def test_an_interrupt_says_what_the_same_command_does(run, tmp_path, monkeypatch, nested, told):
     def interrupted(*arguments, **options):
         raise KeyboardInterrupt
 

@@ -17,16 +17,18 @@ from tactile_bayes.runs.watch import Watch
 
 TEXT = "the only copy of a day's work"
 
+# Names in braces are inputs that the output would replace; beside by.toml they are the shape of its rod.
 GAUGE = "--family circle --parameter r=0.01 --parameter q=0.05"
 
 CALLS = [
     "inspect {samples.csv} --out .",
-    "inspect record.csv --rod-shape {sweeps.csv} --flexural-rigidity 1 --out .",
+    "inspect record.csv --rig {rig.toml} --out .",
+    "inspect record.csv --rig by.toml --out . {sweeps.csv}",
     "reconstruct {contacts.csv} --out .",
     "infer {contacts.csv} --out .",
     "infer {trust.nc} --out .",
     "infer record.csv --rig {posterior.nc} --out .",
-    "infer record.csv --rod-shape {band.csv} --flexural-rigidity 1 --out .",
+    "infer record.csv --rig by.toml --out . {band.csv}",
     "infer {block-00000000-00000100.npz} --out run --checkpoint .",
     "compare {comparison.nc} --out .",
     "compare record.csv --rig {comparison.csv} --out .",
@@ -34,19 +36,19 @@ CALLS = [
     "watch record.csv --rig {stream.nc} --out . --idle 0",
     "measure {record.csv} --out record.csv --force-noise 1 --moment-noise 1",
     "scan --points {points.csv} --out points.csv",
-    "scan --rod-shape {shape.csv} --flexural-rigidity 1 --out shape.csv",
-    "scan --poses {poses.csv} --out poses.csv",
+    "scan --rig by.toml --out shape.csv {shape.csv}",
+    "scan --carry {poses.csv} --out poses.csv",
     "scan --points {points.svg} --figure points.svg --out scan.csv",
-    "calibrate --rod-shape {verdict.txt} --flexural-rigidity 1 --out .",
-    "calibrate --rod-shape {replicates.json} --flexural-rigidity 1 --out .",
+    "calibrate --rig by.toml --out . {verdict.txt}",
+    "calibrate --truth {replicates.json} --out .",
     f"calibrate-rig {{summary.csv}} {GAUGE} --out .",
     f"calibrate-rig record.csv {{rig.nc}} {GAUGE} --out .",
-    f"calibrate-rig record.csv --rig {{rig.nc}} {GAUGE} --out .",
-    "sensitivity --rod-shape {words.txt} --flexural-rigidity 1 --out .",
-    "sensitivity --rod-shape {study/study.nc} --flexural-rigidity 1 --study --out .",
-    "design --poses {candidates.csv} --out .",
+    f"calibrate-rig record.csv --rig {{rig.toml}} {GAUGE} --out .",
+    "sensitivity --rig by.toml --out . {words.txt}",
+    "sensitivity --rig {study/study.nc} --replicates 1 --out .",
+    "design --carry {candidates.csv} --out .",
     "design {design.nc} --out .",
-    "figures --poses {figure_03_motion.pdf} --out .",
+    "figures --carry {figure_03_motion.pdf} --out .",
     "trust run --out {posterior.nc=trust.nc}",
     "report run --out {run/posterior.nc}",
     "report run --out {run/trust.nc}",
@@ -78,8 +80,11 @@ def test_an_output_that_is_an_input_is_refused(words, tmp_path, monkeypatch):
         for folder in (Path(name).parent, Path("run")):
             folder.mkdir(exist_ok=True)
         Path(name).write_text(TEXT)
+    is_shape = "by.toml" in words
+    if is_shape:
+        Path("by.toml").write_text(f'[rod]\nshape = "{name}"\n')
     before = contents(tmp_path)
-    result = commands.call(*(words[:start] + name + words[end + 1 :]).split())
+    result = commands.call(*(words[:start] + ("" if is_shape else name) + words[end + 1 :]).split())
     commands.assert_refused(result, "would replace")
     assert contents(tmp_path) == before
     assert not [path for path in tmp_path.rglob("*") if path.suffix == ".tmp"]

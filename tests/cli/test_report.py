@@ -12,6 +12,7 @@ from helpers.report_pages import Page, analysed_quickly, coarse_record
 from tactile_bayes.cli import report as report_command
 from tactile_bayes.cli.command import Output
 from tactile_bayes.record import write_record
+from tactile_bayes.rig import Rig
 
 call = partial(commands.call, "report")
 
@@ -20,7 +21,9 @@ call = partial(commands.call, "report")
 def test_infer_states_its_file_and_its_words(tmp_path):
     path, out = tmp_path / "my record.csv", tmp_path / "run"
     write_record(coarse_record(), path)
-    words = ["infer", str(path), "--as-stated", "--out", str(out), "--quiet"]
+    rig = tmp_path / "rig.toml"
+    rig.write_text('unknown = "nothing"\n', encoding="utf-8")
+    words = ["infer", str(path), "--rig", str(rig), "--out", str(out), "--quiet"]
     assert commands.call(*words).exit_code == 0
     assert call(out).exit_code == 0
     page = Page((out / "report.html").read_text(encoding="utf-8"))
@@ -31,7 +34,7 @@ def test_infer_states_its_file_and_its_words(tmp_path):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cli") / "run"
-    analysed_quickly(coarse_record(), folder, nuisances=[])
+    analysed_quickly(coarse_record(), folder, rig=Rig(unknown="nothing"))
     return folder
 
 

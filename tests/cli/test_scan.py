@@ -9,6 +9,7 @@ import xarray as xr
 
 import tactile_bayes as tb
 from helpers.commands import assert_misused, assert_refused, call
+from tactile_bayes.rig import Rig
 
 COARSE = ["--drive-step", 10]
 FLANKS = [f"--parameter={number}" for number in ("left_a=0.5", "right_w=1", "right_n=4", "q=0.5")]
@@ -62,14 +63,23 @@ def test_contours_are_chosen_by_options(tmp_path, options, contour):
     assert [sweep["direction"] for sweep in answer["sweeps"]] == ["forward"]
 
 
-def test_a_scan_in_si_is_of_a_contour_in_metres(tmp_path):
-    rod = ["--length", 0.2, "--flexural-rigidity", 1e-3]
+def test_a_scan_in_si_is_of_a_contour_in_metres(tmp_path, rig_file):
+    rod = ["--rig", rig_file('[rod]\nlength = "200 mm"\nflexural_rigidity = 1e-3\n')]
     of_profile = told("scan", "--profile", "II", *rod, *COARSE, "--out", tmp_path / "1.csv")
     family = ["--family", "parabola", "--parameter", "a=2.5", "--parameter", "q=0.1"]
     of_family = told("scan", *family, *rod, *COARSE, "--out", tmp_path / "2.csv")
     assert of_profile["sweeps"] == of_family["sweeps"]
     assert of_profile["units"] == "SI"
     assert of_profile["rod"]["length"] == 0.2
+
+
+def test_a_rig_that_rubs_is_scanned_with_its_friction_and_shape(tmp_path, rig_file):
+    rig = rig_file("[rod]\ntaper = 0.3\n[unknown]\nfriction = 0.2\nrest_curvature = 0.1\n")
+    assert call("scan", "--rig", rig, *COARSE, "--out", tmp_path / "r.csv").exit_code == 0
+    rod = tb.Rod(taper=0.3, rest_curvature=0.1)
+    contour = tb.contours.paper_profile("II", q=0.5)
+    expected = tb.scan(contour, rig=Rig(rod=rod, unknown={"friction": 0.2}), drive_step=math.radians(10.0)).record
+    xr.testing.assert_allclose(tb.read_record(tmp_path / "r.csv"), expected, rtol=1e-12)
 
 
 def test_measured_points_are_scanned(tmp_path):
@@ -134,17 +144,27 @@ def test_a_profile_that_is_none(tmp_path):
 # --- measure --------------------------------------------------------------------------------------------------------
 
 
-def test_a_load_cell_measures_an_ideal_record(ideal, tmp_path):
-    noise = ["--force-noise", 0.05, "--moment-noise", 0.02, "--bias", "0,0.1,-0.1", "--drive-angle-noise", 0.1]
+def test_a_load_cell_measures_an_ideal_record(ideal, tmp_path, rig_file):
+    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.0, 0.1, -0.1), drive_angle_noise=math.radians(0.1))
+    rig = rig_file('[load_cell]\nforce_noise = 0.3\nbias = [0.0, 0.1, -0.1]\ndrive_angle_noise = "0.1 deg"\n')
+    noise = ["--rig", rig, "--force-noise", 0.05, "--moment-noise", 0.02]
     result = call("measure", ideal[0], *noise, "--seed", 3, "--out", tmp_path / "m.csv")
     assert result.exit_code == 0, result.output
     assert "without columns of the truth" in result.stdout
-    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.0, 0.1, -0.1), drive_angle_noise=math.radians(0.1))
     expected = cell.measure(tb.read_record(ideal[0]), seed=3)
     found = tb.read_record(tmp_path / "m.csv")
     assert tb.LoadCell.from_record(found) == cell
     assert not [name for name in found.data_vars if name.startswith("truth_")]
     xr.testing.assert_equal(found, expected[list(found.data_vars)])
+
+
+def test_known_errors_of_a_rig_are_those_of_its_load_cell(ideal, tmp_path, rig_file):
+    rig = rig_file(
+        "[load_cell]\nforce_noise = 0.05\nmoment_noise = 0.02\n[unknown]\nforce_x_bias = 0.3\nlever_y = 0.01\n"
+    )
+    told("measure", ideal[0], "--rig", rig, "--out", tmp_path / "m.csv")
+    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.0, 0.3, 0.0), lever=(0.0, 0.01))
+    assert tb.LoadCell.from_record(tb.read_record(tmp_path / "m.csv")) == cell
 
 
 def test_a_record_that_states_no_load_cell_is_taken_to_be_ideal(ideal, tmp_path):
@@ -162,25 +182,28 @@ def test_the_truth_is_kept_if_asked(ideal, tmp_path):
     xr.testing.assert_equal(found.truth_force_x.drop_attrs(), tb.read_record(ideal[0]).force_x.drop_attrs())
 
 
-def test_every_flaw_arrives(ideal, tmp_path):
-    options = {
-        "--relative-noise": 0.01,
-        "--degrees-of-freedom": 5,
-        "--bias-uncertainty": "0.1,0.2,0.3",
-        "--ornstein-uhlenbeck": "0.01,0.02,30",
-        "--force-range": 9,
-        "--moment-range": 2,
-        "--force-resolution": 0.01,
-        "--moment-resolution": 0.005,
-        "--lever": "0.01,-0.02",
-        "--drive-angle-offset": 1,
-        "--drive-angle-backlash": 0.2,
-        "--drive-angle-resolution": 0.5,
-        "--load-cell-frame": "turning",
-    }
-    words = [word for pair in options.items() for word in pair]
-    gains = ["--gain", "force_x=1.01", "--gain", "force_x/force_y=0.02"]
-    told("measure", ideal[0], *words, *gains, "--out", tmp_path / "m.csv")
+def test_every_flaw_arrives(ideal, tmp_path, rig_file):
+    rig = rig_file("""
+[load_cell]
+relative_noise = 0.01
+degrees_of_freedom = 5
+bias_uncertainty = [0.1, 0.2, 0.3]
+ornstein_uhlenbeck_moment = 0.01
+ornstein_uhlenbeck_force = 0.02
+ornstein_uhlenbeck_time = 30
+force_range = 9
+moment_range = 2
+force_resolution = 0.01
+moment_resolution = 0.005
+lever = [0.01, -0.02]
+drive_angle_offset = "1 deg"
+drive_angle_backlash = "0.2 deg"
+drive_angle_resolution = "0.5 deg"
+frame = "turning"
+gain_force_x_force_x = 1.01
+gain_force_x_force_y = 0.02
+""")
+    told("measure", ideal[0], "--rig", rig, "--out", tmp_path / "m.csv")
     assert tb.LoadCell.from_record(tb.read_record(tmp_path / "m.csv")) == tb.LoadCell(
         relative_noise=0.01,
         degrees_of_freedom=5.0,
@@ -203,14 +226,15 @@ def test_every_flaw_arrives(ideal, tmp_path):
     ("options", "message"),
     [
         ([], "this load cell is ideal, and changes nothing"),
-        (["--bias", "1,2"], "--bias is '1,2': give 3 numbers with commas between them"),
-        (["--gain", "fx=1"], "--gain fx=1: write READING=VALUE or READING/LOAD=VALUE"),
-        (["--gain", "force_x=1.1", "--gain", "force_x=1.2"], "--gain force_x= is given twice"),
-        (["--random-walk", "1,1", "--ornstein-uhlenbeck", "1,1,9"], "random walk or an Ornstein-Uhlenbeck process"),
-        (["--force-range", "-1"], "the load cell's force_range is -1.0"),
+        (["--force-noise", "-1"], "the load cell's force_noise is -1.0"),
+        (["bias = [1, 2]"], "give a list of 3"),
+        (["random_walk_force = 1", "ornstein_uhlenbeck_force = 1"], "random walk or an Ornstein-Uhlenbeck process"),
+        (["force_range = -1"], "the load cell's force_range is -1.0"),
     ],
 )
-def test_what_is_no_load_cell_is_refused_in_a_line(ideal, tmp_path, options, message):
+def test_what_is_no_load_cell_is_refused_in_a_line(ideal, tmp_path, rig_file, options, message):
+    if any("=" in option for option in options):
+        options = ["--rig", rig_file("\n".join(["[load_cell]", *options]))]
     assert_refused(call("measure", ideal[0], *options, "--out", tmp_path / "m.csv"), message)
 
 

@@ -11,13 +11,12 @@ import tactile_bayes as tb
 import tactile_bayes.planning.error_map as error_map_module
 from helpers import commands
 from tactile_bayes.contours import Joined, Parabola
-from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.error_cell import CellOutcome
 from tactile_bayes.runs import sensitivity as sensitivity_run
 
-QUICK = ("--samples", "8", "--drive-step", "6", "-q")
-STUDY = ("--study", "--noise-factor", "0.3", "--noise-factor", "1", "--replicates", "1", "--workers", "1")
+QUICK = ("--drive-step", "6", "-q")
+STUDY = ("--noise-factor", "0.3", "--noise-factor", "1", "--replicates", "1", "--workers", "1")
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -25,6 +24,14 @@ FIGURES = {"amplification.png", "information.png", "noise_shares.png", "required
 
 
 call = partial(commands.call, "sensitivity")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_samples():
+    """Few samples for shares of the variance."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sensitivity_run, "sensitivity", partial(sensitivity_run.sensitivity, samples=8))
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -139,57 +146,38 @@ def test_without_options_it_is_profile_ii_at_half_a_rod_length(asked, tmp_path):
     assert call("--out", tmp_path).exit_code == 0
     options = asked["sensitivity"]
     assert options["contour"] == Parabola(0.5, 0.5)
-    assert (options["rod"], options["load_cell"], options["seed"], options["samples"]) == (None, None, 1, 1024)
+    assert (options["rig"].rod, options["rig"].load_cell, options["rig"].entries) == (None, None, {})
+    assert options["seed"] == 1
     assert options["base"] == [(0.0, 0.0)]
     assert options["drive_step"] == pytest.approx(np.radians(1.0))
     assert options["band_widths"] is None
-    assert list(options["nuisances"]) == list(STANDARD)
     assert not (tmp_path / "study").exists()
 
 
-def test_profiles_are_scaled_to_the_rod(asked, tmp_path):
-    rod = ("--length", 0.2, "--flexural-rigidity", 1e-4, "--diameter", 5e-4)
+def test_profiles_are_scaled_to_the_rod(asked, tmp_path, rig_file):
+    rod = ("--rig", rig_file("[rod]\nlength = 0.2\nflexural_rigidity = 1e-4\ndiameter = 5e-4\n"))
     assert call("--out", tmp_path, "--profile", "IV", "--distance", 0.4, *rod).exit_code == 0
     options = asked["sensitivity"]
-    assert options["rod"] == tb.Rod(0.2, 1e-4, 5e-4)
+    assert options["rig"].rod == tb.Rod(0.2, 1e-4, 5e-4)
     assert isinstance(options["contour"], Joined)
     assert float(options["contour"].height(0.0)) == pytest.approx(0.08)
     assert float(options["contour"].height(0.2)) == pytest.approx(0.28)
 
 
-@pytest.mark.parametrize(
-    ("options", "nuisances"),
-    [
-        (["--discrepancy"], [*STANDARD, "discrepancy"]),
-        (["--as-stated", "--discrepancy"], ["discrepancy"]),
-        (["--nuisance", "standard", "--nuisance", "drift", "--discrepancy"], ["standard", "drift", "discrepancy"]),
-    ],
-)
-def test_a_discrepancy_is_inferred_beside_the_nuisances(asked, tmp_path, options, nuisances):
-    assert call("--out", tmp_path, *options).exit_code == 0
-    assert list(asked["sensitivity"]["nuisances"]) == nuisances
-
-
-def test_options_arrive(asked, tmp_path):
-    cell = ("--force-noise", 0.1, "--moment-noise", 0.03, "--drive-angle-noise", 0.5)
-    rig = ("--base", "0.1,0", "--base", "0.2,0", "--friction", 0.2, "--as-stated", "--seed", 3)
-    assert call("--out", tmp_path, *cell, *rig, "--band-width", 0.01, "--band-width", 0.02).exit_code == 0
-    options = asked["sensitivity"]
-    assert options["load_cell"] == tb.LoadCell(
-        force_noise=0.1, moment_noise=0.03, drive_angle_noise=float(np.radians(0.5))
+def test_rig_and_options_arrive(asked, tmp_path, rig_file):
+    rig = rig_file(
+        '[load_cell]\nforce_noise = 0.1\nmoment_noise = 0.03\ndrive_angle_noise = "0.5 deg"\n'
+        '[unknown]\nfriction = 0.2\ndiscrepancy = "default"\n'
     )
+    options = ("--rig", rig, "--base", "0.1,0", "--base", "0.2,0", "--seed", 3)
+    assert call("--out", tmp_path, *options, "--band-width", 0.01, "--band-width", 0.02).exit_code == 0
+    options = asked["sensitivity"]
+    cell = tb.LoadCell(force_noise=0.1, moment_noise=0.03, drive_angle_noise=float(np.radians(0.5)))
+    assert options["rig"].load_cell == cell
+    assert options["rig"].entries == {"friction": 0.2, "discrepancy": "default"}
     assert options["base"] == [(0.1, 0.0), (0.2, 0.0)]
-    assert (options["friction"], options["nuisances"], options["seed"]) == (0.2, [], 3)
+    assert options["seed"] == 3
     assert options["band_widths"] == [0.01, 0.02]
-
-
-def test_noise_of_the_drive_angle_alone_goes_with_the_usual_load_cell(asked, tmp_path):
-    rod = ("--length", 0.1, "--flexural-rigidity", 1e-5)
-    assert call("--out", tmp_path, "--drive-angle-noise", 1, *rod).exit_code == 0
-    cell = asked["sensitivity"]["load_cell"]
-    assert cell.force_noise == pytest.approx(0.05e-3)
-    assert cell.moment_noise == pytest.approx(0.02e-4)
-    assert cell.drive_angle_noise == pytest.approx(np.radians(1.0))
 
 
 def test_the_study_is_of_the_profile_or_of_those_that_are_given(asked, tmp_path):
@@ -201,11 +189,10 @@ def test_the_study_is_of_the_profile_or_of_those_that_are_given(asked, tmp_path)
     ]
     assert study.replicates == 1
     asked["cells"].clear()
-    more = ("--study-profile", "I", "--study-profile", "II", "--study-distance", 0.3, "--study-distance", 0.5)
-    assert call("--out", tmp_path / "more", *STUDY, *more, "--posterior-cells", 2).exit_code == 0
+    more = ("--profile", "I", "--profile", "II", "--distance", 0.3, "--distance", 0.5)
+    assert call("--out", tmp_path / "more", *STUDY, *more).exit_code == 0
     (study, _), *_ = asked["cells"]
     assert len(study.cells) == 8
-    assert sorted(study.posteriors) == [0, 7]
 
 
 # --- Stopping and going on ------------------------------------------------------------------------------------------
@@ -247,16 +234,13 @@ def test_another_study_is_refused(asked, tmp_path):
     ("options", "words"),
     [
         (["--base", "0"], "--base is '0': give 2 numbers with commas between them"),
-        (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
-        (["--length", "0.2"], "--length and --flexural-rigidity go together"),
-        (["--as-stated", "--nuisance", "bias"], "--as-stated and --nuisance contradict each other"),
-        (["--samples", "9"], "samples is 9"),
-        (["--distance", "1.5", "--samples", "8"], "the contour is out of reach"),
-        (["--band-width", "1e-12", "--samples", "8"], "no noise gives a band of 1e-12: without any it would be"),
-        (["--study", "--study-profile", "V"], "there is no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
-        (["--study", "--workers", "1", "--scheduler", "tcp://a:1"], "--workers and --scheduler exclude each other"),
-        (["--noise-factor", "1"], "--noise-factor is for a study: give --study"),
-        (["--replicates", "3"], "--replicates is for a study: give --study"),
+        (["--rig", "nowhere.toml"], "nowhere.toml: No such file or directory"),
+        (["--distance", "1.5"], "the contour is out of reach"),
+        (["--band-width", "1e-12"], "no noise gives a band of 1e-12: without any it would be"),
+        (["--profile", "V"], "there is no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
+        (["--replicates", "1", "--workers", "few"], "--workers is 'few'"),
+        (["--noise-factor", "1"], "--noise-factor is for a study: give --replicates"),
+        (["--distance", "0.4", "--distance", "0.5"], "more than one --distance is for a study"),
     ],
 )
 def test_refusals(tmp_path, monkeypatch, options, words):
@@ -273,12 +257,12 @@ def amplification_at_once(plan):
 
 
 @pytest.mark.slow
-def test_a_material_asks_for_the_rod(tmp_path, monkeypatch):
+def test_the_best_rod_of_a_material_is_found(tmp_path, rig_file, monkeypatch):
     monkeypatch.setattr(sensitivity_run, "_LENGTHS", np.array([1.0]))
     monkeypatch.setattr(sensitivity_run, "_DIAMETERS", np.array([0.7, 1.0, 2.0]))
-    rig = ("--length", 0.2, "--flexural-rigidity", 2.4279e-3, "--force-noise", 3e-3, "--moment-noise", 0.25e-3)
-    material = ("--youngs-modulus", 206e9, "--elastic-strain", 0.01)
-    result = call("--out", tmp_path, *rig, *material, *QUICK, "--json")
+    rod = "length = 0.2\nflexural_rigidity = 2.4279e-3\ndiameter = 0.7e-3\nelastic_strain = 0.01\n"
+    rig = rig_file(f"[rod]\n{rod}[load_cell]\nforce_noise = 3e-3\nmoment_noise = 0.25e-3\n")
+    result = call("--out", tmp_path, "--rig", rig, "--best-rod", *QUICK, "--json")
     assert result.exit_code == 0, result.output
     answer = json.loads(result.stdout)
     assert answer["rod"]["length"] == pytest.approx(0.2)
@@ -300,13 +284,17 @@ def test_no_rod_that_serves_is_said():
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("text", "message"),
     [
-        (("--youngs-modulus", 206e9), "--youngs-modulus and --elastic-strain go together"),
-        (("--youngs-modulus", -1.0, "--elastic-strain", 0.01), "above zero"),
-        (("--youngs-modulus", 206e9, "--elastic-strain", 0.01), "state the rod in SI, and the noise"),
+        ("", "state length, flexural_rigidity, diameter and elastic_strain under [rod]"),
+        ("[rod]\nlength = 0.2\nflexural_rigidity = 1e-3\ndiameter = 1e-3\n", "elastic_strain under [rod]"),
+        (
+            "[rod]\nlength = 0.2\nflexural_rigidity = 1e-3\ndiameter = 1e-3\nelastic_strain = 0.01\n",
+            "state its noise under [load_cell]",
+        ),
     ],
 )
-def test_half_a_material_or_no_rig_is_refused_before_any_work(tmp_path, options, message):
-    commands.assert_refused(call("--out", tmp_path / "new", *options, *QUICK), message)
+def test_half_a_material_or_no_rig_is_refused_before_any_work(tmp_path, rig_file, text, message):
+    result = call("--out", tmp_path / "new", "--rig", rig_file(text), "--best-rod", *QUICK)
+    commands.assert_refused(result, message)
     assert not (tmp_path / "new").exists()

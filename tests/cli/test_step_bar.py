@@ -12,6 +12,7 @@ from helpers import commands
 from helpers.report_pages import analysed_quickly, coarse_record
 from tactile_bayes.cli.task_bar import step_bar
 from tactile_bayes.record import write_record
+from tactile_bayes.rig import Rig
 
 
 @contextmanager
@@ -54,7 +55,7 @@ def test_it_is_silent_where_it_is_told_to_be_and_where_nobody_looks(monkeypatch,
 
 @pytest.mark.slow
 def test_a_report_shows_its_steps(tmp_path, monkeypatch):
-    analysed_quickly(coarse_record(), tmp_path, nuisances=[])
+    analysed_quickly(coarse_record(), tmp_path, rig=Rig(unknown="nothing"))
     steps = _steps_shown(monkeypatch, "report", ["report", str(tmp_path)])
     assert steps == [(done, 5) for done in range(1, 6)]
 

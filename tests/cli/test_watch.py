@@ -19,12 +19,13 @@ from tactile_bayes.inference.result import read_result
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import read_record, write_record
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs import contour as contour_run
 from tactile_bayes.runs import watch
 from tactile_bayes.runs.watch import open_watch
 from tactile_bayes.sweep import scan
 
-FEW = ("--as-stated", "--particles", 120)
+FEW = ("--particles", 120)
 
 
 @pytest.fixture(scope="module")
@@ -50,10 +51,10 @@ def write(path, *parts):
 
 
 @pytest.fixture
-def follow(path, monkeypatch):
+def follow(path, as_stated, monkeypatch):
     """Call the command, with what happens to the file at each look at it; it ends when nothing happens any more."""
 
-    def call(*options, then=(), json=False):
+    def call(*options, then=(), json=False, rig=as_stated):
         actions = iter(then)
 
         def act(seconds):
@@ -61,7 +62,7 @@ def follow(path, monkeypatch):
 
         monkeypatch.setattr(watching.time, "sleep", act)
         words = [*FEW, *options, *(["--json"] if json else [])]
-        return commands.call("watch", path, "--out", path.parent / "run", "--idle", 0, *words)
+        return commands.call("watch", path, "--out", path.parent / "run", "--idle", 0, "--rig", rig, *words)
 
     return call
 
@@ -165,7 +166,7 @@ def test_the_same_command_goes_on_with_the_same_numbers(path, lines, follow):
     assert (resumed["samples"], resumed["new"]) == (30, 0)
     assert resumed["quantities"] == objects(first)[0]["quantities"]
     measured = read_record(path)
-    stream = Stream(nuisances=[], seed=1, particles=120)
+    stream = Stream(rig=Rig(unknown="nothing"), seed=1, particles=120)
     stream.update(measured.isel(sample=slice(0, 30)))
     stream.update(measured.isel(sample=slice(30, None)))
     expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
@@ -195,7 +196,7 @@ def test_of_a_long_record_every_other_sample_is_taken(path, lines, follow):
     assert (thinned["samples"], thinned["new"], thinned["every"]) == (half, half, 2)
     assert not thinned["restarted"]
     assert any("one sample of 2" in words for words in thinned["warnings"])
-    stream = Stream(nuisances=[], seed=1, particles=120)
+    stream = Stream(rig=Rig(unknown="nothing"), seed=1, particles=120)
     stream.update(read_record(path).isel(sample=slice(None, None, 2)))
     expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
     assert [row["median"] for row in thinned["quantities"]] == pytest.approx(expected, rel=1e-12)
@@ -214,10 +215,11 @@ def test_samples_of_a_load_cell_that_drifts_are_all_taken(record, tmp_path):
     """The steps of its drift are those from one sample to the next; of another cell every other sample is taken."""
     measured = read_record(record)
     steady = LoadCell.from_record(measured)
-    size, options = measured.sizes["sample"], {"record_file": record, "seed": 1, "nuisances": [], "particles": 100}
+    size, options = measured.sizes["sample"], {"record_file": record, "seed": 1, "particles": 100}
     for cell, every in ((steady, 2), (replace(steady, drift=RandomWalk(force=1e-4)), 1)):
-        with open_watch(tmp_path / f"run {every}", most_samples=100, **options) as watched:
-            update = watched.take(measured, cell, "")
+        rig = Rig(load_cell=cell, unknown="nothing")
+        with open_watch(tmp_path / f"run {every}", most_samples=100, rig=rig, **options) as watched:
+            update = watched.take(measured, "")
         assert (update.samples, update.every) == (-(-size // every), every)
 
 
@@ -266,14 +268,16 @@ def test_of_several_families_the_probabilities_are_told(path, lines, follow):
 def test_a_wrong_model_is_told_once(path, follow, tmp_path):
     """Friction that is not inferred."""
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.05, friction=0.2).record, seed=1)
+    record = cell.measure(
+        scan(paper_profile("II", q=0.5), drive_step=0.05, rig=Rig(unknown={"friction": 0.2})).record, seed=1
+    )
     write_record(record.isel(sample=slice(0, 60)), tmp_path / "whole.csv")
     text = (tmp_path / "whole.csv").read_text(encoding="utf-8").splitlines(keepends=True)
     write(path, text[:-45])
     result = follow(then=[partial(write, path, text[: len(text) - left]) for left in (30, 15, 0)])
     assert result.exit_code == 0
     assert result.stderr.count("samples are not what the shape, the rig and the noise predict (e-value") == 1
-    assert "--nuisance" in result.stderr
+    assert "[unknown] of rig.toml" in result.stderr
 
 
 @pytest.mark.slow
@@ -287,15 +291,15 @@ def test_no_family_is_probable_while_an_evidence_is_too_small(path, lines, follo
     assert "Ended after 60 samples: no new rows for 0 s." in said
 
 
-def test_control_c_ends_it_with_the_answer(path, lines, monkeypatch):
+def test_control_c_ends_it_with_the_answer(path, lines, as_stated, monkeypatch):
     head, rows = lines
     write(path, head, rows[:10])
     monkeypatch.setattr(watching.time, "sleep", lambda seconds: os.kill(os.getpid(), signal.SIGINT))
-    result = commands.call("watch", path, "--out", path.parent / "run", *FEW)
+    result = commands.call("watch", path, "--out", path.parent / "run", "--rig", as_stated, *FEW)
     assert result.exit_code == 0
     assert "\nEnded after 10 samples: stopped by Ctrl-C.\n" in result.stdout
     path.unlink()
-    result = commands.call("watch", path, "--out", path.parent / "other", *FEW)
+    result = commands.call("watch", path, "--out", path.parent / "other", "--rig", as_stated, *FEW)
     assert result.exit_code == 130
     assert "interrupted before the first answer" in result.stderr
 
@@ -318,18 +322,26 @@ def test_quiet_prints_the_answer_alone_and_warns_of_few_particles(path, lines, f
         (["--between", "0.1,-0.1"], "give the smaller one first"),
         (["--family", "star"], "star"),
         (["--until-probability", 0.9], "until_probability is for several families"),
-        (["--nuisance", "leaver"], "--as-stated and --nuisance contradict"),
-        (["--column", "force_x"], "--column force_x: write"),
-        (["--column", "force_x=Fx"], "Fx"),
-        (["--length", 0.1], "--length and --flexural-rigidity go together"),
-        (["--missing", "torque"], "torque"),
-        (["--rig", "none.nc"], "there is no file none.nc"),
-        (["--force-noise", 0.1], "give --moment-noise as well"),
     ],
 )
 def test_options_that_are_wrong_are_refused(path, lines, follow, options, words):
     write(path, lines[0], lines[1][:5])
     commands.assert_refused(follow(*options), words)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[unknown]\nleaver = 0.0\n", "did you mean 'lever'?"),
+        ('[file]\nforce_x = "Fx"\n', "Fx"),
+        ("[rod]\nlength = 0.1\n", "length and flexural_rigidity"),
+        ('[file]\nmissing = ["torque"]\n', "torque"),
+        ("rod = 1", "rod"),
+    ],
+)
+def test_a_rig_that_is_wrong_is_refused(path, lines, follow, rig_file, text, words):
+    write(path, lines[0], lines[1][:5])
+    commands.assert_refused(follow(rig=rig_file(text)), words)
 
 
 def test_a_wrong_call_is_refused(path):
@@ -355,7 +367,7 @@ def test_a_file_without_samples_is_said_to_have_none(path, lines, follow):
 
 
 @pytest.mark.slow
-def test_a_rig_that_writes_100_rows_a_second(path, lines, monkeypatch):
+def test_a_rig_that_writes_100_rows_a_second(path, lines, as_stated):
     """In real time, with lines that are half written at any moment."""
     head, rows = lines
 
@@ -372,7 +384,9 @@ def test_a_rig_that_writes_100_rows_a_second(path, lines, monkeypatch):
     rig = threading.Thread(target=measure)
     rig.start()
     out = path.parent / "run"
-    result = commands.call("watch", path, "--out", out, *FEW, "--poll", 0.05, "--idle", 0.4, "--json")
+    result = commands.call(
+        "watch", path, "--out", out, "--rig", as_stated, *FEW, "--poll", 0.05, "--idle", 0.4, "--json"
+    )
     rig.join()
     *updates, end = objects(result)
     assert end["samples_taken"] == updates[-1]["samples"] == 60

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from helpers.contour_posteriors import CELL, swept
 from helpers.refusals import refused
@@ -9,8 +10,11 @@ from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.contours import Circle, Ellipse, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.family import Family
+from tactile_bayes.rig import Rig
 from tactile_bayes.uncertainty.band import contour_band
 
+RIG = Rig(load_cell=CELL, unknown="nothing")
 BRIEF = SamplerSettings(ensembles=2, walkers=20, min_ess=100, max_r_hat=1.1, max_steps=40)
 
 
@@ -21,9 +25,7 @@ def circle():
 
 @pytest.fixture(scope="module")
 def compared(circle):
-    return compare_families(
-        circle, families=["circle", "ellipse"], load_cell=CELL, seed=1, nuisances=(), settings=BRIEF
-    )
+    return compare_families(circle, families=["circle", "ellipse"], rig=RIG, seed=1, settings=BRIEF)
 
 
 @pytest.mark.slow
@@ -63,9 +65,8 @@ def test_a_shape_that_is_far_off_is_given_up():
     found = compare_families(
         measured,
         families=["circle", "ellipse"],
-        load_cell=CELL,
+        rig=RIG,
         seed=1,
-        nuisances=(),
         leave_one_out=False,
         settings=SamplerSettings(ensembles=2, max_steps=150),
     )
@@ -80,7 +81,7 @@ def test_a_shape_that_is_far_off_is_given_up():
 )
 def test_the_right_one_of_all(truth, right):
     measured = CELL.measure(swept(truth, step=np.radians(1.0)), seed=1)
-    found = compare_families(measured, load_cell=CELL, seed=1)
+    found = compare_families(measured, rig=Rig(load_cell=CELL), seed=1)
     assert found.attrs["most_probable"] == right
     assert float(found.probability.sel(family=right)) > 0.5
     assert bool(found.fits.sel(family=right))
@@ -93,7 +94,11 @@ def test_the_right_one_of_all(truth, right):
 def test_what_is_none_of_the_shapes_comes_out_as_such():
     measured = CELL.measure(swept(paper_profile("IV", q=0.5), step=np.radians(1.0)), seed=1)
     found = compare_families(
-        measured, families=["parabola", "circle", "ellipse", "power-law"], load_cell=CELL, seed=1, leave_one_out=False
+        measured,
+        families=["parabola", "circle", "ellipse", "power-law"],
+        rig=Rig(load_cell=CELL),
+        seed=1,
+        leave_one_out=False,
     )
     assert found.attrs["none_fits"]
 
@@ -103,9 +108,8 @@ def test_a_run_is_made_again_from_its_seed(circle, compared):
     again = compare_families(
         circle,
         families=["ellipse", "circle"],
-        load_cell=CELL,
+        rig=RIG,
         seed=1,
-        nuisances=(),
         leave_one_out=False,
         settings=BRIEF,
     )
@@ -121,14 +125,40 @@ def test_an_interrupt_ends_the_comparison(circle):
         compare_families(
             circle,
             families=["circle", "ellipse"],
-            load_cell=CELL,
+            rig=RIG,
             seed=1,
-            nuisances=(),
             settings=SamplerSettings(ensembles=2, min_ess=1e9),
             progress=interrupt,
         )
 
 
-def test_priors_of_a_family_that_is_not_compared_are_refused(circle):
-    with refused(ParameterError, "priors", "'parabola'"):
-        compare_families(circle, families=["circle", "ellipse"], priors={"parabola": {}}, load_cell=CELL, seed=1)
+@pytest.mark.parametrize(
+    ("families", "named"),
+    [
+        ("circle", ["'circle'"]),
+        (Family("circle"), ["circle"]),
+        (3, ["3"]),
+        (["circle"], ["circle"]),
+        (["circle", Family("circle", r=0.8)], ["circle", "different"]),
+        (["circle", "cube"], ["'cube'"]),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(circle, families, named):
+    with refused(ParameterError, *named):
+        compare_families(circle, families, RIG, seed=1)
+
+
+def test_families_of_which_something_is_said(circle):
+    """What is said replaces matched priors; what is known is a constant among the draws, in the family's order."""
+    families = [Family("circle", q=0.5), Family("ellipse", a=stats.norm(0.8, 0.01), b=0.8)]
+    found = compare_families(circle, families, RIG, seed=1, settings=BRIEF, leave_one_out=False)
+    assert found.family.values.tolist() == ["circle", "ellipse"]
+    draws = found.contour_draws.values
+    assert draws.shape[2] == 4
+    np.testing.assert_array_equal(draws[0, :, 1], 0.5)  # r, q, x_c
+    assert np.isnan(draws[0, :, 3]).all()
+    np.testing.assert_array_equal(draws[1, :, 1], 0.8)  # a, b, q, x_c
+    assert abs(np.mean(draws[1, :, 0]) - 0.8) < 0.05
+    band = contour_band(found, [0.0], 0.9)
+    assert float(band["lower"][0]) < 0.51
+    assert float(band["upper"][0]) > 0.49

@@ -12,7 +12,8 @@ from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.parameters.matched_priors import matched_priors
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-OPTIONS = {"load_cell": CELL, "nuisances": [], "seed": 1, "particles": 200}
+RIG = tb.Rig(load_cell=CELL, unknown="nothing")
+OPTIONS = {"rig": RIG, "seed": 1, "particles": 200}
 FAMILIES = ["circle", "ellipse", "parabola"]
 X = [-0.1, 0.0, 0.1]
 
@@ -36,7 +37,7 @@ def compared(measured):
 
 @pytest.mark.slow
 def test_each_family_is_a_stream_of_its_own(compared, measured):
-    alone = tb.Stream(family="ellipse", priors=matched_priors("ellipse", 1.0), **OPTIONS)
+    alone = tb.Stream(family=tb.Family("ellipse", **matched_priors("ellipse", 1.0)), **OPTIONS)
     for now, own in zip(compared[1], fed(alone, measured, 3), strict=True):
         assert float(now.log_evidence.sel(family="ellipse")) == float(own.log_evidence)
         finite = np.isfinite(now.log_evidence.values)
@@ -50,7 +51,7 @@ def test_each_family_is_a_stream_of_its_own(compared, measured):
 @pytest.mark.slow
 def test_the_last_evidences_agree_with_those_of_the_whole_record(measured):
     quick = tb.SamplerSettings(ensembles=2, min_ess=400, max_r_hat=1.05)
-    options = {"load_cell": CELL, "nuisances": [], "seed": 1, "leave_one_out": False, "settings": quick}
+    options = {"rig": RIG, "seed": 1, "leave_one_out": False, "settings": quick}
     whole = tb.compare_families(measured, families=FAMILIES[:2], **options)
     streams = tb.StreamComparison(families=FAMILIES[:2], **(OPTIONS | {"particles": 1000}))
     now = fed(streams, measured, 3)[-1]
@@ -107,13 +108,23 @@ def test_resumed_streams_go_on_with_the_same_numbers(measured, tmp_path):
         tb.Stream.resume(tmp_path / "streams.nc", **options)
 
 
+def test_families_of_which_something_is_said(measured):
+    """What is known is a constant among the draws."""
+    families = [tb.Family("circle", q=0.5), tb.Family("ellipse", b=0.4)]
+    streams = tb.StreamComparison(families, x=X, **(OPTIONS | {"particles": 100}))
+    draws = streams.update(measured).contour_draws.values
+    np.testing.assert_array_equal(draws[0, :, 1], 0.5)  # r, q, x_c
+    np.testing.assert_array_equal(draws[1, :, 1], 0.4)  # a, b, q, x_c
+    assert np.ptp(draws[1, :, 0]) > 0.0
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
         {"families": ["circle"]},
         {"families": "circle"},
-        {"families": FAMILIES, "family": "circle"},
-        {"families": FAMILIES, "priors": {"ellipse": 1.0}},
+        {"families": FAMILIES, "rig": "good"},
+        {"families": ["circle", tb.Family("circle", r=0.4)]},
         {"families": FAMILIES, "particles": 3},
     ],
 )

@@ -10,6 +10,7 @@ from tactile_bayes.errors import ContourError
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 NODES = 40
@@ -58,7 +59,7 @@ def test_loads_are_the_exact_ones(diameter):
     rod = Rod(diameter=diameter)
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     likelihood = RecordLikelihood(
-        scan(Parabola(0.5, 0.5), rod=rod, base=[(0.0, 0.0), (0.2, 0.0)], drive_step=0.05).record, cell
+        scan(Parabola(0.5, 0.5), rig=Rig(rod=rod), base=[(0.0, 0.0), (0.2, 0.0)], drive_step=0.05).record, cell
     )
     rng = np.random.default_rng(1)
     waves = 0.3 * rng.normal(size=(20, 4, 1)) * np.cos(np.arange(4)[:, None] * (Smooth.nodes(NODES) + 0.7))

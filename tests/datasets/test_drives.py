@@ -12,6 +12,7 @@ from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import CHANNELS, rod_of, turned
+from tactile_bayes.rig import Rig
 
 FIRST = {
     "base": [0.9, {"uniform": [-0.1, 0.0]}],
@@ -72,7 +73,7 @@ def test_the_truth_is_what_a_scan_along_the_drive_says(spec):
             one, row = mine.isel(sample=mine["sweep"].values == number), whole.isel(record=i, sweep=number)
             angle = truth_of(one, "drive_angle")
             drive = tb.Motion(one.base_x.values, one.base_y.values, angle)
-            scan = tb.scan(contour_of(mine), drive=drive, rod=rod, friction=said.friction)
+            scan = tb.scan(contour_of(mine), drive=drive, rig=Rig(rod=rod, unknown={"friction": said.friction}))
             theirs, events = scan.record, scan.sweeps[0]
             assert set(one.direction.values) == {events.direction}
             assert theirs.sizes["sample"] == said.drive.samples

@@ -19,6 +19,7 @@ from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.datasets.specification_text import left_out
 from tactile_bayes.errors import ParameterError, SpecificationError, StrainWarning
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
+from tactile_bayes.rig import Rig
 
 CONTACT = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
 FALSE_ALARM = 1e-4
@@ -112,7 +113,11 @@ def test_the_truth_is_what_a_scan_of_the_contour_says(spec):
             angles = (one["truth_drive_angle"] if "truth_drive_angle" in one else one["drive_angle"]).values
             assert np.all(np.diff(angles) * (1.0 if direction == "forward" else -1.0) > 0.0)
             scan = tb.scan(
-                contour, direction=direction, base=pivot, rod=rod, friction=said.friction, drive_angles=angles
+                contour,
+                direction=direction,
+                base=pivot,
+                rig=Rig(rod=rod, unknown={"friction": said.friction}),
+                drive_angles=angles,
             )
             theirs, events = in_frame(scan.record, said.frame), scan.sweeps[0]
             # Whether a sample at the very snap-off is loaded, rounding decides.
@@ -443,7 +448,7 @@ def test_records_whose_rod_is_strained_beyond_the_model_are_counted(diameter):
         warnings.simplefilter("ignore", StrainWarning)
         for i in range(12):
             one = record(said, i)
-            scan = tb.scan(contour_of(one), rod=tb.Rod(0.2, 0.0024, diameter))
+            scan = tb.scan(contour_of(one), rig=Rig(rod=tb.Rod(0.2, 0.0024, diameter)))
             largest[i] = [scan.events[direction].largest_strain for direction in ("forward", "backward")]
     np.testing.assert_allclose(records.sweep["largest_strain"], largest, rtol=0.01)
     assert records.strained == np.count_nonzero(np.any(largest > 0.1, axis=1))

@@ -13,6 +13,7 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 CELLS = {
@@ -138,7 +139,7 @@ def test_records_of_the_right_family_pass(name):
     p_values = []
     for seed in range(12):
         measured = CELLS[name].measure(scan(contour, drive_step=np.radians(2.0)).record, seed=seed)
-        result = infer_contour(measured, load_cell=CELLS[name], nuisances=[], seed=seed, settings=SHORT)
+        result = infer_contour(measured, rig=Rig(load_cell=CELLS[name], unknown="nothing"), seed=seed, settings=SHORT)
         p_values.append(float(check_record(result).overall_p_value))
     assert min(p_values) > 5e-3
 
@@ -149,5 +150,5 @@ def test_profile_iv_is_no_parabola(noise):
     for seed in range(4):
         cell = LoadCell(force_noise=noise, moment_noise=0.4 * noise)
         measured = cell.measure(scan(paper_profile("IV", q=0.5), drive_step=np.radians(2.0)).record, seed=seed)
-        result = infer_contour(measured, load_cell=cell, nuisances=[], seed=seed, settings=SHORT)
+        result = infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), seed=seed, settings=SHORT)
         assert not check_record(result).passed

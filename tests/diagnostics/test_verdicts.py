@@ -17,6 +17,7 @@ from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.result import to_arviz
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.sweep import Motion, scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.normal_band import normal_band
@@ -50,8 +51,8 @@ def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
     )
     assert found[0].endswith(
         "Do not use this contour. It may be the family or the rig. Try another family (--family shape-free, or "
-        "compare), or infer more of the rig (--nuisance friction, gain, drift, lever, backlash, "
-        "suspension_compliance, rest_curvature, taper, stem, length)."
+        'compare), or infer more of the rig ("default" under [unknown] of rig.toml: friction, gain, drift, lever, '
+        "backlash, suspension_compliance, rest_curvature, taper, stem, length)."
     )
     assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 60 steps")
     assert found[2].startswith("The noise is ")
@@ -114,7 +115,8 @@ def test_loads_that_contradict_one_another_unless_noise_does_it():
     assert "below 1e-99" in found[0]
     assert "with friction" not in found[0]
     dragged = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
-    assert dragged[0].endswith("too small by 20 standard errors, as with friction: infer it (--nuisance friction).")
+    assert dragged[0].endswith('with friction: infer it (friction = "default" under [unknown] of rig.toml).')
+    assert "too small by 20 standard errors" in dragged[0]
     sought = predicted()
     sought.attrs |= {"nuisances": '["friction"]'}
     dragged = verdicts(sought, xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
@@ -160,7 +162,7 @@ def test_a_zero_that_moved_is_told():
     assert re.match(
         r"The zero moved from one unloaded stretch to another, of force_x \(p = [\d.e-]+ if it had not\)", said
     )
-    assert "--nuisance drift" in said
+    assert 'drift = "default" under [unknown]' in said
 
 
 def test_a_zero_that_moved_is_not_told_where_that_is_inferred_or_stated():
@@ -234,5 +236,5 @@ def test_a_sweep_that_goes_back_in_contact_is_named_where_there_is_friction(fric
     back = np.arange(there_and_back.sizes["sample"]) > 18
     columns = {"sweep": ("sample", back.astype(int)), "direction": ("sample", np.where(back, "backward", "forward"))}
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(there_and_back.assign(columns), seed=1)
-    posterior = infer_contour(measured, nuisances=[], friction=friction, seed=1, settings=QUICK)
+    posterior = infer_contour(measured, rig=Rig(unknown={**NOTHING, "friction": friction}), seed=1, settings=QUICK)
     assert ("Sweep 1 went back in contact" in verdicts(posterior)[-1]) is named

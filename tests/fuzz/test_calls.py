@@ -15,7 +15,7 @@ from helpers.public_calls import AcceptedError, end_before_sampling, right_calls
 from helpers.refusals import refused
 from helpers.wrong_values import MORE, RESULTS, WRONG
 from tactile_bayes.checks import as_number, shown
-from tactile_bayes.errors import TactileBayesError, TactileBayesWarning
+from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
 from tactile_bayes.mechanics import elastica
 
 ROOT = Path(__file__).parents[2]
@@ -28,6 +28,9 @@ NOT_CALLED = {
     *(f"elastica.{name}" for name in ("Contact", "Wrench", "forward_contacts", "lever_of_stem")),
 }
 """Bases, results, and parts of the forward model that its own code alone calls."""
+
+OF_ANY_NAME = ("Family", "Family.only", "Rig.with_unknown")
+"""What takes parameters of a contour or a rig by name."""
 
 MOST_OBSCURE = 0.02
 """Largest share of wrong calls that end in an error of another library."""
@@ -56,6 +59,7 @@ SENSIBLE = {
     "workers": lambda value: value is None or (type(value) is int and value > 0),
     "rod": a_kind(tb.Rod),
     "load_cell": a_kind(tb.LoadCell),
+    "rig": a_kind(tb.Rig),
     "settings": a_kind(tb.SamplerSettings),
     "truth": a_kind(tb.contours.Contour),
     "posterior": a_kind(xr.DataTree, xr.Dataset),
@@ -144,8 +148,8 @@ def test_right_calls_succeed(calls):
 
 
 def test_an_unknown_keyword_is_python_s_to_refuse(calls):
-    for call in calls.values():
-        with refused(TypeError, "'left'"):
+    for name, call in calls.items():
+        with refused(ParameterError if name in OF_ANY_NAME else TypeError, "left"):
             call.function(**call.arguments, left=1)
 
 

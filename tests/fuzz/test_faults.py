@@ -10,10 +10,12 @@ import shutil
 import sys
 import types
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 from helpers.faults import ERRORS, KILL, faulty, killed
 from tactile_bayes import datasets
@@ -29,6 +31,8 @@ from tactile_bayes.inference.result import write_result
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.record import make_record, write_record
 from tactile_bayes.report import writing
+from tactile_bayes.rig import Rig
+from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.runs import (
     calibration,
     comparison,
@@ -107,13 +111,12 @@ def cheap(monkeypatch):
         (design, "design", lambda k: designed(k)),
         (design, "design_messages", lambda k: (f"best {k}",)),
         (trust, "trust", lambda k: data(k).rename(family="assumption") if k == 0 else data(k)),
-        (rig, "infer_rig", tree),
+        (rig, "calibrate_rig", lambda k: Rig(calibration=replace(CALIBRATION, posterior=tree(k)))),
         (rig, "verdicts", lambda k: (f"verdict {k}",)),
         (rig, "summary", data),
-        (rig, "_taken_over", lambda k: f"taken over {k}"),
         (reconstruction, "validate", record),
         (reconstruction, "known_cell", lambda k: (None, "nothing")),
-        (reconstruction, "reconstruct", lambda k: contacts(k)),
+        (reconstruction, "contacts_of", lambda k: contacts(k)),
         (sensitivity, "sensitivity", lambda k: xr.DataTree(xr.Dataset(attrs=data(k).attrs))),
         (writing, "findings_of", lambda k: None),
         (writing, "page_of", lambda k: {}),
@@ -125,6 +128,7 @@ def cheap(monkeypatch):
         monkeypatch.setattr(module, name, returned(make))
 
 
+CALIBRATION = RigPrior({"lever_x": stats.norm(0.0, 0.1)}, np.eye(1), 0.01, "0")
 COUNTS = {"redrawn": {}, "strained": 0, "untouched": 0}
 GENERATED = types.SimpleNamespace(index=np.arange(2), counts=COUNTS)
 
@@ -190,7 +194,9 @@ WRITERS = {
     "reconstruct": lambda folder, k: reconstruction.reconstruct_into(record(k), folder),
     "compare": lambda folder, k: comparison.write_comparison(data(k), folder),
     "calibrate": lambda folder, k: calibration.calibrate_into(folder),
-    "calibrate-rig": lambda folder, k: rig.calibrate_rig_into(folder, [(None, None)], contour=Parabola(0.5, 0.5)),
+    "calibrate-rig": lambda folder, k: rig.calibrate_rig_into(
+        folder, [(None, None)], contour=Parabola(0.5, 0.5), rig=Rig()
+    ),
     "design": lambda folder, k: design.design_into(folder),
     "sensitivity": lambda folder, k: sensitivity.sensitivity_into(folder),
     "trust": write_trust,

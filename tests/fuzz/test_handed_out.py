@@ -11,6 +11,7 @@ from helpers import drawn_sweeps
 from helpers.handed_out import violations
 from helpers.rest_lines import depth, rest_line
 from tactile_bayes.errors import ContourError, TactileBayesWarning
+from tactile_bayes.rig import Rig
 
 SCANS, POSES = 4, 60
 """Number of scans that a seed checks, and of poses before contact in each."""
@@ -44,7 +45,7 @@ def test_a_carried_rod_is_never_in_the_object(fuzz_seed):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TactileBayesWarning)
             try:
-                scan = tb.scan(contour, rod=rod, friction=friction, drive=drive)
+                scan = tb.scan(contour, rig=Rig(rod=rod, unknown={"friction": friction}), drive=drive)
             except ContourError:
                 ends["refused"] += 1
                 continue

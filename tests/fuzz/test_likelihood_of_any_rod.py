@@ -6,6 +6,7 @@ import pytest
 import tactile_bayes as tb
 from helpers.rods_drawn import drawn_rod
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.rig import Rig
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 SCENES = 6
@@ -20,7 +21,9 @@ def drawn_scene(rng):
         side * np.array([-1.2, 1.2]), rng.uniform(-0.5, -0.1, 2), 0.5 * np.pi + side * rng.uniform(-1.3, 1.3, 2)
     )
     drive, step = [(None, np.radians(3.0)), (drive, None)][rng.integers(2)]
-    record = tb.scan(tb.contours.Parabola(*numbers), drive=drive, rod=rod, friction=friction, drive_step=step).record
+    record = tb.scan(
+        tb.contours.Parabola(*numbers), drive=drive, rig=Rig(rod=rod, unknown={"friction": friction}), drive_step=step
+    ).record
     return record, friction, tb.contours.Parabola(*(np.array([number]) for number in numbers))
 
 
@@ -46,7 +49,9 @@ def test_interpolation_is_not_felt_at_the_truth(fuzz_seed):
 def test_loads_of_thousands_do_not_change_that(q):
     """A rod that grows stiffer toward its tip, past an object at its pivot."""
     rod = tb.Rod(rigidity_profile=lambda s: 1.0 + 1.4 * s)
-    record = tb.scan(tb.contours.Parabola(0.16, q, 0.17), rod=rod, friction=0.29, drive_step=np.radians(3.0)).record
+    record = tb.scan(
+        tb.contours.Parabola(0.16, q, 0.17), rig=Rig(rod=rod, unknown={"friction": 0.29}), drive_step=np.radians(3.0)
+    ).record
     measured = CELL.measure(record, seed=1)
     contour = tb.contours.Parabola(*np.array([[0.16], [q], [0.17]]))
     exact, found = (

@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 import tactile_bayes as tb
 from helpers.rods_drawn import drawn_rod
+from tactile_bayes.rig import Rig
 
 CELL = tb.LoadCell(force_noise=1e-7, moment_noise=1e-7)
 SCENES = 12
@@ -21,7 +22,10 @@ def drawn_record(rng):
     )
     try:
         record = tb.scan(
-            contour, drive=[None, drive][rng.integers(2)], rod=rod, friction=friction, drive_step=0.08
+            contour,
+            drive=[None, drive][rng.integers(2)],
+            rig=Rig(rod=rod, unknown={"friction": friction}),
+            drive_step=0.08,
         ).record
     except (tb.errors.ReachError, tb.errors.ContourError):
         return None
@@ -60,7 +64,9 @@ def test_step_2_returns_the_contacts_of_a_scan(fuzz_seed):
         rod, friction, record = drawn
         done += 1
         for method in ("raw", "constrained"):
-            found = tb.reconstruct(record, rod=rod, friction=friction, method=method, load_cell=CELL)
+            found = tb.reconstruct(
+                record, rig=Rig(rod=rod, load_cell=CELL, unknown={"friction": friction}), method=method
+            )
             x, y = (found[f"contact_{axis}"].values - record[f"truth_contact_{axis}"].values for axis in "xy")
             x_other, y_other = (
                 found[f"other_contact_{axis}"].values - record[f"truth_contact_{axis}"].values for axis in "xy"

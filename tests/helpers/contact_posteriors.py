@@ -22,6 +22,7 @@ from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import samples_of
 from tactile_bayes.record import CHANNELS, frame_of, in_frame, rod_of
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 NAMES = ("contact_x", "contact_y", "slope_angle")
@@ -39,7 +40,9 @@ def measured(kind: str = "plain") -> xr.Dataset:
     Not to be changed.
     """
     if kind == "SI":
-        return SI_CELL.measure(scan(Parabola(5.0, q=0.05), rod=ROD, drive_step=0.05, base=(0.01, 0.002)).record, seed=3)
+        return SI_CELL.measure(
+            scan(Parabola(5.0, q=0.05), rig=Rig(rod=ROD), drive_step=0.05, base=(0.01, 0.002)).record, seed=3
+        )
     record = scan(paper_profile("II", q=0.5), drive_step=0.05).record
     if kind == "turning":
         record = in_frame(record, "turning")

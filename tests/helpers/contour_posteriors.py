@@ -1,6 +1,7 @@
 """Records of known contours, and posteriors that several tests look at: computed once, and not to be changed."""
 
-from functools import cache, partial
+from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -29,15 +31,26 @@ MODEST = SamplerSettings(ensembles=2, walkers=16, min_ess=160, max_r_hat=1.06)
 SOUND = SamplerSettings(ensembles=2, walkers=24, min_ess=400, max_r_hat=1.05)
 
 
-infer_as_stated = partial(infer_contour, nuisances=())
-"""Posteriors of a contour and noise alone: of few parameters, and quick."""
+NO_PRIORS: Mapping[str, Any] = {}
 
 
-def swept(contour, *, bases=((0.0, 0.0),), step=STEP, **options) -> xr.Dataset:
+def only(*names: str, **said: Any) -> dict[str, Any]:
+    """Unknowns of a rig of which everything else is as stated."""
+    return {**NOTHING, **dict.fromkeys(names, "default"), **said}
+
+
+def infer_as_stated(
+    record: xr.Dataset, *, load_cell: LoadCell | None = None, unknown: Mapping[str, Any] = NO_PRIORS, **options: Any
+) -> xr.DataTree:
+    """A posterior of a contour and noise alone, but for what is said to be unknown: of few parameters, and quick."""
+    return infer_contour(record, rig=Rig(load_cell=load_cell, unknown=only(**unknown)), **options)
+
+
+def swept(contour, *, bases=((0.0, 0.0),), step=STEP, rod=None, friction=0.0, **options) -> xr.Dataset:
     """An exact record of sweeps in both directions from every base."""
-    parts = []
+    parts, rig = [], Rig(rod=rod, unknown={"friction": friction})
     for k, base in enumerate(bases):
-        part = scan(contour, base=base, drive_step=step, **options).record
+        part = scan(contour, rig, base=base, drive_step=step, **options).record
         part["sweep"] = part.sweep + 2 * k
         parts.append(part)
     return xr.concat(parts, "sample", combine_attrs="override") if parts[1:] else parts[0]

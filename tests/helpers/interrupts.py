@@ -41,7 +41,8 @@ def interrupted_at(call, function):
 
 def interrupted_while_sampling(command, record, cwd, *, setup=""):
     """Exit code, stdout and stderr of a command that writes to run/, when Control-C is pressed while it samples."""
-    arguments = [command, record, "--as-stated", "--out", "run", "-q"]
+    (cwd / "rig.toml").write_text('unknown = "nothing"\n', encoding="utf-8")
+    arguments = [command, record, "--rig", "rig.toml", "--out", "run", "-q"]
     with subprocess.Popen(
         [sys.executable, "-c", setup + SAMPLING, *arguments],
         stdout=subprocess.PIPE,

@@ -63,6 +63,8 @@ def run(path: Path, text: str) -> int:
             with contextlib.redirect_stdout(out):
                 exec(compile("\n" * (block.line - 1) + block.code, str(path), "exec"), names)
             printed = out.getvalue()
+        elif block.language == "toml" and (name := re.match(r"# (\w+\.toml)\n", block.code)):
+            Path(name[1]).write_text(block.code, encoding="utf-8")
         elif block.language == "sh" and "run" in matter(text).get("commands", ""):
             printed = "".join(_output(command) for command in commands(block.code))
         elif block.language == "text" and block.follows:

@@ -10,6 +10,7 @@ from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Scan, scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -55,7 +56,14 @@ def predicted(cell: LoadCell = CELL, *, chains: int = 4, draws: int = 250, seed:
         }
     )
     kept = {name: value for name, value in record.attrs.items() if name.startswith(("rod_", "load_cell_"))}
-    tree.attrs = {"units": "dimensionless", "family": "parabola", "converged": 1, "message": "converged", **kept}
+    tree.attrs = {
+        "units": "dimensionless",
+        "family": "parabola",
+        "known": "{}",
+        "converged": 1,
+        "message": "converged",
+        **kept,
+    }
     return tree
 
 
@@ -63,7 +71,7 @@ def predicted(cell: LoadCell = CELL, *, chains: int = 4, draws: int = 250, seed:
 def taken_for_a_parabola(profile: str) -> xr.DataTree:
     """The parabola's posterior, of few steps, of a record of one of the paper's profiles; not to be changed."""
     measured = CELL.measure(scan(paper_profile(profile, q=0.5), drive_step=0.1).record, seed=1)
-    return infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=SHORT)
+    return infer_contour(measured, rig=Rig(load_cell=CELL, unknown="nothing"), seed=1, settings=SHORT)
 
 
 def with_readings(tree: xr.DataTree, **readings: np.ndarray) -> xr.DataTree:

@@ -9,14 +9,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 import tactile_bayes as tb
 from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, swept
 from tactile_bayes.diagnostics.inspection import Inspection
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.mechanics import elastica
+from tactile_bayes.rig import Rig
+from tactile_bayes.rig.file_format import FileFormat
 
 PARABOLA = tb.contours.Parabola(0.5, 0.5)
+STATED = Rig(load_cell=CELL, unknown="nothing")
 ROD = tb.Rod.circular(0.1, 1e-3, 1e9)
 SI_CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.002)
 CARRIED = tb.Translation(base=(0.9, 0.0), heading=np.pi, drive_angle=1.5, travel=1.8)
@@ -86,12 +90,12 @@ def posterior() -> xr.DataTree:
 
 @functools.cache
 def contacts_drawn() -> xr.DataTree:
-    return tb.infer_contacts(measured(), load_cell=CELL, seed=1, draws=40, method="importance")
+    return tb.infer_contacts(measured(), rig=Rig(load_cell=CELL), seed=1, draws=40, method="importance")
 
 
 @functools.cache
 def contacts() -> xr.Dataset:
-    return tb.reconstruct(measured(), method="constrained", load_cell=CELL)
+    return tb.reconstruct(measured(), method="constrained", rig=Rig(load_cell=CELL))
 
 
 @functools.cache
@@ -111,18 +115,18 @@ def gap() -> xr.Dataset:
 
 @functools.cache
 def plan() -> tb.Plan:
-    return tb.Plan(PARABOLA, load_cell=CELL, drive_step=0.1, nuisances=[])
+    return tb.Plan(PARABOLA, rig=STATED, drive_step=0.1)
 
 
 @functools.cache
 def plan_si() -> tb.Plan:
     contour = tb.contours.Parabola(5.0, 0.05)
-    return tb.Plan(contour, load_cell=SI_CELL, rod=ROD, drive_step=0.1, nuisances=[])
+    return tb.Plan(contour, rig=Rig(rod=ROD, load_cell=SI_CELL, unknown="nothing"), drive_step=0.1)
 
 
 @functools.cache
 def sensitivity() -> xr.DataTree:
-    return tb.sensitivity(PARABOLA, seed=1, load_cell=CELL, drive_step=0.1, nuisances=[], samples=8)
+    return tb.sensitivity(PARABOLA, seed=1, rig=STATED, drive_step=0.1, samples=8)
 
 
 @functools.cache
@@ -132,8 +136,8 @@ def designed() -> xr.Dataset:
 
 @functools.cache
 def mapped() -> xr.Dataset:
-    options = {"noise_factors": [0.1, 1.0], "replicates": 1, "drive_step": 0.1, "nuisances": []}
-    return tb.error_map(["II"], load_cell=CELL, seed=1, workers=1, **options)
+    options = {"noise_factors": [0.1, 1.0], "replicates": 1, "drive_step": 0.1}
+    return tb.error_map(["II"], rig=STATED, seed=1, workers=1, **options)
 
 
 @functools.cache
@@ -144,25 +148,25 @@ def rods_required() -> xr.Dataset:
 
 @functools.cache
 def inspected() -> Inspection:
-    return tb.inspect_record(measured(), load_cell=CELL)
+    return tb.inspect_record(measured(), rig=Rig(load_cell=CELL))
 
 
 @functools.cache
 def stream() -> tb.Stream:
     """A stream before its first update."""
-    return tb.Stream(load_cell=CELL, nuisances=[], seed=1, particles=100)
+    return tb.Stream(rig=STATED, seed=1, particles=100)
 
 
 @functools.cache
 def updated() -> tb.Stream:
-    made = tb.Stream(load_cell=CELL, nuisances=[], seed=1, particles=100)
+    made = tb.Stream(rig=STATED, seed=1, particles=100)
     made.update(measured().isel(sample=slice(0, 10)))
     return made
 
 
 @functools.cache
 def streams() -> tb.StreamComparison:
-    made = tb.StreamComparison(families=["parabola", "circle"], load_cell=CELL, nuisances=[], seed=1, particles=100)
+    made = tb.StreamComparison(families=["parabola", "circle"], rig=STATED, seed=1, particles=100)
     made.update(measured().isel(sample=slice(0, 10)))
     return made
 
@@ -301,7 +305,7 @@ def _load_cell_calls() -> dict[str, Call]:
 
 def _rod_and_sweep_calls() -> dict[str, Call]:
     x = np.linspace(0.0, 0.1, 20)
-    scan = {"contour": PARABOLA, "base": (0.0, 0.0), "rod": None, "friction": 0.0}
+    scan = {"contour": PARABOLA, "base": (0.0, 0.0), "rig": None}
     shape = {"length": None, "diameter": 0.0, "taper": 0.0, "rigidity_profile": None, "stem": 0.0}
     motion = tb.Motion(x=[0.8, -0.7], y=0.0, drive_angle=[0.8, 1.6])
     return {
@@ -335,8 +339,7 @@ def _rod_and_sweep_calls() -> dict[str, Call]:
                 "drive_angles": DRIVE_ANGLES,
                 "direction": "forward",
                 "base": (0.0, 0.0),
-                "rod": None,
-                "friction": 0.0,
+                "rig": None,
             },
         ),
         "equilibria": Call(tb.equilibria, {**scan, "slope_angles": [0.1], "direction": "forward"}),
@@ -397,7 +400,7 @@ def _record_calls(folder: Path) -> dict[str, Call]:
         "in_frame": Call(tb.in_frame, {"record": measured(), "frame": "turning"}),
         "inspect_record": Call(
             tb.inspect_record,
-            {"record": measured(), "load_cell": CELL, "friction": 0.0, "false_alarm": 1e-3, "progress": None},
+            {"record": measured(), "rig": STATED, "false_alarm": 1e-3, "progress": None},
         ),
         "check_units_and_signs": Call(tb.check_units_and_signs, {"measured": measured(), "load_cell": CELL}),
         "read_result": Call(tb.read_result, {"path": posterior_file}),
@@ -426,29 +429,58 @@ def _data_set(folder: Path) -> Path:
 
 
 def _inference_calls(folder: Path) -> dict[str, Call]:
-    rig = {"load_cell": CELL, "seed": 1, "rod": None, "friction": None, "nuisances": [], "priors": None}
+    rig = {"rig": STATED, "seed": 1}
     sampled = {"settings": BRIEF, "progress": None}
-    stored = {**rig, **sampled, "checkpoint": None, "keep": None, "rig": None}
+    stored = {**rig, **sampled, "checkpoint": None, "keep": None}
     streamed = {**rig, "particles": 100, "x": [0.0, 0.1], "stop": None}
     file, both = folder / "stream.nc", folder / "streams.nc"
+    rig_file = folder / "rig.toml"
+    STATED.write(rig_file)
     updated().save(file)
     streams().save(both)
-    kept = {"load_cell": CELL, "nuisances": [], "seed": 1, "particles": 100}
+    kept = {**rig, "particles": 100}
+    broken = folder / "broken.csv"
+    broken.write_text("no record", encoding="utf-8")
     rest = measured().isel(sample=slice(10, 15))
     return {
         "infer_contour": Call(tb.infer_contour, {**stored, "measured": measured(), "family": "parabola"}),
-        "infer_rig": Call(tb.infer_rig, {**stored, "records": measured(), "contour": PARABOLA, "nuisances": ["bias"]}),
+        "infer_contours": Call(
+            tb.infer_contours,
+            {
+                **rig,
+                **sampled,
+                "records": [broken],
+                "out": folder / "many",
+                "family": "parabola",
+                "probability": 0.9,
+                "workers": 1,
+            },
+        ),
+        "calibrate_rig": Call(
+            tb.calibrate_rig,
+            {**stored, "rig": STATED.with_unknown(lever="default"), "records": measured(), "contour": PARABOLA},
+        ),
+        "Rig": Call(
+            tb.Rig,
+            {"rod": None, "load_cell": CELL, "unknown": {"lever": 0.0}, "calibration": None, "file": FileFormat()},
+        ),
+        "Rig.is_named": Call(STATED.is_named, {"name": "lever_x"}),
+        "Rig.of": Call(tb.Rig.of, {"posterior": posterior()}),
+        "Rig.read": Call(tb.Rig.read, {"path": rig_file}),
+        "Rig.with_unknown": Call(STATED.with_unknown, {"friction": 0.2}),
+        "Rig.write": Call(STATED.write, {"path": folder / "other.toml"}),
+        "Family": Call(functools.partial(tb.Family, "circle"), {"r": 0.2, "x_c": stats.norm(0.0, 0.1)}),
+        "Family.of": Call(tb.Family.of, {"posterior": posterior()}),
+        "Family.only": Call(tb.Family("circle").only, {"r": 0.2}),
         "infer_contacts": Call(
             tb.infer_contacts,
             {
                 "settings": None,
                 "progress": None,
                 "measured": measured(),
-                "load_cell": CELL,
+                "rig": STATED,
                 "prior": "flat",
                 "seed": 1,
-                "rod": None,
-                "friction": 0.0,
                 "draws": 40,
                 "method": "importance",
             },
@@ -468,17 +500,17 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
         "compare_families": Call(
             tb.compare_families,
             {
-                **rig,
                 **sampled,
                 "measured": measured(),
                 "families": ["parabola", "circle"],
+                "rig": STATED,
+                "seed": 1,
                 "false_alarm": 1e-3,
-                "rig": None,
             },
         ),
         "SamplerSettings": Call(tb.SamplerSettings, dict(vars(tb.SamplerSettings()))),
         "SamplerSettings.walkers_for": Call(tb.SamplerSettings().walkers_for, {"parameters": 4}),
-        "Stream": Call(tb.Stream, {**streamed, "family": "parabola", "rig": None}),
+        "Stream": Call(tb.Stream, {**streamed, "family": "parabola"}),
         "Stream.update": Call(stream().update, {"samples": rest}),
         "Stream.contour_draws": Call(updated().contour_draws, {"count": 10}),
         "Stream.save": Call(updated().save, {"path": folder / "other.nc"}),
@@ -500,10 +532,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
             {
                 "measured": measured(),
                 "method": "constrained",
-                "load_cell": CELL,
-                "rod": None,
-                "friction": 0.0,
-                "suspension_compliance": 0.0,
+                "rig": STATED,
             },
         ),
     }
@@ -528,7 +557,8 @@ def _summary_calls() -> dict[str, Call]:
                 "replicates": 0,
                 "assumptions": False,
                 "probability": None,
-                "priors": None,
+                "family": None,
+                "rig": None,
                 "seed": 1,
                 "out": None,
                 "workers": 1,
@@ -540,14 +570,15 @@ def _summary_calls() -> dict[str, Call]:
 
 
 def _planning_calls() -> dict[str, Call]:
-    rig = {"load_cell": CELL, "rod": None, "friction": None, "nuisances": [], "priors": None}
+    rig = {"rig": STATED, "family": None}
     sweep = {"drive": None, "base": (0.0, 0.0), "direction": "both", "drive_step": 0.1, "drive_angles": None}
     tasks = {"out": None, "workers": 1, "scheduler": None, "progress": None}
     made = updated().posterior()
-    sampled = {"seed": 1, "family": "parabola", "settings": None, "probability": 0.9, "world": None}
-    calibration = {**rig, **sampled, "drive": None, "base": (0.0, 0.0), "direction": "both", "drive_angles": None}
+    sampled = {"seed": 1, "family": "parabola", "settings": None, "probability": 0.9}
+    driven = {"drive": None, "base": (0.0, 0.0), "direction": "both", "drive_angles": None}
+    calibration = {"rig": STATED, **sampled, **driven, "truth": None, "misspecification": None}
     return {
-        "Plan": Call(tb.Plan, {**rig, **sweep, "contour": PARABOLA, "priors": {}}),
+        "Plan": Call(tb.Plan, {**rig, **sweep, "contour": PARABOLA}),
         "Plan.reconstruct": Call(plan().reconstruct, {"record": measured(), "method": "raw"}),
         "Plan.with_noise": Call(plan().with_noise, {"factor": 2.0}),
         "Plan.certain": Call(plan().certain, {"record": ideal()}),
@@ -578,11 +609,7 @@ def _planning_calls() -> dict[str, Call]:
                 "draws": 2,
                 "span": None,
                 "probability": 0.9,
-                "load_cell": None,
-                "rod": None,
-                "friction": None,
-                "nuisances": [],
-                "priors": None,
+                "rig": None,
             },
         ),
         "error_map": Call(
@@ -632,7 +659,7 @@ def _planning_calls() -> dict[str, Call]:
         "calibrate": Call(tb.calibrate, {**calibration, **tasks, "replicates": 1}),
         "calibration_replicate": Call(tb.calibration_replicate, {**calibration, "number": 0, "out": None}),
         "Misspecification": Call(
-            tb.Misspecification, {**vars(tb.Misspecification()), "flat_spot": (0.1, 2.0), "load_cell": CELL}
+            tb.Misspecification, {"base_shift": (0.0, 0.0), "flat_spot": (0.1, 2.0), "family": "circle"}
         ),
     }
 

@@ -11,6 +11,7 @@ import xarray as xr
 
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.record import read_record, write_record
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs import contour as run
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import scan
@@ -38,7 +39,7 @@ def analysed_quickly(record: xr.Dataset, folder, **options) -> run.Run:
 
 def coarse_record(step: float = float(np.radians(6.0)), **options) -> xr.Dataset:
     """The demonstration's record, in few samples, as it is measured."""
-    record = LOAD_CELL.measure(scan(CONTOUR, rod=ROD, drive_step=step, **options).record, seed=1)
+    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=step, **options).record, seed=1)
     return record.drop_vars([name for name in record.data_vars if str(name).startswith("truth_")])
 
 
@@ -72,7 +73,7 @@ def hostile_run(parent):
     analysed_quickly(
         read_record(path),
         folder,
-        nuisances=[],
+        rig=Rig(unknown="nothing"),
         record_file=path,
         command=["tactile-bayes", "infer", FILE, "--out", ENTRY],
     )

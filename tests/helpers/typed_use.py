@@ -8,13 +8,15 @@ from matplotlib.axes import Axes
 from scipy import stats
 
 import tactile_bayes as tb
+from tactile_bayes.inference.family import Family
+from tactile_bayes.rig import Rig
 
 
 def contour_of(record: xr.Dataset) -> tuple[xr.DataTree, xr.Dataset, xr.Dataset]:
     cell: tb.LoadCell = tb.LoadCell.from_zero_load(record)
-    contacts: xr.Dataset = tb.reconstruct(record, method="constrained", load_cell=cell)
+    contacts: xr.Dataset = tb.reconstruct(record, Rig(load_cell=cell), method="constrained")
     posterior: xr.DataTree = tb.infer_contour(
-        record, family="parabola", load_cell=cell, priors={"q": stats.uniform(0.3, 0.4)}, seed=1
+        record, family=Family("parabola", q=stats.uniform(0.3, 0.4)), rig=Rig(load_cell=cell), seed=1
     )
     band: xr.Dataset = tb.contour_band(posterior, x=[-0.5, 0.0, 0.5], probability=0.95)
     return posterior, contacts, band
@@ -22,7 +24,7 @@ def contour_of(record: xr.Dataset) -> tuple[xr.DataTree, xr.Dataset, xr.Dataset]
 
 def simulated(rod: tb.Rod | None = None) -> xr.Dataset:
     contour: tb.contours.Contour = tb.contours.Parabola(a=0.5, q=0.5)
-    scan = tb.scan(contour, base=[(0.0, 0.0), (0.25, 0.0)], drive_step=float(np.radians(2.0)), rod=rod)
+    scan = tb.scan(contour, Rig(rod=rod), base=[(0.0, 0.0), (0.25, 0.0)], drive_step=float(np.radians(2.0)))
     angle: float = scan.sweeps[0].snap_off.drive_angle
     record: xr.Dataset = scan.record
     return tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(record.where(record.drive_angle < angle), seed=1)

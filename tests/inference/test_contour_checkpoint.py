@@ -53,8 +53,9 @@ def test_a_run_out_of_time_goes_on_from_the_same_start(tmp_path):
     [
         ({"seed": 2}, "seed of the ensembles"),
         ({"family": "circle"}, "family"),
-        ({"events": False}, "events"),
-        ({"nuisances": ["rigidity_scale"]}, "nuisances"),
+        ({"settings": replace(SHORT, events=False)}, "events"),
+        ({"unknown": {"rigidity_scale": "default"}}, "nuisances"),
+        ({"unknown": {"friction": 0.2}}, "friction"),
         ({"load_cell": replace(CELL, force_noise=0.06)}, "load_cell_force_noise"),
         ({"settings": replace(SHORT, walkers=14)}, "walkers of an ensemble"),
     ],

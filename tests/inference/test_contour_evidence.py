@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from helpers.contour_posteriors import CELL, swept
+from helpers.contour_posteriors import CELL, only, swept
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, contour_evidence
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.family import Family
+from tactile_bayes.rig import Rig
 
 NARROW = {
     "parabola": {"a": stats.lognorm(s=0.02, scale=0.5), "q": stats.norm(0.5, 0.0015), "x_c": stats.norm(0.0, 0.005)},
@@ -22,8 +24,8 @@ SETTINGS = SamplerSettings(ensembles=2, min_ess=400, max_r_hat=1.03)
 
 def problem_of(family, truth, noise=1.0):
     measured = CELL.measure(swept(TRUTHS[truth], step=0.15), seed=4)
-    priors = NARROW[family] | {"noise_scale": stats.lognorm(s=0.1, scale=noise)}
-    return contour_problem(Experiment(measured, family, CELL, priors, friction=0.0, nuisances=()))
+    rig = Rig(load_cell=CELL, unknown=only(noise_scale=stats.lognorm(s=0.1, scale=noise)))
+    return contour_problem(Experiment(measured, rig, Family(family, **NARROW[family])))
 
 
 @pytest.mark.slow

@@ -8,10 +8,13 @@ import pytest
 from scipy import stats
 
 from tactile_bayes.contours import Parabola
+from tactile_bayes.distributions import in_words
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
+from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -22,16 +25,8 @@ RECORD = scan(Parabola(0.5, q=0.5), drive_step=0.1).record
     ("wrong", "message"),
     [
         ({"family": "cube"}, "there is no family 'cube'"),
-        ({"load_cell": 0.05}, r"load_cell is 0.05: give LoadCell\("),
-        ({"rod": 0.2}, "the rod is 0.2: give a Rod"),
-        ({"priors": None}, "priors is None: give distributions by name"),
-        ({"priors": {1: stats.norm()}}, "priors is .*: give distributions by name"),
-        ({"priors": {"a": stats.norm}}, "the prior of a is .*: give a frozen distribution"),
-        ({"priors": {"b": stats.norm()}}, "a prior of b, which is no parameter: there are a, q, x_c, .*moment_gain"),
-        ({"friction": -0.1}, "friction is -0.1: give a coefficient from 0 to"),
-        ({"friction": 0.1, "nuisances": ["friction"]}, "to be inferred as well: leave one of the two"),
-        ({"nuisances": "bias"}, r"nuisances is 'bias': give a list of names, like \['bias'\]"),
-        ({"nuisances": ["rust"]}, "there is no nuisance parameter 'rust'"),
+        ({"rig": 0.05}, r"rig is 0.05: give Rig\("),
+        ({"rig": None}, r"rig is None: give Rig\("),
         ({"events": 1}, "events is 1: give True or False"),
     ],
 )
@@ -46,7 +41,7 @@ def test_what_is_no_record_is_refused():
 
 
 def test_the_model_is_built_once_and_anew_of_another_record():
-    one = Experiment(RECORD, "circle", CELL, nuisances=["bias"])
+    one = Experiment(RECORD, Rig(load_cell=CELL, unknown={**NOTHING, "bias": "default"}), "circle")
     assert one.model is one.model
     other = replace(one, record=RECORD.isel(sample=slice(0, 20)))
     assert other.model is not one.model
@@ -56,14 +51,16 @@ def test_the_model_is_built_once_and_anew_of_another_record():
 
 def test_priors_of_its_own_take_the_place_of_default_ones():
     own = {"q": stats.norm(0.5, 0.1), "friction": stats.halfnorm(scale=0.1)}
-    experiment = Experiment(RECORD, load_cell=CELL, priors=own, nuisances=[])
+    rig = Rig(load_cell=CELL, unknown={**NOTHING, "friction": own["friction"]})
+    experiment = Experiment(RECORD, rig, Family("parabola", q=own["q"]))
     assert experiment.model.names == ("a", "q", "x_c", "friction", "noise_scale")
     assert {name: experiment.model.priors[name] for name in own} == own
-    assert experiment.model.priors["a"] is experiment.default_priors["a"]
+    usual = Experiment(RECORD, rig).priors
+    assert in_words(experiment.model.priors["a"]) == in_words(usual["a"])
 
 
 def test_the_model_does_not_travel_and_is_the_same_there():
-    here = Experiment(RECORD, load_cell=CELL, nuisances=[])
+    here = Experiment(RECORD, rig=Rig(load_cell=CELL, unknown="nothing"))
     point = np.array([[0.5, 0.5, 0.0, 1.0]])
     density = here.model.log_probability(point)
     there = copy.deepcopy(here)  # of what __getstate__ returns, as on the way to another process
@@ -74,9 +71,9 @@ def test_the_model_does_not_travel_and_is_the_same_there():
 def test_a_rod_takes_the_place_of_that_of_the_record():
     rod = Rod(length=0.1, flexural_rigidity=1e-5)
     cell = usual_load_cell(rod)
-    record = scan(Parabola(5.0, q=0.05), drive_step=0.1, rod=rod).record
+    record = scan(Parabola(5.0, q=0.05), drive_step=0.1, rig=Rig(rod=rod)).record
     stiffer = replace(rod, flexural_rigidity=2e-5)
-    experiment = Experiment(record, load_cell=cell, rod=stiffer, nuisances=[])
+    experiment = Experiment(record, rig=Rig(rod=stiffer, load_cell=cell, unknown="nothing"))
     assert experiment.model.likelihood.rod == stiffer
     assert experiment.about["rod_flexural_rigidity"] == 2e-5
-    assert Experiment(record, load_cell=cell, nuisances=[]).about["rod_flexural_rigidity"] == 1e-5
+    assert Experiment(record, rig=Rig(load_cell=cell, unknown="nothing")).about["rod_flexural_rigidity"] == 1e-5

@@ -9,7 +9,9 @@ import xarray as xr
 
 import tactile_bayes as tb
 from tactile_bayes.inference.found_rig import contact_points, found_rig
+from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, to_dimensionless, with_rod
+from tactile_bayes.rig import Rig
 
 CONTOUR = tb.contours.Parabola(0.5, q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -38,14 +40,16 @@ def posterior_of(**values):
     """Draws whose medians are these."""
     draws = {name: (("chain", "draw"), value + np.array([[-1e-3, 0.0, 1e-3]])) for name, value in values.items()}
     tree = xr.DataTree.from_dict({"posterior": xr.Dataset(draws)})
-    tree.attrs |= {"nuisances": json.dumps(list(values)), "friction": 0.0, "family": "parabola"}
+    tree.attrs |= {"nuisances": json.dumps(list(values)), "known": "{}", "family": "parabola"}
     return tree
 
 
 @cache
 def swept(friction):
     """Loads without any other fault, and where the rod really touches."""
-    return tb.scan(CONTOUR, base=[(0.0, 0.0), (0.25, 0.0)], drive_step=np.radians(8.0), friction=friction).record
+    return tb.scan(
+        CONTOUR, base=[(0.0, 0.0), (0.25, 0.0)], drive_step=np.radians(8.0), rig=Rig(unknown={"friction": friction})
+    ).record
 
 
 def read_with(faults, *, stated=None, frame="fixed"):
@@ -79,13 +83,14 @@ def read_with(faults, *, stated=None, frame="fixed"):
 
 def off(read, truth, cell, posterior):
     """How far contacts of the loaded samples are off, and how much is left over."""
-    rig = found_rig(read, cell, posterior)
+    rig = found_rig(read, posterior, cell)
     contacts = tb.reconstruct(
         rig.record,
         method="constrained",
-        load_cell=rig.load_cell,
-        friction=rig.friction,
-        suspension_compliance=rig.suspension_compliance,
+        rig=Rig(
+            load_cell=rig.load_cell,
+            unknown={"friction": rig.friction, "suspension_compliance": rig.suspension_compliance},
+        ),
     )
     loaded = np.hypot(truth.force_x, truth.force_y).values > 0.6
     x, y = (contacts[f"contact_{axis}"] - truth[f"truth_contact_{axis}"] for axis in "xy")
@@ -136,12 +141,12 @@ def test_the_length_of_the_rod_is_found(bent, units):
     """It keeps its proportions; a record in lengths of the stated rod has another rod's then."""
     stated = tb.Rod(1.0, 2.0, rest_curvature=bent)
     longer = stated.reshaped(stated.mean_rest_curvature / 1.03, 0.0, length=1.03)
-    truth = tb.scan(CONTOUR, rod=longer, drive_step=np.radians(8.0)).record
+    truth = tb.scan(CONTOUR, rig=Rig(rod=longer), drive_step=np.radians(8.0)).record
     read = truth.drop_vars([name for name in truth.data_vars if str(name).startswith("truth_")])
     read, cell = with_rod(read, stated), tb.LoadCell(force_noise=0.05, moment_noise=0.02)
     if units == "dimensionless":
         read, cell = to_dimensionless(read), cell.dimensionless(stated)
-    contacts = found_rig(read, cell, posterior_of(length=1.03)).contacts()
+    contacts = contacts_of(found_rig(read, posterior_of(length=1.03), cell), "constrained")
     assert contacts.attrs["units"] == units
     assert contacts.contact_x.attrs["units"] == {"SI": "m", "dimensionless": "1"}[units]
     distance, misfit = off(read, truth, cell, posterior_of(length=1.03))
@@ -171,7 +176,7 @@ def test_they_come_on_top_of_what_the_load_cell_states():
 
 def test_what_was_not_inferred_stays_as_stated():
     read, _ = read_with({})
-    rig = found_rig(read, CELL, posterior_of(noise_scale=1.3))
+    rig = found_rig(read, posterior_of(noise_scale=1.3), CELL)
     assert rig.record.identical(read)
     assert rig.load_cell == CELL
     assert (rig.friction, rig.suspension_compliance) == (0.0, 0.0)
@@ -179,7 +184,7 @@ def test_what_was_not_inferred_stays_as_stated():
 
 def test_noise_that_was_inferred_is_the_load_cells():
     read, _ = read_with({})
-    cell = found_rig(read, None, posterior_of(moment_noise=0.03, force_noise=0.06)).load_cell
+    cell = found_rig(read, posterior_of(moment_noise=0.03, force_noise=0.06)).load_cell
     assert (cell.moment_noise, cell.force_noise) == (0.03, 0.06)
 
 
@@ -189,8 +194,8 @@ def test_a_stiffer_rod_that_was_inferred_raises_no_alarm():
     read, _ = read_with({"rigidity_scale": 1.05})
     measured = CELL.measure(read, seed=1)
     settings = tb.SamplerSettings(ensembles=2, walkers=26, max_r_hat=1.1, min_ess=100.0, max_steps=400)
-    posterior = tb.infer_contour(measured, load_cell=CELL, seed=1, settings=settings)
-    assert tb.reconstruct(measured, method="constrained", load_cell=CELL).attrs["misfit_probability"] < 1e-6
-    contacts = contact_points(measured, CELL, posterior)
+    posterior = tb.infer_contour(measured, rig=Rig(load_cell=CELL), seed=1, settings=settings)
+    assert tb.reconstruct(measured, method="constrained", rig=Rig(load_cell=CELL)).attrs["misfit_probability"] < 1e-6
+    contacts = contact_points(measured, posterior, CELL)
     assert contacts.attrs["misfit_probability"] > 1e-3
     assert tb.verdicts(posterior, contacts)[0].startswith("All is well")

@@ -13,7 +13,7 @@ EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_complianc
 
 
 def suggested(nuisances, **stated):
-    found = re.search(r"--nuisance ([^)]*)\)", what_to_try(["parabola"], nuisances, **stated))
+    found = re.search(r"under \[unknown\] of rig\.toml: ([^)]*)\)", what_to_try(["parabola"], nuisances, **stated))
     return found[1].split(", ") if found else []
 
 

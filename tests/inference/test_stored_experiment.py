@@ -2,14 +2,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, measured, posterior
-from tactile_bayes.errors import InferenceError
+from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, measured, only, posterior
+from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.stored_experiment import experiment_of, points_of
+from tactile_bayes.rig import NOTHING, Rig
 
 
-def assert_same_density(tree, priors=None):
-    model = experiment_of(tree, priors).model
+def assert_same_density(tree, **given):
+    model = experiment_of(tree, **given).model
     points = points_of(tree, model.names)
     stored = tree["sample_stats"]["lp"].values
     assert model.log_probability(points.reshape(-1, points.shape[-1])) == pytest.approx(stored.ravel(), abs=1e-9)
@@ -24,30 +27,45 @@ def test_also_with_nuisances_a_rod_in_metres_and_unknown_noise():
     from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
     from tactile_bayes.sweep import scan
 
-    record = LOAD_CELL.measure(scan(CONTOUR, rod=ROD, drive_step=0.1).record, seed=1)
-    assert_same_density(infer_contour(record, seed=1, nuisances=["bias", "friction"], settings=BRIEF))
+    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.1).record, seed=1)
+    assert_same_density(
+        infer_contour(
+            record, seed=1, rig=Rig(unknown={**NOTHING, "bias": "default", "friction": "default"}), settings=BRIEF
+        )
+    )
     record.attrs = {name: value for name, value in record.attrs.items() if not name.startswith("load_cell_")}
-    assert_same_density(infer_contour(record, seed=1, nuisances=[], settings=BRIEF))
+    assert_same_density(infer_contour(record, seed=1, rig=Rig(unknown="nothing"), settings=BRIEF))
 
 
-def test_priors_follow_from_their_text():
-    priors = {"q": stats.uniform(0.4, 0.2), "a": stats.lognorm(s=0.5, scale=0.7)}
-    assert_same_density(infer_as_stated(measured(), load_cell=CELL, priors=priors, seed=1, settings=BRIEF))
+def test_priors_and_known_numbers_follow_from_the_tree():
+    family = Family("parabola", q=stats.uniform(0.4, 0.2), a=stats.lognorm(s=0.5, scale=0.7), x_c=0.01)
+    unknown = {"noise_scale": stats.lognorm(s=1 / 3), "suspension_compliance": 0.01}
+    tree = infer_as_stated(measured(), family=family, load_cell=CELL, unknown=unknown, seed=1, settings=BRIEF)
+    assert_same_density(tree)
+    assert experiment_of(tree).own_family == family
 
 
 def test_priors_that_are_no_text_must_be_given_and_be_the_same():
-    edges = np.linspace(0.3, 0.7, 5)
-    priors = {"q": stats.rv_histogram((np.ones(4), edges))()}
-    tree = infer_as_stated(measured(), load_cell=CELL, priors=priors, seed=1, settings=BRIEF)
-    with pytest.raises(InferenceError, match="give priors="):
-        experiment_of(tree)
-    assert_same_density(tree, priors)
-    with pytest.raises(InferenceError, match="the prior of q was histogram"):
-        experiment_of(tree, {"q": stats.uniform(0.3, 0.4)})
+    own = stats.rv_histogram((np.ones(4), np.linspace(0.3, 0.7, 5)))()
+    rubbing = stats.rv_histogram((np.ones(4), np.linspace(0.0, 0.4, 5)))()
+    family, rig = Family("parabola", q=own), Rig(load_cell=CELL, unknown=only(friction=rubbing))
+    of_family = infer_as_stated(measured(), family=family, load_cell=CELL, seed=1, settings=BRIEF)
+    with pytest.raises(ParameterError, match="does not state its family"):
+        experiment_of(of_family)
+    assert_same_density(of_family, family=family)
+    with pytest.raises(ParameterError, match="the prior of q was histogram"):
+        experiment_of(of_family, family=Family("parabola", q=stats.uniform(0.3, 0.4)))
+    of_rig = infer_contour(measured(), rig=rig, seed=1, settings=BRIEF)
+    with pytest.raises(ParameterError, match="does not state its rig"):
+        experiment_of(of_rig)
+    assert_same_density(of_rig, rig=rig)
+    assert verdicts(of_family)
+    assert verdicts(of_rig)
 
 
-def test_a_tree_without_priors_is_refused():
+@pytest.mark.parametrize("name", ["rig", "family_parameters"])
+def test_a_tree_that_does_not_state_what_it_assumes_is_refused(name):
     tree = posterior().copy()
-    tree.attrs = {name: value for name, value in tree.attrs.items() if name != "priors"}
-    with pytest.raises(InferenceError, match="does not state its priors"):
+    tree.attrs = {each: value for each, value in tree.attrs.items() if each != name}
+    with pytest.raises(ParameterError, match="does not state"):
         experiment_of(tree)

@@ -13,6 +13,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, frame_of, in_frame, present_channels, to_dimensionless, to_si
+from tactile_bayes.rig import Rig
 
 # --- The cell itself --------------------------------------------------------------------------------------------
 
@@ -217,7 +218,7 @@ def test_an_encoder_that_shows_no_sweep_is_refused():
 @pytest.mark.parametrize("frame", ["fixed", "turning"])
 def test_a_cell_beside_the_pivot_takes_the_moment_of_the_contact_force_there(frame, rod):
     """By equilibrium of the rod between the contact and the lever's end."""
-    record = scan(Parabola(0.5 / rod.length, 0.5 * rod.length), drive_step=0.1, rod=rod).record
+    record = scan(Parabola(0.5 / rod.length, 0.5 * rod.length), drive_step=0.1, rig=Rig(rod=rod)).record
     lever = np.array([0.03, -0.02]) * rod.length
     measured = LoadCell(lever=tuple(lever), frame=frame).measure(record, seed=1)
     cos, sin = np.cos(record.drive_angle.values), np.sin(record.drive_angle.values)
@@ -241,14 +242,14 @@ def test_step_2_of_a_record_with_known_errors_is_that_of_the_ideal_one(frame, ro
     clean = reconstruct(record)
     measured = sheet.measure(record, seed=1)
     for given in (None, sheet):
-        contacts = reconstruct(measured, load_cell=given)
+        contacts = reconstruct(measured, rig=Rig(load_cell=given))
         # A sample whose load is rounding has no contact to speak of.
         firm = np.abs(record.holding_moment.values) > 1e-6 * unit[0]
         np.testing.assert_array_equal(contacts.status[firm], clean.status[firm])
         for name in ("contact_x", "contact_y", "contact_arclength"):
             np.testing.assert_allclose(contacts[name][firm], clean[name][firm], rtol=0, atol=1e-7 * length)
         np.testing.assert_allclose(contacts.drive_angle, record.drive_angle, rtol=1e-15)
-    wrong = reconstruct(measured, load_cell=LoadCell(frame=frame))
+    wrong = reconstruct(measured, rig=Rig(load_cell=LoadCell(frame=frame)))
     assert np.abs(wrong.contact_y - clean.contact_y).max() > 1e-3 * length
 
 

@@ -13,6 +13,7 @@ from helpers.integration import shoot
 from helpers.second_variation import Held, eigenvalues, held
 from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import equilibria, scan
 
 EIGENVALUE = 1e-7
@@ -179,9 +180,9 @@ def test_curved_and_tapered_rods_are_stable_up_to_their_snap_off(name, q):
         return eigenvalues(held(contour, state, **along), terms=40)[:2]
 
     def eigenvalue(alpha):
-        return of_state(equilibria(contour, [alpha], rod=rod).isel(slope_angle=0))[0]
+        return of_state(equilibria(contour, [alpha], rig=Rig(rod=rod)).isel(slope_angle=0))[0]
 
-    swept = scan(contour, direction="forward", rod=rod, drive_step=0.02)
+    swept = scan(contour, direction="forward", rig=Rig(rod=rod), drive_step=0.02)
     record, last = swept.record, swept.events["forward"].snap_off
     names = ("slope_angle", "contact_phase", "contact_arclength")
     record = record.rename({f"truth_{name}": name for name in names})

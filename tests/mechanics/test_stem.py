@@ -21,6 +21,7 @@ from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.rods.along import Along
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
 
 STEM = 0.15
 CIRCLE = tb.contours.Circle(0.3, 0.6)
@@ -95,14 +96,19 @@ def test_a_stiff_first_piece_is_a_stem(curvature, drive):
     )
     own = Rod(rest_curvature=curvature, stem=STEM)
     options = {"direction": "forward"} if drive is None else {"drive": drive}
-    one, other = (tb.scan(CIRCLE, rod=rod, friction=0.1, drive_step=0.02, **options) for rod in (own, long))
+    one, other = (
+        tb.scan(CIRCLE, rig=Rig(rod=rod, unknown={"friction": 0.1}), drive_step=0.02, **options) for rod in (own, long)
+    )
     for name in ("first_contact", "snap_off"):
         found, expected = (getattr(scan.sweeps[0], name) for scan in (one, other))
         assert found.drive_angle == pytest.approx(expected.drive_angle, abs=1e-5)
         assert (found.base_x, found.contact_x) == pytest.approx((expected.base_x, expected.contact_x), abs=1e-4)
     if drive is None:
         angles = np.linspace(1.0, 2.4, 80)
-        one, other = (tb.scan(CIRCLE, rod=rod, friction=0.1, drive_angles=angles, **options) for rod in (own, long))
+        one, other = (
+            tb.scan(CIRCLE, rig=Rig(rod=rod, unknown={"friction": 0.1}), drive_angles=angles, **options)
+            for rod in (own, long)
+        )
     for name in ("holding_moment", "force_x", "force_y"):
         assert np.abs(one.record[name]).max() > 0.1
         np.testing.assert_allclose(one.record[name], other.record[name], atol=1e-4)
@@ -112,7 +118,12 @@ def test_a_stiff_first_piece_is_a_stem(curvature, drive):
 def test_a_stem_that_vanishes_is_none(name):
     rod = RODS[name]
     short, without = (
-        tb.scan(CIRCLE, rod=tb.Rod(rest_curvature=rod.rest_curvature, taper=rod.taper, stem=stem), friction=0.1)
+        tb.scan(
+            CIRCLE,
+            rig=Rig(
+                rod=tb.Rod(rest_curvature=rod.rest_curvature, taper=rod.taper, stem=stem), unknown={"friction": 0.1}
+            ),
+        )
         for stem in (1e-7, 0.0)
     )
     assert short.sweeps[0].snap_off.drive_angle == pytest.approx(without.sweeps[0].snap_off.drive_angle, abs=1e-6)
@@ -121,7 +132,9 @@ def test_a_stem_that_vanishes_is_none(name):
 
 def test_backward_sweeps_are_mirror_images():
     forward, backward = (
-        tb.scan(CIRCLE, rod=tb.Rod(rest_curvature=bend, stem=STEM), direction=way, friction=0.1).sweeps[0]
+        tb.scan(
+            CIRCLE, rig=Rig(rod=tb.Rod(rest_curvature=bend, stem=STEM), unknown={"friction": 0.1}), direction=way
+        ).sweeps[0]
         for bend, way in ((0.4, "forward"), (-0.4, "backward"))
     )
     for name in ("first_contact", "snap_off"):
@@ -135,15 +148,17 @@ def test_equilibria_and_step_2_are_those_of_the_sweep(name):
     """Slope angles of a scan give its states again, and its loads its contacts, of either method and any side."""
     rod = RODS[name]
     for direction in ("forward", "backward"):
-        scan = tb.scan(CIRCLE, rod=rod, direction=direction, friction=0.1, drive_step=0.06)
+        scan = tb.scan(CIRCLE, rig=Rig(rod=rod, unknown={"friction": 0.1}), direction=direction, drive_step=0.06)
         record = scan.record.isel(sample=scan.record.truth_contact_phase.values != "none")
-        states = tb.equilibria(CIRCLE, record.truth_slope_angle, direction=direction, rod=rod, friction=0.1)
+        states = tb.equilibria(
+            CIRCLE, record.truth_slope_angle, direction=direction, rig=Rig(rod=rod, unknown={"friction": 0.1})
+        )
         assert np.mean(states.contact_phase.values == record.truth_contact_phase.values) > 0.9
         for column in ("drive_angle", "holding_moment", "force_x", "force_y"):
             np.testing.assert_allclose(states[column], record[column], atol=1e-7, err_msg=column)
         cell = tb.LoadCell(force_noise=1e-4, moment_noise=1e-4)
         for method in ("raw", "constrained"):
-            found = tb.reconstruct(record, method=method, load_cell=cell, friction=0.1)
+            found = tb.reconstruct(record, method=method, rig=Rig(load_cell=cell, unknown={"friction": 0.1}))
             good = np.isfinite(found.contact_x.values)
             assert good.sum() > 0.8 * good.size
             np.testing.assert_allclose(found.contact_x[good], record.truth_contact_x[good], atol=2e-4)
@@ -187,7 +202,7 @@ def test_derivatives_of_the_drive_angle_are_differences():
 @pytest.mark.parametrize("name", RODS)
 def test_the_drawn_rod_goes_from_the_pivot_to_its_contact(name):
     rod = RODS[name]
-    scan = tb.scan(CIRCLE, rod=rod, direction="backward", drive_step=0.1)
+    scan = tb.scan(CIRCLE, rig=Rig(rod=rod), direction="backward", drive_step=0.1)
     record = scan.record.isel(sample=scan.record.truth_contact_phase.values == "tip")
     loads = (record[n].values for n in ("drive_angle", "holding_moment", "force_x", "force_y"))
     x, y = rod_shape(*loads, side=-1.0, rods=rod.mirrored(-1.0))
@@ -201,8 +216,10 @@ def test_the_drawn_rod_goes_from_the_pivot_to_its_contact(name):
 def test_a_file_states_the_stem(tmp_path):
     rod = Rod(0.05, 1e-8, 2e-4, rest_curvature=lambda s: -200.0 * s, stem=4e-3)
     contour = tb.contours.Circle(0.015, 0.03)
-    si = tb.scan(contour, rod=rod, drive_step=0.1, direction="forward").record
-    own = tb.scan(tb.contours.Circle(0.3, 0.6), rod=rod.in_lengths(), drive_step=0.1, direction="forward").record
+    si = tb.scan(contour, rig=Rig(rod=rod), drive_step=0.1, direction="forward").record
+    own = tb.scan(
+        tb.contours.Circle(0.3, 0.6), rig=Rig(rod=rod.in_lengths()), drive_step=0.1, direction="forward"
+    ).record
     np.testing.assert_allclose(si.holding_moment, rod.moment_unit * own.holding_moment, atol=1e-9 * rod.moment_unit)
     assert si.attrs["rod_stem"] == 4e-3
     assert "rod_stem" not in tb.scan(CIRCLE, drive_step=0.1).record.attrs
@@ -215,9 +232,9 @@ def test_a_file_states_the_stem(tmp_path):
 
 def test_contact_on_the_stem_is_refused():
     with refused(ContourError, "0.17", "stem"):
-        tb.scan(tb.contours.Circle(0.3, 0.1), rod=Rod(stem=STEM))
+        tb.scan(tb.contours.Circle(0.3, 0.1), rig=Rig(rod=Rod(stem=STEM)))
     with refused(ReachError, "stem of 0.15"):
-        tb.scan(tb.contours.Circle(0.3, 1.2), rod=Rod(stem=STEM))
+        tb.scan(tb.contours.Circle(0.3, 1.2), rig=Rig(rod=Rod(stem=STEM)))
     for stem in (-0.1, 1.1, np.nan):
         with refused(ParameterError, "stem"):
             Rod(stem=stem)

@@ -13,6 +13,7 @@ from tactile_bayes.paper_figures import caption, draw_all, figure
 from tactile_bayes.plotting import PALETTE, style
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, travels_of
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Motion, Rotation, Translation, scan
 
 STEP = 0.05
@@ -180,7 +181,7 @@ def test_points_with_noise_are_those_of_step_two():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     ax = made(11, BACK, distances=[0.5], load_cell=cell, seed=3).axes[1]
     measured = cell.measure(swept("II", 0.5, BACK).record, seed=3)
-    contacts = reconstruct(measured, load_cell=cell)
+    contacts = reconstruct(measured, rig=Rig(load_cell=cell))
     found = np.isfinite(contacts.contact_x.values)
     (line,) = (each for each in ax.lines if each.get_marker() == "^" and len(each.get_xdata()))
     np.testing.assert_array_equal(line.get_xdata(), contacts.contact_x.values[found])

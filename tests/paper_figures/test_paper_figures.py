@@ -19,6 +19,7 @@ from tactile_bayes.paper_figures import NUMBERS, caption, draw_all, figure
 from tactile_bayes.plotting import PALETTE, style
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import equilibria, scan
 
 COARSE = np.radians(4.0)
@@ -290,7 +291,7 @@ def test_points_with_noise_are_those_of_step_two():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     ax = made(11, distances=[0.5], load_cell=cell, seed=3, drive_step=COARSER).axes[1]
     measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=COARSER).record, seed=3)
-    contacts = reconstruct(measured, load_cell=cell)
+    contacts = reconstruct(measured, rig=Rig(load_cell=cell))
     forward = (contacts.direction.values == "forward") & np.isfinite(contacts.contact_x.values)
     x, y = points_of(ax, "o")
     np.testing.assert_array_equal(x, contacts.contact_x.values[forward])

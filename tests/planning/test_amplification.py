@@ -11,6 +11,7 @@ from tactile_bayes.contours import paper_profile
 from tactile_bayes.planning.amplification import METHODS, SOURCES, amplification
 from tactile_bayes.planning.family_parameters import enlarged
 from tactile_bayes.planning.plan import Plan
+from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)
 
@@ -29,19 +30,23 @@ def in_units_of(cell, rod):
 
 
 PLANS = {
-    "plain": Plan(PROFILE, QUIET),
-    "a thick rod in SI": Plan(enlarged(PROFILE, 0.2), in_units_of(QUIET, THICK), THICK),
-    "a cell that turns": Plan(PROFILE, replace(QUIET, frame="turning", bias=(0.1, -0.1, 0.2))),
-    "cross-talk": Plan(PROFILE, replace(QUIET, gain=TALKING, drive_angle_offset=0.02)),
-    "correlated noise": Plan(PROFILE, replace(QUIET, correlation=(0.3, -0.2, 0.5))),
-    "an encoder with noise": Plan(PROFILE, replace(QUIET, drive_angle_noise=2e-6)),
+    "plain": Plan(PROFILE, Rig(load_cell=QUIET)),
+    "a thick rod in SI": Plan(enlarged(PROFILE, 0.2), Rig(load_cell=in_units_of(QUIET, THICK), rod=THICK)),
+    "a cell that turns": Plan(PROFILE, Rig(load_cell=replace(QUIET, frame="turning", bias=(0.1, -0.1, 0.2)))),
+    "cross-talk": Plan(PROFILE, Rig(load_cell=replace(QUIET, gain=TALKING, drive_angle_offset=0.02))),
+    "correlated noise": Plan(PROFILE, Rig(load_cell=replace(QUIET, correlation=(0.3, -0.2, 0.5)))),
+    "an encoder with noise": Plan(PROFILE, Rig(load_cell=replace(QUIET, drive_angle_noise=2e-6))),
     "all of it turning": Plan(
         enlarged(PROFILE, 0.2),
-        replace(in_units_of(QUIET, THICK), drive_angle_noise=2e-6, frame="turning", correlation=(0.1, 0.2, 0.5)),
-        THICK,
+        Rig(
+            load_cell=replace(
+                in_units_of(QUIET, THICK), drive_angle_noise=2e-6, frame="turning", correlation=(0.1, 0.2, 0.5)
+            ),
+            rod=THICK,
+        ),
     ),
-    "friction": Plan(PROFILE, replace(QUIET, drive_angle_noise=2e-6), friction=0.3),
-    "another pivot": Plan(paper_profile("III", q=0.4), QUIET, base=(0.2, -0.1)),
+    "friction": Plan(PROFILE, Rig(load_cell=replace(QUIET, drive_angle_noise=2e-6), unknown={"friction": 0.3})),
+    "another pivot": Plan(paper_profile("III", q=0.4), Rig(load_cell=QUIET), base=(0.2, -0.1)),
 }
 
 
@@ -70,7 +75,9 @@ def loaded(plan):
 
 
 def reconstructed(record, plan, method):
-    found = tb.reconstruct(record, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.taken_friction)
+    found = tb.reconstruct(
+        record, method=method, rig=Rig(rod=plan.rod, load_cell=plan.cell, unknown={"friction": plan.friction})
+    )
     return found.contact_x.values, found.contact_y.values
 
 
@@ -79,10 +86,10 @@ def differences(plan, method, source):
     record = loaded(plan)
     slope = record.truth_slope_angle.values
     cos, sin = np.cos(slope), np.sin(slope)
-    units = {"holding_moment": plan.taken_rod.moment_unit, "drive_angle": 1.0}
+    units = {"holding_moment": plan.rod.moment_unit, "drive_angle": 1.0}
     found = []
     for step in STEPS[method]:
-        step = step * units.get(source, plan.taken_rod.force_unit)
+        step = step * units.get(source, plan.rod.force_unit)
         x, y = (
             (more - less) / (2.0 * step)
             for more, less in zip(
@@ -114,7 +121,7 @@ def test_gains_are_differences_of_reconstruct(name, method):
         right = differences(plan, method, source)
         of = grown.sel(reconstruction=method, source=source)
         found = np.stack([of.gain_along.values, of.gain_across.values], axis=1)
-        scale = np.abs(right).max(axis=1, keepdims=True) + plan.taken_rod.length * 1e-2
+        scale = np.abs(right).max(axis=1, keepdims=True) + plan.rod.length * 1e-2
         np.testing.assert_array_less(np.abs(found - right) / scale, TOLERANCES[method])
 
 
@@ -153,7 +160,7 @@ def test_standard_deviations_are_those_that_reconstruct_states():
     plan, grown = in_the_middle("all of it turning")
     record = loaded(plan)
     for method in METHODS:
-        stated = tb.reconstruct(record, method=method, load_cell=plan.cell, rod=plan.rod)
+        stated = tb.reconstruct(record, method=method, rig=Rig(rod=plan.rod, load_cell=plan.cell))
         of = grown.sel(reconstruction=method)
         np.testing.assert_allclose(of.sd_along.values, stated.tangent_sd.values, rtol=1e-3)
         np.testing.assert_allclose(of.sd_across.values, stated.normal_sd.values, rtol=1e-3)
@@ -169,7 +176,7 @@ def test_the_constrained_estimate_is_never_worse_than_the_raw_one_across_nor_alo
 
 
 def test_both_directions_are_mirror_images():
-    grown = amplification(Plan(PROFILE, replace(QUIET, drive_angle_noise=1e-6)))
+    grown = amplification(Plan(PROFILE, Rig(load_cell=replace(QUIET, drive_angle_noise=1e-6))))
     forward, backward = (grown.isel(sample=np.flatnonzero(grown.sweep.values == sweep)) for sweep in (0, 1))
     np.testing.assert_allclose(np.pi - backward.drive_angle.values, forward.drive_angle.values, rtol=0.0, atol=1e-9)
     far = (forward.after_first_contact > 1e-3) & (forward.before_snap_off > 1e-3)
@@ -187,7 +194,9 @@ def test_a_rod_in_si_is_a_scaled_one():
     """Gains in m/(N m), m/N and m/rad."""
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     angles = in_the_middle("plain")[0].drive_angles
-    si = amplification(Plan(enlarged(PROFILE, 0.2), in_units_of(QUIET, rod), rod, drive_angles=angles))
+    si = amplification(
+        Plan(enlarged(PROFILE, 0.2), Rig(load_cell=in_units_of(QUIET, rod), rod=rod), drive_angles=angles)
+    )
     plain = in_the_middle("plain")[1]
     per = rod.length / np.array([*rod.load_units, 1.0])
     right = np.stack([plain[name].values * per for name in ("gain_along", "gain_across")])
@@ -230,7 +239,7 @@ def test_growth_is_what_single_samples_show():
 def test_deviations_are_in_proportion_to_noise_and_gains_are_not_touched_by_it():
     plan, grown = in_the_middle("an encoder with noise")
     cell = replace(plan.cell, drive_angle_noise=3.0 * plan.cell.drive_angle_noise)
-    louder = amplification(replace(plan, load_cell=cell).with_noise(3.0))
+    louder = amplification(replace(plan, rig=Rig(load_cell=cell)).with_noise(3.0))
     for name in ("sd_along", "sd_across"):
         np.testing.assert_allclose(louder[name].values, 3.0 * grown[name].values, rtol=1e-9)
     for name in ("gain_along", "gain_across"):

@@ -13,6 +13,7 @@ from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.candidate import Candidate
 from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
+from tactile_bayes.rig import Rig
 
 CIRCLE = tb.contours.Circle(0.3, 0.8)
 SHIFTS = [
@@ -24,7 +25,7 @@ CELL = tb.LoadCell(force_noise=0.005, moment_noise=0.002)
 
 def test_amplification_is_the_change_of_a_contact_by_a_reading():
     """Against finite differences of raw Step 2."""
-    plan = Plan(CIRCLE, CELL, drive=SHIFTS)
+    plan = Plan(CIRCLE, Rig(load_cell=CELL), drive=SHIFTS)
     found = amplification(plan)
     record = plan.scan.record
     loaded = np.flatnonzero(record.truth_contact_phase.values != "none")
@@ -42,7 +43,7 @@ def test_amplification_is_the_change_of_a_contact_by_a_reading():
 
 
 def test_distances_are_along_the_drive():
-    plan = Plan(CIRCLE, CELL, drive=SHIFTS[0], drive_step=0.05)
+    plan = Plan(CIRCLE, Rig(load_cell=CELL), drive=SHIFTS[0], drive_step=0.05)
     found, (sweep,) = amplification(plan), plan.scan.sweeps
     travel = 0.8 - found.base_x.values
     np.testing.assert_allclose(found.after_first_contact, travel - sweep.first_contact.travel, atol=1e-12)
@@ -50,11 +51,11 @@ def test_distances_are_along_the_drive():
 
 
 def test_noise_shares_are_of_either_kind_of_drive():
-    shares = noise_shares(Plan(CIRCLE, CELL, drive=SHIFTS), seed=1, samples=16, states=4)
+    shares = noise_shares(Plan(CIRCLE, Rig(load_cell=CELL), drive=SHIFTS), seed=1, samples=16, states=4)
     assert shares.sizes["sample"] == 8
     assert np.all(shares.after_first_contact >= 0.0)
     with refused(ParameterError, "noise_shares"):
-        noise_shares(Plan(CIRCLE, CELL, drive=[tb.Rotation(), SHIFTS[0]]), seed=1, samples=16, states=4)
+        noise_shares(Plan(CIRCLE, Rig(load_cell=CELL), drive=[tb.Rotation(), SHIFTS[0]]), seed=1, samples=16, states=4)
 
 
 @pytest.mark.parametrize("drive", [SHIFTS, [tb.Rotation(), SHIFTS[0]]])
@@ -69,16 +70,16 @@ def test_sensitivity_tells_what_a_band_would_be(drive):
 @pytest.mark.slow
 def test_drives_are_candidates_of_a_design():
     """Two translations tell more than one of them, and a pivot among drives is what it is among pivots."""
-    priors = {"r": stats.uniform(0.25, 0.1), "q": stats.uniform(0.75, 0.1), "x_c": stats.norm(0.0, 0.02)}
-    options = {"priors": priors, "draws": 4, "seed": 1, "span": (-0.2, 0.2)}
-    found = tb.design("circle", drives=[SHIFTS[0], SHIFTS, tb.Rotation()], **options)
+    known = tb.Family("circle", r=stats.uniform(0.25, 0.1), q=stats.uniform(0.75, 0.1), x_c=stats.norm(0.0, 0.02))
+    options = {"draws": 4, "seed": 1, "span": (-0.2, 0.2)}
+    found = tb.design(known, drives=[SHIFTS[0], SHIFTS, tb.Rotation()], **options)
     assert found.drive.values[0] == "carried from (0.8, 0) to (-0.8, 0) at 63°"
     assert found.width[1] < found.width[0]
     assert np.all(found.reached > 0.0)
-    pivot = tb.design("circle", bases=[(0.0, 0.0)], **options)
+    pivot = tb.design(known, bases=[(0.0, 0.0)], **options)
     assert float(pivot.width[0]) == pytest.approx(float(found.width[2]), rel=1e-12)
     with refused(ParameterError, "drive"):
-        tb.design("circle", drives=["left"], **options)
+        tb.design(known, drives=["left"], **options)
 
 
 @pytest.mark.slow
@@ -87,7 +88,7 @@ def test_a_posterior_of_a_carried_rod_is_what_is_known():
     measured = CELL.measure(tb.scan(CIRCLE, drive=SHIFTS[0], drive_step=0.04).record, seed=1)
     settings = tb.SamplerSettings(walkers=32, ensembles=2)
     posterior = tb.infer_contour(
-        measured, family="circle", load_cell=CELL, nuisances=[], friction=0.0, seed=1, settings=settings
+        measured, family="circle", rig=Rig(load_cell=CELL, unknown="nothing"), seed=1, settings=settings
     )
     found = tb.design(posterior, drives=[SHIFTS[1]], bases=[(0.0, 0.0)], draws=4, seed=1)
     assert found.sizes["pivot"] == 0

@@ -12,40 +12,43 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import Experiment, usual_load_cell
+from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.candidate import Candidate, Question, _band_widths, expected_of
 from tactile_bayes.planning.design import design
 from tactile_bayes.planning.information import information
-from tactile_bayes.planning.knowledge import COARSE, empty_record, known_from_posterior, known_from_prior
+from tactile_bayes.planning.knowledge import known_from_posterior, known_from_prior
 from tactile_bayes.planning.plan import Plan
+from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.sweep import Rotation, scan
 
-PRIORS = {"a": stats.lognorm(0.3, scale=0.6), "q": stats.uniform(0.4, 0.2), "x_c": stats.norm(0.0, 0.05)}
+FAMILY = Family("parabola", a=stats.lognorm(0.3, scale=0.6), q=stats.uniform(0.4, 0.2), x_c=stats.norm(0.0, 0.05))
+AS_STATED = Rig(unknown="nothing")
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 QUICK = SamplerSettings(ensembles=2, walkers=26, max_r_hat=1.05, min_ess=200.0, max_steps=400)
 STEP = float(np.radians(4.0))
 
 
-def designed(known="parabola", **options):
+def designed(known=FAMILY, **options):
     asked = {"bases": [(0.0, 0.0), (0.2, 0.0)], "drive_steps": [2.5 * STEP], "draws": 3, "seed": 1}
-    own = {"priors": PRIORS, "nuisances": []} if isinstance(known, str) else {}
+    own = {} if isinstance(known, xr.DataTree) else {"rig": AS_STATED}
     return design(known, **(asked | own | options))
 
 
 @pytest.fixture(scope="module")
-def posterior():
-    record = scan(Parabola(0.5, q=0.5), drive_step=STEP).record
-    measured = CELL.measure(record, seed=1)
-    return infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=QUICK)
+def measured():
+    return CELL.measure(scan(Parabola(0.5, q=0.5), drive_step=STEP).record, seed=1)
+
+
+@pytest.fixture(scope="module")
+def posterior(measured):
+    return infer_contour(measured, rig=Rig(load_cell=CELL, unknown="nothing"), seed=1, settings=QUICK)
 
 
 def known():
-    cell = usual_load_cell(Rod())
-    empty = empty_record([Rotation()], COARSE, None, cell)
-    experiment = Experiment(empty, "parabola", cell, PRIORS, friction=0.0, nuisances=())
-    return known_from_prior(experiment, draws=3, rng=np.random.default_rng(1))
+    return known_from_prior(AS_STATED, FAMILY, draws=3, rng=np.random.default_rng(1))
 
 
 def test_with_one_truth_it_is_the_information_of_its_record():
@@ -56,7 +59,9 @@ def test_with_one_truth_it_is_the_information_of_its_record():
     x = np.linspace(-0.5, 0.5, 11)
     found = expected_of((Question(one, (Candidate((Rotation(),), STEP),), x, 0.95, 0, 1), 0))
     angles = np.arange(np.radians(-30.0), np.radians(210.0), STEP)
-    plan = Plan(Parabola(0.5, q=0.5), load_cell=told.experiment.load_cell, drive_angles=angles, nuisances=[])
+    plan = Plan(
+        Parabola(0.5, q=0.5), Rig(load_cell=told.experiment.rig.load_cell, unknown="nothing"), drive_angles=angles
+    )
     bounds = information(plan)
     slopes = np.stack([x**2, np.ones_like(x), -x * 2.0 * 0.5], axis=1)  # of a (x − x_c)² + q
     # Bounds are those without priors, of four parameters of which the noise is independent.
@@ -178,12 +183,13 @@ def test_the_seed_decides():
 def test_in_metres_and_newtons_it_is_the_same():
     rod = Rod(length=0.2, flexural_rigidity=2e-3)
     cell = LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
-    priors = {
-        "a": stats.lognorm(0.3, scale=0.6 / 0.2),
-        "q": stats.uniform(0.4 * 0.2, 0.2 * 0.2),
-        "x_c": stats.norm(0.0, 0.05 * 0.2),
-    }
-    si = designed(rod=rod, load_cell=cell, priors=priors, bases=[(0.0, 0.0), (0.04, 0.0)])
+    known = Family(
+        "parabola",
+        a=stats.lognorm(0.3, scale=0.6 / 0.2),
+        q=stats.uniform(0.4 * 0.2, 0.2 * 0.2),
+        x_c=stats.norm(0.0, 0.05 * 0.2),
+    )
+    si = designed(known, rig=Rig(rod=rod, load_cell=cell, unknown="nothing"), bases=[(0.0, 0.0), (0.04, 0.0)])
     plain = designed()
     np.testing.assert_allclose(si.width.values / 0.2, plain.width.values, rtol=1e-3)
     np.testing.assert_allclose(si.information.values, plain.information.values, rtol=1e-3)
@@ -193,12 +199,42 @@ def test_in_metres_and_newtons_it_is_the_same():
 def test_a_posterior_is_known_by_its_own_rig(posterior):
     told = known_from_posterior(posterior, draws=5, rng=np.random.default_rng(1))
     assert told.bases == ((0.0, 0.0),)
-    assert told.experiment.load_cell.force_noise == CELL.force_noise
+    assert told.experiment.noise.cell.force_noise == CELL.force_noise
     deviation = np.sqrt(np.diag(np.linalg.inv(told.precision)))
     samples = posterior["posterior"].to_dataset()
     np.testing.assert_allclose(
         deviation, [float(samples[name].std()) for name in ("a", "q", "x_c", "noise_scale")], rtol=1e-3
     )
+
+
+def test_what_a_posterior_knows_of_rig_and_contour_is_known(measured):
+    rig = Rig(load_cell=CELL, unknown={**NOTHING, "friction": 0.1, "moment_bias": "default", "noise_scale": 1.0})
+    known = Family("parabola", q=0.5, a=stats.norm(0.5, 0.1))
+    posterior = infer_contour(measured, family=known, rig=rig, seed=1, settings=QUICK)
+    told = known_from_posterior(posterior, draws=5, rng=np.random.default_rng(1))
+    assert told.experiment.model.names == ("a", "x_c", "moment_bias")
+    assert dict(told.experiment.own_family.known) == {"q": 0.5}
+    assert dict(told.experiment.nuisances.known) == {"friction": 0.1}
+    assert np.isfinite(designed(posterior).width).all()
+
+
+def test_shifts_of_pivots_are_left_out():
+    """Of a rig as of a posterior, for candidates of two pivots, too."""
+    rig = AS_STATED.with_unknown(base="default")
+    drives = [[Rotation(), Rotation((0.2, 0.0))]]
+    found, right = (designed(rig=each, bases=None, drives=drives) for each in (rig, AS_STATED))
+    np.testing.assert_array_equal(found.width, right.width)
+
+
+def test_the_calibration_of_another_rig_is_refused():
+    stated = {"units": "dimensionless", "rod_length": 1.0, "rod_flexural_rigidity": 2.0}
+    joint = RigPrior({"rigidity_scale": stats.lognorm(s=0.01)}, np.eye(1), 0.0, "0", stated)
+    unknown = {name: value for name, value in NOTHING.items() if name != "rigidity_scale"}
+    rig = Rig(unknown=unknown, calibration=joint)
+    with refused(ParameterError, "rig", "match"):
+        designed(rig=rig)
+    with refused(ParameterError, "rig", "match"):
+        _ = Plan(Parabola(0.5, q=0.5), rig).model
 
 
 def test_weighted_bands():
@@ -231,11 +267,9 @@ def test_what_is_impossible_is_refused(wrong):
 
 
 def test_what_is_no_knowledge_is_refused(posterior):
-    with refused(ParameterError, "prior of b", "a, q, x_c"):
-        designed(priors={"b": stats.norm()})
     with refused(ParameterError, "family"):
-        designed("shape-free", priors={})
-    with refused(ParameterError, "load_cell", "posterior"):
-        designed(posterior, load_cell=CELL)
+        designed("shape-free")
+    with refused(ParameterError, "rig", "posterior"):
+        designed(posterior, rig=AS_STATED)
     with refused(InferenceError, "infer_contour"):
         designed(xr.DataTree())

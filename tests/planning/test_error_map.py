@@ -18,6 +18,7 @@ from tactile_bayes.planning.error_cell import CellOutcome
 from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
+from tactile_bayes.rig import NOTHING, Rig
 
 SMALL = {
     "contours": ["II"],
@@ -26,7 +27,7 @@ SMALL = {
     "replicates": 2,
     "seed": 3,
     "drive_step": 0.1,
-    "nuisances": (),
+    "rig": Rig(unknown="nothing"),
     "workers": 1,
 }
 
@@ -88,12 +89,12 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         {"replicates": 3},
         {"noise_factors": [2.0]},
         {"contours": {"II": Parabola(0.6, 0.5)}},
-        {"load_cell": tb.LoadCell(force_noise=0.1, moment_noise=0.02)},
-        {"friction": 0.1},
-        {"priors": {"a": stats.norm(0.5, 0.1)}},
+        {"rig": Rig(load_cell=tb.LoadCell(force_noise=0.1, moment_noise=0.02), unknown="nothing")},
+        {"rig": Rig(unknown={**NOTHING, "friction": 0.1})},
+        {"family": tb.Family("parabola", a=stats.norm(0.5, 0.1))},
         {"base_x": 0.1},
     ],
-    ids=lambda other: next(iter(other)),
+    ids=str,
 )
 def test_the_folder_of_another_study_is_refused(tmp_path_factory, other):
     folder = tmp_path_factory.mktemp("study")
@@ -140,11 +141,17 @@ def test_first_order_is_what_small_noise_gives():
     """
     replicates, step = 24, np.radians(6.0)
     found = error_map(
-        ["II"], noise_factors=[0.01], replicates=replicates, drive_step=step, seed=1, workers=1, nuisances=()
+        ["II"],
+        noise_factors=[0.01],
+        replicates=replicates,
+        drive_step=step,
+        seed=1,
+        workers=1,
+        rig=Rig(unknown="nothing"),
     ).squeeze()
     plan = Plan(paper_profile("II", q=0.5), drive_step=step).with_noise(0.01)
     angles = np.unique(plan.scan.record.drive_angle.values)
-    grown = amplification(Plan(plan.contour, plan.cell, drive_angles=angles))
+    grown = amplification(Plan(plan.contour, Rig(load_cell=plan.cell), drive_angles=angles))
     for method in ("raw", "constrained"):
         of = grown.sel(reconstruction=method)
         ok = of.holds.values
@@ -160,7 +167,7 @@ def test_first_order_is_what_small_noise_gives():
 
 def test_first_order_is_not_what_large_noise_gives():
     found = error_map(
-        ["II"], noise_factors=[0.01, 100.0], replicates=3, drive_step=0.1, seed=1, workers=1, nuisances=()
+        ["II"], noise_factors=[0.01, 100.0], replicates=3, drive_step=0.1, seed=1, workers=1, rig=Rig(unknown="nothing")
     ).squeeze()
     quiet, loud = found.isel(noise_factor=0), found.isel(noise_factor=1)
     growth = (loud.median_error / quiet.median_error).sel(reconstruction="constrained")
@@ -170,7 +177,7 @@ def test_first_order_is_not_what_large_noise_gives():
 
 
 def test_expected_widths_are_those_of_information():
-    plan = Plan(paper_profile("II", q=0.5), base=(0.0, 0.1), drive_step=0.1, nuisances=())
+    plan = Plan(paper_profile("II", q=0.5), Rig(unknown="nothing"), base=(0.0, 0.1), drive_step=0.1)
     right = information(plan)
     of = small().sel(distance=0.4, noise_factor=1.0, contour="II")
     for kind in ("touched", "gap"):
@@ -182,7 +189,7 @@ def test_expected_widths_are_those_of_information():
 
 def test_a_map_of_a_rod_in_si_is_a_scaled_one():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
-    found = error_map(**SMALL, rod=rod)
+    found = error_map(**{**SMALL, "rig": Rig(rod=rod, unknown="nothing")})
     np.testing.assert_array_equal(found.distance.values, small().distance.values)
     np.testing.assert_allclose(found.force_noise.values, rod.force_unit * small().force_noise.values)
     for name in ("rms_along", "rms_across", "expected_gap_width", "gap_width", "median_error"):
@@ -244,7 +251,8 @@ def test_posteriors_are_inferred_in_some_cells():
         {"posterior_replicates": 0},
         {"seed": -1},
         {"probability": 1.0},
-        {"nuisances": "bias"},
+        {"rig": "bias"},
+        {"family": "parabola"},
     ],
     ids=str,
 )
@@ -258,7 +266,8 @@ def test_bad_grids_are_refused(wrong):
     [
         ({"contours": {"x": 5}}, "5"),
         ({"contours": {"x": tb.contours.from_points(np.arange(-3.0, 4.0), np.arange(-3.0, 4.0) ** 2)}}, "family"),
-        ({"load_cell": tb.LoadCell(force_noise=0.1)}, "holding_moment"),
+        ({"rig": Rig(load_cell=tb.LoadCell(force_noise=0.1))}, "holding_moment"),
+        ({"contours": ["II", "III"], "family": tb.Family("parabola")}, "circle"),
     ],
 )
 def test_what_cannot_be_studied_is_refused(wrong, named):

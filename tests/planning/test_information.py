@@ -11,16 +11,18 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ReachError
-from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.rig import expanded
+from tactile_bayes.rig.rig_prior import RigPrior
 
 PROFILE = paper_profile("II", q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-DOUBLE = Plan(PROFILE, CELL, drive_step=np.radians(2.0))
+DOUBLE = Plan(PROFILE, Rig(load_cell=CELL), drive_step=np.radians(2.0))
 
 BETWEEN = np.concatenate([np.linspace(0.9, 2.2, 14), np.linspace(2.5, 3.05, 5), [3.3]])
 """Drive angles clear of first contacts and snap-offs of both sweeps, the last one unloaded."""
@@ -40,8 +42,14 @@ def told(plan):
     return information(plan)
 
 
-def between(cell=CELL, nuisances=("rigidity_scale", "drive_angle_offset"), **options):
-    return Plan(PROFILE, cell, drive_angles=BETWEEN, nuisances=nuisances, **options)
+def only(*names, cell=CELL):
+    """The rig of which these parameters are unknown."""
+    return Rig(load_cell=cell, unknown={**NOTHING, **dict.fromkeys(names, "default")})
+
+
+def between(*unknown, cell=CELL, **options):
+    rig = only(*(unknown or ("rigidity_scale", "drive_angle_offset")), cell=cell)
+    return Plan(PROFILE, rig, drive_angles=BETWEEN, **options)
 
 
 def located(plan):
@@ -93,8 +101,8 @@ def test_information_is_the_curvature_of_the_log_likelihood(name):
 
     What fourth derivatives leave is of the order of the square of the deviations, about 1e-3 of parameters, beside one.
     """
-    nuisances = ["rigidity_scale"] + ["bias"] * (name in ("white", "correlated"))
-    plan = between(CELLS[name], nuisances)
+    unknown = ["rigidity_scale"] + ["bias"] * (name in ("white", "correlated"))
+    plan = between(*unknown, cell=CELLS[name])
     centre = located(plan)
     data = readings(plan, centre)
     found = record_information(plan.model, plan.point).matrix[: centre.size, : centre.size]
@@ -127,7 +135,7 @@ def test_information_is_the_curvature_of_the_log_likelihood(name):
 )
 def test_information_of_an_encoder_is_that_of_dense_algebra(name, encoder, frame):
     cell = replace(CELLS[name], drive_angle_noise=encoder, frame=frame)
-    plan = between(cell, ("rigidity_scale", "drive_angle_offset", "bias"))
+    plan = between("rigidity_scale", "drive_angle_offset", "bias", cell=cell)
     slopes, by_angle = scan_slopes(plan)
     root = np.diag([0.02, 0.05, 0.05])
     m, x, y = cell.correlation
@@ -140,7 +148,7 @@ def test_information_of_an_encoder_is_that_of_dense_algebra(name, encoder, frame
 
 
 def test_information_beside_a_discrepancy_is_that_of_dense_algebra():
-    plan = between(nuisances=("rigidity_scale", "drive_angle_offset", "bias", "discrepancy"))
+    plan = between("rigidity_scale", "drive_angle_offset", "bias", "discrepancy")
     slopes, _ = scan_slopes(plan)
     discrepancy = plan.model.discrepancy_at(plan.point)
     assert discrepancy is not None
@@ -155,7 +163,7 @@ def test_information_beside_a_discrepancy_is_that_of_dense_algebra():
 
 
 def test_slopes_are_those_of_scans():
-    plan = between(replace(CELL, drive_angle_noise=0.01), ("rigidity_scale", "drive_angle_offset", "bias"))
+    plan = between("rigidity_scale", "drive_angle_offset", "bias", cell=replace(CELL, drive_angle_noise=0.01))
     found = reading_slopes(plan.model, plan.point)
     right, by_angle = scan_slopes(plan)
     scale = np.abs(right).max(axis=(0, 1))
@@ -168,7 +176,7 @@ def test_a_cell_that_turns_knows_as_much():
     """Where both forces have the same noise: of independent ones a turn changes nothing."""
     plain, turned = (
         record_information(plan.model, plan.point).matrix
-        for plan in (between(replace(CELL, frame=frame), ["rigidity_scale"]) for frame in ("fixed", "turning"))
+        for plan in (between("rigidity_scale", cell=replace(CELL, frame=frame)) for frame in ("fixed", "turning"))
     )
     assert_matrices_agree(turned, plain, 1e-6)
 
@@ -177,7 +185,7 @@ def test_gain_that_is_known_changes_nothing_where_noise_goes_with_it():
     """Readings twice as large with noise twice as large."""
     double = tuple(tuple(2.0 * float(i == j) for j in range(3)) for i in range(3))
     louder = tb.LoadCell(force_noise=0.1, moment_noise=0.04, gain=double)
-    plain, doubled = (record_information(p.model, p.point).matrix for p in (between(), between(louder)))
+    plain, doubled = (record_information(p.model, p.point).matrix for p in (between(), between(cell=louder)))
     assert_matrices_agree(doubled, plain, 1e-9)
 
 
@@ -192,7 +200,8 @@ def test_students_t_tells_less_by_a_known_factor(nu):
     of_place = mean(lambda z: (nu + 1.0) * z / (nu + z * z))
     of_scale = mean(lambda z: (nu + 1.0) * z * z / (nu + z * z) - 1.0)
     normal, outlying = (
-        record_information(p.model, p.point).matrix for p in (between(), between(replace(CELL, degrees_of_freedom=nu)))
+        record_information(p.model, p.point).matrix
+        for p in (between(), between(cell=replace(CELL, degrees_of_freedom=nu)))
     )
     np.testing.assert_allclose(outlying[:-1, :-1], of_place * normal[:-1, :-1], rtol=1e-6, atol=1e-6)
     assert outlying[-1, -1] == pytest.approx(of_scale * 3 * 2 * BETWEEN.size, rel=1e-8)
@@ -201,12 +210,12 @@ def test_students_t_tells_less_by_a_known_factor(nu):
 
 def test_what_cannot_be_negative_is_looked_at_from_inside():
     """Friction and compliance of the suspension, against differences of scans with some of it."""
-    plan = between(nuisances=["friction", "suspension_compliance"])
+    plan = between("friction", "suspension_compliance")
     found = reading_slopes(plan.model, plan.point).by_parameters
     step = 1e-4
 
     def read(factor):
-        record = tb.scan(PROFILE, drive_angles=BETWEEN, friction=factor * step).record
+        record = tb.scan(PROFILE, drive_angles=BETWEEN, rig=Rig(unknown={"friction": factor * step})).record
         return np.stack([record[name].values for name in CHANNELS], axis=-1)
 
     right = (4.0 * read(1.0) - read(2.0) - 3.0 * read(0.0)) / (2.0 * step)
@@ -238,30 +247,49 @@ KNOWN = {
 @pytest.mark.parametrize("known", KNOWN)
 def test_bounds_are_those_that_were_known(known):
     """Of another program, to the digits that it gave."""
-    nuisances, name, right = KNOWN[known]
-    found = told(replace(DOUBLE, nuisances=tuple(nuisances)))[name]
+    unknown, name, right = KNOWN[known]
+    found = told(replace(DOUBLE, rig=only(*unknown)))[name]
     for parameter, (value, digits) in right.items():
         assert float(found.sel(parameter=parameter)) == pytest.approx(value, abs=0.5 * 10.0**-digits + 1e-12), parameter
 
 
 def test_bounds_from_the_moment_alone_are_those_that_were_known():
     """Of another program, that had samples at other angles: to a twentieth."""
-    found = told(replace(DOUBLE, nuisances=())).bound_of_channel.sel(channel="holding_moment")
+    found = told(replace(DOUBLE, rig=only())).bound_of_channel.sel(channel="holding_moment")
     assert float(found.sel(parameter="a")) == pytest.approx(0.0022, rel=0.05)
     assert float(found.sel(parameter="q")) == pytest.approx(0.0003, abs=0.00005)
-    found = told(replace(DOUBLE, nuisances=("rigidity_scale",))).bound_of_channel.sel(channel="holding_moment")
+    found = told(replace(DOUBLE, rig=only("rigidity_scale"))).bound_of_channel.sel(channel="holding_moment")
     assert float(found.sel(parameter="a")) == pytest.approx(0.0056, rel=0.05)
     assert float(found.sel(parameter="q")) == pytest.approx(0.0051, rel=0.05)
 
 
+def test_a_calibrated_rig_knows_its_parameters_together():
+    """With the covariance of a normal copula, by inversion of the whole matrix."""
+    sds, correlation = [0.02, 0.01], -0.995
+    priors = {"rigidity_scale": stats.lognorm(s=sds[0]), "drive_angle_offset": stats.norm(0.0, sds[1])}
+    joint = RigPrior(priors, np.array([[1.0, correlation], [correlation, 1.0]]), 0.0, "0")
+    unknown = {name: value for name, value in expanded(NOTHING).items() if name not in priors}
+    plan = Plan(PROFILE, Rig(load_cell=CELL, unknown=unknown, calibration=joint), drive_angles=BETWEEN)
+    names = [plan.model.names.index(name) for name in priors]
+    found = np.linalg.inv(prior_precision(plan.model)[np.ix_(names, names)])
+    right = [float(plan.model.priors[name].std()) for name in priors]
+    np.testing.assert_allclose(found, np.outer(right, right) * joint.correlation, rtol=1e-9)
+    matrix = record_information(plan.model, plan.point).matrix
+    prior = np.diag([float(plan.model.priors[name].std()) ** -2.0 for name in plan.model.names])
+    prior[np.ix_(names, names)] = np.linalg.inv(np.outer(right, right) * joint.correlation)
+    whole = np.sqrt(np.diag(np.linalg.inv(matrix + prior)))
+    np.testing.assert_allclose(information(plan).bound_with_priors.values, whole, rtol=1e-6)
+
+
 def test_bounds_are_inverses_of_the_matrix_with_and_without_priors():
-    plan = between(nuisances=("rigidity_scale", "bias"))
+    plan = between("rigidity_scale", "bias")
     found, matrix = told(plan), record_information(plan.model, plan.point).matrix
     sds = [0.3, 0.05]
-    plan = replace(plan, priors={"a": stats.norm(0.5, sds[0]), "rigidity_scale": stats.norm(1.0, sds[1])})
+    rig = plan.rig.with_unknown(rigidity_scale=stats.norm(1.0, sds[1]))
+    plan = replace(plan, rig=rig, family=tb.Family("parabola", a=stats.norm(0.5, sds[0])))
     prior = np.array([plan.model.priors[name].std() ** -2.0 for name in plan.model.names])
     assert prior[0] == pytest.approx(sds[0] ** -2)
-    np.testing.assert_allclose(prior_precision(plan.model), prior, rtol=1e-12)
+    np.testing.assert_allclose(prior_precision(plan.model), np.diag(prior), rtol=1e-12)
     informed = information(plan)
     scale = np.sqrt(np.diag(matrix))
     scaled = np.linalg.inv(matrix / np.outer(scale, scale))
@@ -283,7 +311,7 @@ def test_bounds_are_in_proportion_to_noise():
 
 def test_what_a_record_does_not_tell_has_no_bound_but_with_priors():
     """One sweep of one sample has three numbers, for seven parameters."""
-    plan = Plan(PROFILE, CELL, direction="forward", drive_angles=[1.5, 1.6])
+    plan = Plan(PROFILE, Rig(load_cell=CELL), direction="forward", drive_angles=[1.5, 1.6])
     found = information(plan)
     assert np.isinf(found.bound.sel(parameter=["a", "q", "x_c"]).values).all()
     assert np.all(np.isfinite(found.bound_with_priors.values))
@@ -293,8 +321,8 @@ def test_what_a_record_does_not_tell_has_no_bound_but_with_priors():
 def test_a_rod_in_si_tells_the_same():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     cell = tb.LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
-    plan = Plan(Parabola(2.5, 0.1), cell, rod, drive_angles=BETWEEN)
-    si, plain = information(plan), told(Plan(PROFILE, CELL, drive_angles=BETWEEN))
+    plan = Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod), drive_angles=BETWEEN)
+    si, plain = information(plan), told(Plan(PROFILE, Rig(load_cell=CELL), drive_angles=BETWEEN))
     zeros, levers = [rod.moment_unit, rod.force_unit, rod.force_unit], [0.2, 0.2]
     units = np.array([5.0, 0.2, 0.2, 1.0, 1.0, *zeros, *levers, 1.0, 1.0, 1.0])
     assert list(si.parameter.values) == list(plain.parameter.values)
@@ -311,7 +339,7 @@ def test_a_rod_in_si_tells_the_same():
 
 
 def test_channels_alone_and_left_out_are_those_of_a_cell_with_the_others_drowned():
-    plan = between(nuisances=("rigidity_scale",))
+    plan = between("rigidity_scale")
     found = told(plan)
     drowned = {
         "alone": tb.LoadCell(force_noise=5e4, moment_noise=0.02),
@@ -319,13 +347,13 @@ def test_channels_alone_and_left_out_are_those_of_a_cell_with_the_others_drowned
     }
     variables = {"alone": found.bound_of_channel, "without": found.bound_without_channel}
     for kind, cell in drowned.items():
-        right = information(replace(plan, load_cell=cell)).bound_with_priors.values
+        right = information(replace(plan, rig=only("rigidity_scale", cell=cell))).bound_with_priors.values
         bounds = variables[kind].sel(channel="holding_moment").values
         np.testing.assert_allclose(bounds[:-1], right[:-1], rtol=1e-5, err_msg=kind)
 
 
 def test_channels_that_are_independent_add_up():
-    plan = between(nuisances=())
+    plan = replace(between(), rig=only())
     parts = [record_information(plan.model, plan.point, np.arange(3) == k).matrix for k in range(3)]
     assert_matrices_agree(sum(parts), record_information(plan.model, plan.point).matrix, 1e-12)
 
@@ -348,7 +376,7 @@ def test_leverage_sums_to_what_is_told():
     assert found.attrs["told"] <= parameters
     # The trace of M (M + P)⁻¹, of another route.
     matrix = record_information(DOUBLE.model, DOUBLE.point).matrix[:-1, :-1]
-    prior = prior_precision(DOUBLE.model)[:-1]
+    prior = np.diag(prior_precision(DOUBLE.model))[:-1]
     scale = np.sqrt(prior)
     values = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
     assert found.attrs["told"] == pytest.approx(np.sum(values / (values + 1.0)), rel=1e-6)
@@ -357,7 +385,7 @@ def test_leverage_sums_to_what_is_told():
 
 def test_leverage_on_a_parameter_is_what_is_lost_without_the_sample():
     """Of a forward sweep, by a plan without that drive angle."""
-    plan = replace(between(nuisances=("rigidity_scale",)), direction="forward")
+    plan = replace(between("rigidity_scale"), direction="forward")
     found = told(plan)
     angles = np.delete(np.asarray(plan.drive_angles), 7)
     without = information(replace(plan, drive_angles=angles)).bound_with_priors.values
@@ -416,11 +444,10 @@ def posterior_ratios(factor, seed):
 
     Without friction, which lies at the end of its prior: a posterior that is cut off there is narrower than the bound.
     """
-    plan = replace(DOUBLE.with_noise(factor), nuisances=[name for name in STANDARD if name != "friction"])
+    louder = DOUBLE.with_noise(factor)
+    plan = replace(louder, rig=louder.rig.with_unknown(friction=0.0))
     measured = plan.cell.measure(plan.scan.record, seed=seed)
-    posterior = tb.infer_contour(
-        measured, family=plan.family, load_cell=plan.cell, nuisances=plan.nuisances, seed=seed, settings=SETTINGS
-    )
+    posterior = tb.infer_contour(measured, rig=plan.rig, seed=seed, settings=SETTINGS)
     bounds = information(plan).bound_with_priors
     draws = posterior["posterior"].to_dataset()
     # The posterior is as wide as the noise that it finds, which is off by some 3 % in a record of 600 readings.

@@ -13,9 +13,10 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import SOURCES, amplification
 from tactile_bayes.planning.noise_shares import first_and_total, noise_shares
 from tactile_bayes.planning.plan import Plan
+from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)
-QUIET = Plan(PROFILE, tb.LoadCell(force_noise=5e-6, moment_noise=2e-6, drive_angle_noise=2e-6))
+QUIET = Plan(PROFILE, Rig(load_cell=tb.LoadCell(force_noise=5e-6, moment_noise=2e-6, drive_angle_noise=2e-6)))
 
 
 def ishigami(x):
@@ -87,7 +88,9 @@ def test_shares_at_small_noise_are_those_of_first_order():
 def test_shares_do_not_depend_on_the_unit():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     cell = tb.LoadCell(force_noise=5e-6 * rod.force_unit, moment_noise=2e-6 * rod.moment_unit, drive_angle_noise=2e-6)
-    si = noise_shares(Plan(Parabola(2.5, 0.1), cell, rod), seed=1, samples=64, states=2, methods=("raw",))
+    si = noise_shares(
+        Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod)), seed=1, samples=64, states=2, methods=("raw",)
+    )
     plain = noise_shares(QUIET, seed=1, samples=64, states=2, methods=("raw",))
     np.testing.assert_allclose(si.share.values, plain.share.values, rtol=0.0, atol=1e-4)
     np.testing.assert_allclose(si.rms_error.values, 0.2 * plain.rms_error.values, rtol=1e-4)
@@ -104,7 +107,7 @@ def test_first_order_fails_at_large_noise_and_this_says_so():
 
 def test_a_noise_of_zero_is_left_out():
     cell = replace(QUIET.cell, drive_angle_noise=0.0)
-    found = noise_shares(replace(QUIET, load_cell=cell), seed=1, samples=128, states=2, methods=("raw",))
+    found = noise_shares(replace(QUIET, rig=Rig(load_cell=cell)), seed=1, samples=128, states=2, methods=("raw",))
     assert list(found.source.values) == ["holding_moment", "force_x", "force_y"]
     # Of additive noises, shares sum to one: but for the estimators' scatter, three times 0.02.
     np.testing.assert_allclose(found.share.sum("source").values, 1.0, atol=0.06)

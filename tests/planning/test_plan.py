@@ -12,11 +12,13 @@ from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, 
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.experiment import usual_load_cell
+from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import NOTHING, Rig
 
 PROFILE = paper_profile("II", q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -71,7 +73,7 @@ def test_what_has_no_parameters_is_refused_with_the_correction(contour, named):
 
 
 def test_a_plan_has_the_record_of_its_scan():
-    plan = Plan(PROFILE, CELL, drive_step=0.05)
+    plan = Plan(PROFILE, Rig(load_cell=CELL), drive_step=0.05)
     scanned = tb.scan(PROFILE, drive_step=0.05).record
     for name in (*CHANNELS, "drive_angle"):
         np.testing.assert_array_equal(plan.record[name].values, scanned[name].values)
@@ -87,7 +89,7 @@ def test_the_record_has_errors_that_are_known_and_none_that_are_drawn():
         "drive_angle_backlash": 0.02,
     }
     cell = replace(CELL, **known, drive_angle_noise=0.01, bias_uncertainty=(1.0, 1.0, 1.0))
-    plan = Plan(PROFILE, cell, drive_step=0.05)
+    plan = Plan(PROFILE, Rig(load_cell=cell), drive_step=0.05)
     scanned = tb.scan(PROFILE, drive_step=0.05).record
     loads, read = (np.stack([r[name].values for name in CHANNELS]) for r in (scanned, plan.record))
     loads[0] += 0.02 * loads[1] - 0.01 * loads[2]
@@ -98,8 +100,9 @@ def test_the_record_has_errors_that_are_known_and_none_that_are_drawn():
 
 def test_the_model_shows_the_record_at_the_point():
     """Contour as it is, rig as stated."""
-    for options in ({}, {"nuisances": ["gain", "friction", "suspension_compliance"]}):
-        plan = Plan(PROFILE, replace(CELL, frame="turning"), drive_step=0.05, **options)
+    several = ("gain", "friction", "suspension_compliance", "length", "taper", "rest_curvature", "moment_curve")
+    for unknown in ({}, {**NOTHING, **dict.fromkeys(several, "default")}):
+        plan = Plan(PROFILE, Rig(load_cell=replace(CELL, frame="turning"), unknown=unknown), drive_step=0.05)
         values = dict(zip(plan.model.names, plan.point, strict=True))
         assert (values["a"], values["q"], values["x_c"], values["noise_scale"]) == (0.5, 0.5, 0.0, 1.0)
         loads = plan.model.loads(plan.point[None])[0]
@@ -109,21 +112,25 @@ def test_the_model_shows_the_record_at_the_point():
 
 @pytest.mark.parametrize("name", [n for n in CONTOURS if n != "circle/ellipse"])
 def test_every_family_has_a_model(name):
-    plan = Plan(CONTOURS[name], CELL, drive_step=0.1, nuisances=())
-    assert plan.family == name
+    plan = Plan(CONTOURS[name], Rig(load_cell=CELL, unknown="nothing"), drive_step=0.1)
+    assert plan.experiment.own_family == tb.Family(name)
     np.testing.assert_array_equal(plan.point[:-1], list(family_parameters(CONTOURS[name])[1].values()))
 
 
 def test_priors_that_are_given_are_those_of_the_model():
     prior = stats.norm(0.5, 0.01)
-    plan = Plan(PROFILE, CELL, priors={"q": prior, "friction": stats.halfnorm(scale=0.1)}, nuisances=())
+    plan = Plan(
+        PROFILE,
+        Rig(load_cell=CELL, unknown={**NOTHING, "friction": stats.halfnorm(scale=0.1)}),
+        family=Family("parabola", q=prior),
+    )
     assert plan.model.priors["q"] is prior
     assert plan.model.forward_parameters == ("a", "q", "x_c", "friction")
 
 
 def test_noise_grows_by_a_factor_and_nothing_else():
     cell = replace(CELL, drive_angle_noise=0.01, bias=(0.1, 0.0, 0.0))
-    louder = Plan(PROFILE, cell, friction=0.2).with_noise(3.0)
+    louder = Plan(PROFILE, Rig(load_cell=cell, unknown={"friction": 0.2})).with_noise(3.0)
     assert louder.cell == replace(cell, force_noise=3.0 * 0.05, moment_noise=3.0 * 0.02)
     assert (louder.friction, louder.contour) == (0.2, PROFILE)
 
@@ -134,7 +141,7 @@ def test_without_a_load_cell_there_is_the_usual_one():
     usual = usual_load_cell(rod)
     assert (usual.force_noise, usual.moment_noise) == pytest.approx((0.05 * 0.05, 0.02 * 0.01))
     assert usual.dimensionless(rod).entries() == pytest.approx({"force_noise": 0.05, "moment_noise": 0.02})
-    assert Plan(Parabola(2.5, 0.1), rod=rod).cell == usual_load_cell(rod)
+    assert Plan(Parabola(2.5, 0.1), Rig(rod=rod)).cell == usual_load_cell(rod)
 
 
 @pytest.mark.parametrize(
@@ -148,19 +155,48 @@ def test_without_a_load_cell_there_is_the_usual_one():
 )
 def test_a_channel_without_noise_is_refused_by_name(cell, silent):
     with refused(ParameterError, silent, "LoadCell"):
-        Plan(PROFILE, cell)
+        Plan(PROFILE, Rig(load_cell=cell))
 
 
-@pytest.mark.parametrize("options", [{"rod": 0.2}, {"load_cell": 0.05}, {"nuisances": "bias"}])
+@pytest.mark.parametrize("options", [{"rig": 0.2}, {"rig": CELL}, {"family": "parabola"}])
 def test_what_is_none_is_refused(options):
     with refused(ParameterError, **options):
         Plan(PROFILE, **options)
 
 
-def test_a_model_that_is_none_is_refused():
-    plan = Plan(PROFILE, drive_step=0.1, priors={"b": stats.norm()})
-    with refused(ParameterError, "prior of b", "a, q, x_c"):
-        _ = plan.model
+@pytest.mark.parametrize(
+    ("said", "name"),
+    [
+        ({"lever": 0.01}, "lever_x"),
+        ({"force_x_gain": 1.02}, "force_x_gain"),
+        ({"noise_scale": 2.0}, "noise_scale"),
+        ({"base_2_y": 0.01}, "base_2_y"),
+        ({"length": 1.1}, "length"),
+    ],
+)
+def test_a_number_that_the_sweeps_would_not_have_is_refused_by_name(said, name):
+    with refused(ParameterError, name, "as stated"):
+        Plan(PROFILE, Rig(unknown=said))
+
+
+def test_numbers_that_are_as_stated_are_known():
+    plan = Plan(PROFILE, Rig(unknown={**NOTHING, "length": 1.0, "noise_scale": 1.0, "discrepancy": 0.0}))
+    assert plan.model.names == ("a", "q", "x_c")
+
+
+@pytest.mark.parametrize(
+    ("family", "words"),
+    [(Family("circle"), ("circle", "parabola")), (Family("parabola", q=0.4), ("q", "0.4", "0.5"))],
+)
+def test_the_family_of_another_contour_is_refused(family, words):
+    with refused(ParameterError, *words):
+        Plan(PROFILE, family=family)
+
+
+def test_what_is_known_of_the_contour_is_none_of_the_parameters():
+    plan = Plan(PROFILE, Rig(unknown="nothing"), drive_step=0.1, family=Family("parabola", q=0.5))
+    assert plan.model.names == ("a", "x_c", "noise_scale")
+    np.testing.assert_array_equal(plan.point, [0.5, 0.0, 1.0])
 
 
 # ---- covariance over a whole record

@@ -15,10 +15,11 @@ from tactile_bayes.load_cell import RandomWalk
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise, required_rod
+from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-PLAN = Plan(PROFILE, CELL, drive_step=np.radians(9.0))
+PLAN = Plan(PROFILE, Rig(load_cell=CELL), drive_step=np.radians(9.0))
 
 CELLS = {
     "white": CELL,
@@ -39,7 +40,7 @@ SHARED = [pytest.param(name, "gap", marks=pytest.mark.slow) for name in ("encode
 )
 def test_a_load_cell_as_asked_for_gives_the_band_that_was_wanted(name, where):
     """Whatever else about it stays as it is."""
-    plan = replace(PLAN, load_cell=CELLS[name])
+    plan = replace(PLAN, rig=Rig(load_cell=CELLS[name]))
     present = float(information(plan)[f"{where}_width"])
     needed = required_noise(plan, 0.7 * present, where=where)
     assert float(needed.present_width) == pytest.approx(present, rel=1e-9)
@@ -47,7 +48,7 @@ def test_a_load_cell_as_asked_for_gives_the_band_that_was_wanted(name, where):
     assert factor < 0.7 + 1e-6  # what stays takes its share
     better = replace(plan.cell, force_noise=float(needed.force_noise[0]), moment_noise=float(needed.moment_noise[0]))
     assert better.force_noise == pytest.approx(factor * 0.05)
-    got = information(replace(plan, load_cell=better))
+    got = information(replace(plan, rig=Rig(load_cell=better)))
     assert float(got[f"{where}_width"]) == pytest.approx(0.7 * present, rel=1e-4)
 
 
@@ -58,7 +59,7 @@ def test_everywhere_is_the_mean_of_all_places():
 
 
 def test_noise_is_in_proportion_to_the_band_where_priors_say_little():
-    plan = replace(PLAN, nuisances=("rigidity_scale", "drive_angle_offset", "bias"))
+    plan = replace(PLAN, rig=PLAN.rig.with_unknown(lever=0.0, backlash=0.0, friction=0.0))
     needed = required_noise(plan, [1e-4, 2e-4, 4e-4], probability=0.9)
     np.testing.assert_allclose(needed.noise_factor / needed.noise_factor[0], [1.0, 2.0, 4.0], rtol=1e-3)
     wider = required_noise(plan, 1e-4, probability=0.5)
@@ -69,7 +70,7 @@ def test_noise_is_in_proportion_to_the_band_where_priors_say_little():
 def test_a_rod_in_si_needs_the_same():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     cell = tb.LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
-    si = required_noise(Plan(Parabola(2.5, 0.1), cell, rod, drive_step=PLAN.drive_step), 0.2 * 0.003)
+    si = required_noise(Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod), drive_step=PLAN.drive_step), 0.2 * 0.003)
     plain = required_noise(PLAN, 0.003)
     np.testing.assert_allclose(si.noise_factor, plain.noise_factor, rtol=1e-5)
     np.testing.assert_allclose(si.force_noise, plain.force_noise * rod.force_unit, rtol=1e-5)
@@ -81,8 +82,8 @@ def test_a_rod_in_si_needs_the_same():
 
 
 def test_a_band_that_priors_give_needs_no_load_cell():
-    priors = {"a": stats.norm(0.5, 0.001), "q": stats.norm(0.5, 0.002), "x_c": stats.norm(0.0, 0.001)}
-    plan = replace(PLAN, priors=priors)
+    family = tb.Family("parabola", a=stats.norm(0.5, 0.001), q=stats.norm(0.5, 0.002), x_c=stats.norm(0.0, 0.001))
+    plan = replace(PLAN, family=family)
     needed = required_noise(plan, [0.001, 1.0], where="gap")
     assert np.isfinite(needed.noise_factor.values).tolist() == [True, False]
     # In the gap the height is q, and little else: 2 · 1.96 · 0.002.
@@ -91,8 +92,8 @@ def test_a_band_that_priors_give_needs_no_load_cell():
 
 def test_a_band_that_no_load_cell_gives_is_refused():
     """Because the zero of the cell is not known."""
-    plan = replace(PLAN, load_cell=replace(CELL, bias_uncertainty=(0.02, 0.1, 0.1)))
-    with refused(ParameterError, "1e-12", "priors"):
+    plan = replace(PLAN, rig=Rig(load_cell=replace(CELL, bias_uncertainty=(0.02, 0.1, 0.1))))
+    with refused(ParameterError, "1e-12", "unknowns"):
         required_noise(plan, [1e-3, 1e-12])
 
 
@@ -112,7 +113,11 @@ def test_a_gap_is_asked_for_where_there_is_one():
 # ---- rods
 
 ROD = tb.Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
-METAL = Plan(Parabola(2.5, 0.1), tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3), ROD, drive_step=np.radians(9.0))
+METAL = Plan(
+    Parabola(2.5, 0.1),
+    Rig(load_cell=tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3), rod=ROD),
+    drive_step=np.radians(9.0),
+)
 LENGTHS, DIAMETERS = [0.09, 0.17, 0.2], [0.3e-3, 0.7e-3, 3e-3]
 
 
@@ -125,7 +130,7 @@ def test_every_rod_has_the_band_and_the_strain_of_its_own_plan():
     """The band where the plan's own rod touches, or leaves a gap."""
     found = rods()
     x = information(METAL).x.values
-    plan = replace(METAL, rod=tb.Rod.circular(0.17, 0.3e-3, 206e9))
+    plan = replace(METAL, rig=replace(METAL.rig, rod=tb.Rod.circular(0.17, 0.3e-3, 206e9)))
     of = found.sel(length=0.17, diameter=0.3e-3)
     assert float(of.strain) == pytest.approx(max(sweep.largest_strain for sweep in plan.scan.sweeps))
     bounds = information(plan)
@@ -162,7 +167,7 @@ def test_the_best_rod_has_the_narrowest_band_of_those_that_bear_it():
 
 def test_a_thicker_rod_has_a_narrower_band_in_proportion_to_its_rigidity():
     """But for its thickness, and priors: the fourth power of 0.7/0.3."""
-    plan = replace(METAL, nuisances=())
+    plan = replace(METAL, rig=replace(METAL.rig, unknown="nothing"))
     found = required_rod(
         plan, lengths=[0.2], diameters=[0.3e-3, 0.33e-3], youngs_modulus=206e9, elastic_strain=1.0
     ).width.values[0]
@@ -188,7 +193,7 @@ def test_no_rod_will_do_and_progress_is_told_after_each():
 
 def test_a_rod_wants_a_load_cell_and_units():
     options = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
-    for plan in (PLAN, replace(METAL, load_cell=None), replace(METAL, rod=None)):
+    for plan in (PLAN, *(replace(METAL, rig=replace(METAL.rig, **{name: None})) for name in ("load_cell", "rod"))):
         with refused(ParameterError, "rod", "SI", "load_cell"):
             required_rod(plan, **options)
 

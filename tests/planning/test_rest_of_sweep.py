@@ -5,6 +5,7 @@ import pytest
 
 import tactile_bayes as tb
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.rig import NOTHING, Rig
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 X = np.linspace(-0.2, 0.2, 5)
@@ -19,7 +20,9 @@ def measured():
 
 @pytest.fixture(scope="module")
 def stream(measured):
-    stream = tb.Stream(load_cell=CELL, nuisances=["force_x_bias"], seed=1, particles=500, x=X)
+    stream = tb.Stream(
+        rig=Rig(load_cell=CELL, unknown={**NOTHING, "force_x_bias": "default"}), seed=1, particles=500, x=X
+    )
     stream.update(measured.isel(sample=slice(0, SO_FAR)))
     return stream
 
@@ -33,7 +36,9 @@ def test_it_is_what_the_rest_then_adds(measured, stream):
     end = int((measured.direction == "forward").sum())
     rest = tb.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, seed=1)
     np.testing.assert_allclose(rest.present_width, width(stream.latest()), rtol=0.15)
-    whole = tb.Stream(load_cell=CELL, nuisances=["force_x_bias"], seed=1, particles=500, x=X)
+    whole = tb.Stream(
+        rig=Rig(load_cell=CELL, unknown={**NOTHING, "force_x_bias": "default"}), seed=1, particles=500, x=X
+    )
     np.testing.assert_allclose(rest.width, width(whole.update(measured.isel(sample=slice(0, end)))), rtol=0.3)
     assert np.all(rest.width < 0.5 * rest.present_width)
     assert np.all(rest.width_error < 0.1 * rest.width)

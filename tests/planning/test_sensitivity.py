@@ -17,6 +17,7 @@ from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise
 from tactile_bayes.planning.sensitivity import PARTS, sensitivity
+from tactile_bayes.rig import Rig
 
 ROD = tb.Rod(length=0.2, flexural_rigidity=2e-3)
 PROFILE = paper_profile("II", q=0.5)
@@ -30,7 +31,7 @@ def plain():
 
 @cache
 def in_si():
-    return tb.sensitivity(seed=1, samples=4, drive_step=STEP, rod=ROD)
+    return tb.sensitivity(seed=1, samples=4, drive_step=STEP, rig=Rig(rod=ROD))
 
 
 def words(tree):
@@ -122,7 +123,7 @@ def test_a_wide_band_is_what_priors_give():
 
 def test_where_first_order_does_not_hold_the_words_say_so():
     loud = tb.LoadCell(force_noise=50.0, moment_noise=20.0)
-    tree = sensitivity(seed=1, parts=["amplification"], load_cell=loud)
+    tree = sensitivity(seed=1, parts=["amplification"], rig=Rig(load_cell=loud))
     assert "First order holds for no raw contact point at this noise." in words(tree)
 
 
@@ -134,7 +135,7 @@ def test_parts_that_are_none_are_refused(parts):
 
 def test_a_channel_without_noise_is_refused_by_name():
     with refused(ParameterError, "force_x, force_y"):
-        sensitivity(seed=1, load_cell=tb.LoadCell(moment_noise=0.02))
+        sensitivity(seed=1, rig=Rig(load_cell=tb.LoadCell(moment_noise=0.02)))
 
 
 def test_a_contour_of_no_family_is_refused_with_the_correction():

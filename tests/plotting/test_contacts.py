@@ -15,6 +15,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contact_posterior import infer_contacts
 from tactile_bayes.plotting import contact_ellipses, contact_regions
 from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.rig import Rig
 from tactile_bayes.uncertainty.contact_region import contact_region
 
 SOME = np.array([2, 22, 24, 30, 45, 61, 120])
@@ -22,12 +23,12 @@ SOME = np.array([2, 22, 24, 30, 45, 61, 120])
 
 @pytest.fixture(scope="module")
 def posterior():
-    return infer_contacts(measured().isel(sample=SOME), load_cell=CELL, seed=1, draws=400, method="importance")
+    return infer_contacts(measured().isel(sample=SOME), rig=Rig(load_cell=CELL), seed=1, draws=400, method="importance")
 
 
 @pytest.fixture(scope="module")
 def contacts():
-    return reconstruct(measured(), method="constrained", load_cell=CELL)
+    return reconstruct(measured(), method="constrained", rig=Rig(load_cell=CELL))
 
 
 def outlines(ax):
@@ -94,7 +95,7 @@ def test_the_true_contour_leaves_the_limits_alone(posterior):
 
 def test_si_axes_are_labelled_in_their_unit():
     record = measured("SI")
-    ax = contact_ellipses(reconstruct(record, method="constrained", load_cell=SI_CELL), ax=own_axes())
+    ax = contact_ellipses(reconstruct(record, method="constrained", rig=Rig(load_cell=SI_CELL)), ax=own_axes())
     assert "mm" in ax.get_xlabel() or "m]" in ax.get_xlabel()
 
 

@@ -13,6 +13,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, ROD
 
 BRIEF = SamplerSettings(ensembles=2, max_steps=20)
@@ -20,7 +21,7 @@ BRIEF = SamplerSettings(ensembles=2, max_steps=20)
 
 @pytest.fixture(scope="module")
 def posterior(measured):
-    return infer_contour(measured, family="parabola", nuisances=[], seed=1, settings=BRIEF)
+    return infer_contour(measured, family="parabola", rig=Rig(unknown="nothing"), seed=1, settings=BRIEF)
 
 
 def title(ax):

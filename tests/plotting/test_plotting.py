@@ -22,6 +22,7 @@ from tactile_bayes.plotting import posteriors, touch_map
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.plotting.tightening import _fit_map, _panels
 from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Motion, Rotation, Translation, scan
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 
@@ -37,7 +38,7 @@ def plain():
 
 @pytest.fixture(scope="module")
 def si():
-    return scan(Parabola(5.0, q=0.05), drive_step=STEP, rod=ROD)
+    return scan(Parabola(5.0, q=0.05), drive_step=STEP, rig=Rig(rod=ROD))
 
 
 @pytest.fixture(scope="module")
@@ -391,8 +392,10 @@ def drawn_gaps(ax):
 def test_touched_arcs_run_along_the_contour_from_first_contact_to_snap_off(unit, request):
     made = {
         "several": lambda: scan(paper_profile("IV", q=0.5), base=THREE, drive_step=STEP),
-        "friction": lambda: scan(Circle(1.0, q=0.4), base=[(0, 0), (0.3, 0)], friction=0.4, drive_step=STEP),
-        "thick": lambda: scan(Parabola(5.0, q=0.05), rod=replace(ROD, diameter=0.002), drive_step=STEP),
+        "friction": lambda: scan(
+            Circle(1.0, q=0.4), base=[(0, 0), (0.3, 0)], rig=Rig(unknown={"friction": 0.4}), drive_step=STEP
+        ),
+        "thick": lambda: scan(Parabola(5.0, q=0.05), rig=Rig(rod=replace(ROD, diameter=0.002)), drive_step=STEP),
     }
     result = made[unit]() if unit in made else request.getfixturevalue(unit)
     drawn = arcs(plotting.touched(result), result)
@@ -488,7 +491,7 @@ def test_touched_is_labelled_in_the_units_of_the_record(si):
     width = si.events["forward"].snap_off.contact_x - si.events["backward"].snap_off.contact_x
     assert [text.get_text() for text in ax.texts] == [f"gap\n{1e3 * width:.3g} mm"]
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
-    moved = scan(si.contour, base=[(-0.0125, 0.0), (0.02, -0.005)], rod=ROD, drive_step=STEP)
+    moved = scan(si.contour, base=[(-0.0125, 0.0), (0.02, -0.005)], rig=Rig(rod=ROD), drive_step=STEP)
     assert labels(plotting.touched(moved)) == ["contour", "base (−12.5, 0) mm", "base (20, −5) mm"]
 
 

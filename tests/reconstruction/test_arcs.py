@@ -14,6 +14,7 @@ from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct, samples, samples_of
 from tactile_bayes.record import make_record
+from tactile_bayes.rig import Rig
 
 CURVATURES = (-0.7, 0.4)
 NAMES = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
@@ -82,7 +83,7 @@ def test_the_rest_curvature_is_mirrored_with_its_sample(with_rest_curvature):
 def test_a_record_without_noise_gives_its_contacts_back(with_rest_curvature, curvature, units):
     made = swept(curvature, units)
     with_rest_curvature(made.rod)
-    contacts = reconstruct(made.record, friction=FRICTION)
+    contacts = reconstruct(made.record, rig=Rig(unknown={"friction": FRICTION}))
     assert (contacts.status == "ok").all()
     np.testing.assert_array_equal(contacts.contact_phase.values, made.phase)
     np.testing.assert_allclose(values(contacts), made.truth, atol=1e-10)
@@ -92,7 +93,9 @@ def test_a_record_without_noise_gives_its_contacts_back(with_rest_curvature, cur
 def test_constrained_contacts_of_a_record_without_noise_are_the_true_ones(with_rest_curvature, curvature):
     made = swept(curvature)
     with_rest_curvature(made.rod)
-    contacts = reconstruct(made.record, method="constrained", load_cell=cell_of(made.rod, 1e-3), friction=FRICTION)
+    contacts = reconstruct(
+        made.record, method="constrained", rig=Rig(load_cell=cell_of(made.rod, 1e-3), unknown={"friction": FRICTION})
+    )
     np.testing.assert_allclose(values(contacts), made.truth, atol=1e-7)
     np.testing.assert_array_less(contacts.misfit.values, 1e-6)
     assert abs(contacts.attrs["axial_score"]) < 1e-2
@@ -107,7 +110,7 @@ def test_misfits_are_those_of_noise_and_tell_of_a_rod_that_is_curved(with_rest_c
     made = swept(curvature)
     cell = cell_of(made.rod, 0.3)
     measured = cell.measure(made.record, seed=1)
-    known = {"method": "constrained", "load_cell": cell, "friction": FRICTION}
+    known = {"method": "constrained", "rig": Rig(load_cell=cell, unknown={"friction": FRICTION})}
     with_rest_curvature(Rod())
     straight = reconstruct(measured, **known)
     assert straight.attrs["misfit_probability"] < 1e-6
@@ -129,8 +132,8 @@ def test_contact_posteriors_are_near_the_constrained_contacts(with_rest_curvatur
     cell = cell_of(made.rod, 0.1)
     measured = cell.measure(made.record.isel(sample=slice(None, None, 12)), seed=2)
     with_rest_curvature(made.rod)
-    fitted = reconstruct(measured, method="constrained", load_cell=cell, friction=FRICTION)
-    tree = infer_contacts(measured, load_cell=cell, friction=FRICTION, seed=1)
+    fitted = reconstruct(measured, method="constrained", rig=Rig(load_cell=cell, unknown={"friction": FRICTION}))
+    tree = infer_contacts(measured, rig=Rig(load_cell=cell, unknown={"friction": FRICTION}), seed=1)
     ok = fitted.status.values == "ok"
     assert ok.sum() >= 4
     assert tree["sample_stats"].converged.values[ok].all()

@@ -7,6 +7,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 CONTOUR = Parabola(0.5, 0.5)
@@ -15,12 +16,13 @@ CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 
 
 def swept(rod, step=4.0, friction=0.0):
-    return scan(CONTOUR, rod=rod, drive_step=np.radians(step), friction=friction).record
+    return scan(CONTOUR, rig=Rig(rod=rod, unknown={"friction": friction}), drive_step=np.radians(step)).record
 
 
-def score(record, seed, cell=CELL, **known):
+def score(record, seed, cell=CELL, rod=None, friction=0.0):
     measured = cell.measure(record, seed=seed)
-    return reconstruct(measured, method="constrained", load_cell=cell, **known).attrs["axial_score"]
+    rig = Rig(rod=rod, load_cell=cell, unknown={"friction": friction})
+    return reconstruct(measured, rig, method="constrained").attrs["axial_score"]
 
 
 @pytest.mark.parametrize("curvature", [0.0, 0.4])

@@ -17,6 +17,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides, doubtful_sweeps, reconstruct, with_sides
 from tactile_bayes.record import make_record
+from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.runs.reconstruction import reconstruction_messages
 from tactile_bayes.sweep import scan
 
@@ -25,15 +26,8 @@ CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 
 def simulated(family, count, spread=0.3, seed=7):
     """Records of the default prior, biases having three times its standard deviation."""
-    priors = {f"{name}_bias": stats.norm(0.0, spread) for name in ("moment", "force_x", "force_y")}
-    experiment = experiment_of(
-        seed=1,
-        family=family,
-        load_cell=CELL,
-        priors=priors,
-        nuisances=("rigidity_scale", "drive_angle_offset", "bias"),
-        friction=0.0,
-    )
+    unknown = {"lever": 0.0, "backlash": 0.0, "friction": 0.0, "bias": stats.norm(0.0, spread)}
+    experiment = experiment_of(family, Rig(load_cell=CELL, unknown=unknown), seed=1)
     for number in range(count):
         yield simulate(experiment, np.random.default_rng([seed, number])).measured
 
@@ -117,10 +111,10 @@ def test_without_a_zero_the_prior_of_a_bias_decides():
 def test_step_2_takes_the_side_that_fits_and_says_so():
     """The moment speaks against the direction; forces and drive angles fit contacts on its side alone."""
     measured = in_contact_throughout(-0.3)
-    contacts = reconstruct(measured, method="constrained", load_cell=CELL)
+    contacts = reconstruct(measured, method="constrained", rig=Rig(load_cell=CELL))
     assert json.loads(contacts.attrs["doubtful_sides"]) == {"0": "forward"}
     assert "sweep 0 as a forward one" in reconstruction_messages(contacts)[0]
-    assert "doubtful_sides" not in reconstruct(in_contact_throughout(0.3), load_cell=CELL).attrs
+    assert "doubtful_sides" not in reconstruct(in_contact_throughout(0.3), rig=Rig(load_cell=CELL)).attrs
 
 
 @pytest.mark.slow
@@ -136,9 +130,7 @@ def test_in_doubt_evidence_decides_which_side_it_was():
     assert doubtful_sweeps(shifted, CELL) == (0,)
     found = infer_contour(
         shifted,
-        load_cell=CELL,
-        nuisances=["bias"],
-        priors={"moment_bias": stats.norm(0.0, 1.0)},
+        rig=Rig(load_cell=CELL, unknown={**NOTHING, "bias": "default", "moment_bias": stats.norm(0.0, 1.0)}),
         seed=1,
         settings=SamplerSettings(ensembles=2, max_steps=50),
     )

@@ -13,6 +13,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples, reconstruct
 from tactile_bayes.record import in_frame, make_record
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 NUMBERS = ("contact_x", "contact_y", "contact_arclength", "slope_angle")
@@ -58,9 +59,9 @@ def assert_statuses_tell_the_truth(contacts):
 @pytest.mark.parametrize("profile", ["I", "II", "III", "IV"])
 def test_a_record_without_noise_gives_the_contour_back(profile, q, base, friction):
     contour = paper_profile(profile, q)
-    record = scan(contour, base=base, friction=friction, drive_step=np.radians(3)).record
+    record = scan(contour, base=base, rig=Rig(unknown={"friction": friction}), drive_step=np.radians(3)).record
     assert set(record.direction.values) == {"forward", "backward"}
-    assert_contour_comes_back(record, reconstruct(record, friction=friction), contour)
+    assert_contour_comes_back(record, reconstruct(record, rig=Rig(unknown={"friction": friction})), contour)
 
 
 @pytest.mark.parametrize(
@@ -72,8 +73,8 @@ def test_a_record_without_noise_gives_the_contour_back(profile, q, base, frictio
     ],
 )
 def test_units_and_thickness_of_the_rod_come_out_right(contour, base, rod, friction):
-    record = scan(contour, base=base, rod=rod, friction=friction, drive_step=np.radians(3)).record
-    contacts = reconstruct(record, friction=friction)
+    record = scan(contour, base=base, rig=Rig(rod=rod, unknown={"friction": friction}), drive_step=np.radians(3)).record
+    contacts = reconstruct(record, rig=Rig(unknown={"friction": friction}))
     assert_contour_comes_back(record, contacts, contour, rod.length)
     metre = "m" if record.attrs["units"] == "SI" else "1"
     assert [contacts[name].attrs["units"] for name in NUMBERS] == [metre, metre, metre, "rad"]
@@ -88,7 +89,7 @@ def test_what_identifies_a_sample_is_kept(swept):
 
 @pytest.mark.parametrize("rod", [None, WIRE])
 def test_forces_may_have_been_measured_in_the_turning_frame(rod):
-    record = scan(Parabola(2.5, 0.1) if rod else CONTOUR, rod=rod, drive_step=0.1).record
+    record = scan(Parabola(2.5, 0.1) if rod else CONTOUR, rig=Rig(rod=rod), drive_step=0.1).record
     contacts, turning = reconstruct(record), reconstruct(in_frame(record, "turning"))
     assert (turning.status == contacts.status).all()
     for name in NUMBERS:
@@ -105,7 +106,7 @@ def test_sweeps_may_be_interleaved(swept):
 
 
 def test_friction_that_is_left_out_turns_the_slope_by_its_angle():
-    record = scan(Parabola(0.5, 0.3), friction=0.3, drive_step=0.1).record
+    record = scan(Parabola(0.5, 0.3), rig=Rig(unknown={"friction": 0.3}), drive_step=0.1).record
     on = record.truth_contact_phase.values != "none"
     turn = (reconstruct(record).slope_angle - record.truth_slope_angle).values[on]
     side = np.where(record.direction.values[on] == "forward", 1.0, -1.0)
@@ -190,7 +191,7 @@ def test_no_sample_raises_and_none_is_silently_empty(loads, angle, direction, no
     columns = {"sweep": 0, "direction": direction, "drive_angle": np.full(len(loads), angle)}
     record = make_record({**columns, "holding_moment": moment, "force_x": force_x, "force_y": force_y})
     cell = None if noise is None else LoadCell(force_noise=noise, moment_noise=noise)
-    assert_statuses_tell_the_truth(reconstruct(record, load_cell=cell, friction=friction))
+    assert_statuses_tell_the_truth(reconstruct(record, rig=Rig(load_cell=cell, unknown={"friction": friction})))
 
 
 # --- With noise ---------------------------------------------------------------------------------------------------
@@ -213,7 +214,7 @@ def test_small_noise_makes_proportionate_errors(swept):
 
 def test_a_noisy_record_scatters_about_the_contour():
     contour = Parabola(2.5, 0.1)
-    record = scan(contour, rod=WIRE).record
+    record = scan(contour, rig=Rig(rod=WIRE)).record
     cell = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
     contacts = reconstruct(cell.measure(record, seed=1))
     assert_statuses_tell_the_truth(contacts)
@@ -226,8 +227,8 @@ def test_a_noisy_record_scatters_about_the_contour():
 def test_the_data_sheet_in_the_record_is_the_default(swept):
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(swept, seed=1)
     by_default = reconstruct(measured)
-    assert by_default.identical(reconstruct(measured, load_cell=LoadCell(force_noise=0.05, moment_noise=0.02)))
-    assert (reconstruct(measured, load_cell=LoadCell()).status.values != "no contact").all()
+    assert by_default.identical(reconstruct(measured, rig=Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02))))
+    assert (reconstruct(measured, rig=Rig(load_cell=LoadCell())).status.values != "no contact").all()
 
 
 @pytest.mark.parametrize("missing", [(), ("holding_moment",), ("force_x", "force_y")], ids=["all", "forces", "moment"])
@@ -259,9 +260,9 @@ def test_a_missing_channel_is_refused(swept, name):
 
 def test_a_rod_that_is_given_holds_against_the_one_stated():
     contour = Parabola(2.5, 0.1)
-    record = scan(contour, rod=WIRE, drive_step=0.1).record
+    record = scan(contour, rig=Rig(rod=WIRE), drive_step=0.1).record
     wrong = record.assign_attrs(rod_length=0.3, rod_flexural_rigidity=1e-3, rod_diameter=0.0)
-    assert_contour_comes_back(record, reconstruct(wrong, rod=WIRE), contour, WIRE.length)
+    assert_contour_comes_back(record, reconstruct(wrong, rig=Rig(rod=WIRE)), contour, WIRE.length)
     assert wrong.attrs["rod_length"] == 0.3
     with pytest.raises(AssertionError):
         assert_contour_comes_back(record, reconstruct(wrong), contour, WIRE.length)
@@ -269,4 +270,4 @@ def test_a_rod_that_is_given_holds_against_the_one_stated():
 
 def test_a_rod_in_si_does_not_fit_a_dimensionless_record(swept):
     with refused(ParameterError, "dimensionless", WIRE):
-        reconstruct(swept, rod=WIRE)
+        reconstruct(swept, rig=Rig(rod=WIRE))

@@ -8,6 +8,7 @@ from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.contacts.contact_coordinates import contact_states
 from tactile_bayes.mechanics.elastica import contact_from_wrench
 from tactile_bayes.record import make_record
+from tactile_bayes.rig import Rig
 
 CELL = tb.LoadCell(force_noise=0.01, moment_noise=0.005)
 PSI1 = np.array([1.8, 2.0, 2.2])
@@ -45,7 +46,7 @@ def test_step_2_returns_the_second_point_without_moment(name, side):
     record, rod, place = touching(name, side)
     assert np.all(side * record["holding_moment"].values > 0.0)
     for method, cell in (("raw", None), ("raw", CELL), ("constrained", CELL)):
-        found = tb.reconstruct(record, rod=rod, method=method, load_cell=cell)
+        found = tb.reconstruct(record, rig=Rig(rod=rod, load_cell=cell), method=method)
         assert set(found["contact_phase"].values) == {"tip"}
         for name_of, values in zip(("contact_x", "contact_y", "slope_angle"), place, strict=True):
             np.testing.assert_allclose(found[name_of], values, atol=1e-9, err_msg=f"{method} {name_of}")
@@ -63,7 +64,7 @@ def test_one_state_is_that_of_its_wrench_and_its_shape_ends_there():
 def test_two_points_that_are_nearly_as_good_are_both_returned():
     """Moments that vanish 0.1 L before the tip, and where the rod is at 0.64, 0.44 and 0.24 rad to the contour."""
     record, rod, place = touching("arc", force=8.0, psi1=np.array([2.5, 2.7, 2.9]), arclength=0.9)
-    found = tb.reconstruct(record, rod=rod)
+    found = tb.reconstruct(record, rig=Rig(rod=rod))
     assert found["status"].values.tolist() == ["ok", "ok", "ambiguous"]
     np.testing.assert_allclose([found["contact_x"], found["contact_y"]], place[:2], atol=1e-9)
     np.testing.assert_array_equal(np.isfinite(found["other_contact_x"]), [False, False, True])
@@ -72,7 +73,7 @@ def test_two_points_that_are_nearly_as_good_are_both_returned():
 
 def test_it_is_a_branch_of_the_posterior():
     record, rod, place = touching("arc")
-    tree = tb.infer_contacts(record, rod=rod, load_cell=CELL, seed=1, method="importance")
+    tree = tb.infer_contacts(record, rig=Rig(rod=rod, load_cell=CELL), seed=1, method="importance")
     assert tree["sample_stats"]["converged"].values.all()
     np.testing.assert_array_less(tree["sample_stats"]["tangential_probability"].values, 0.01)
     draws = tree["posterior"].to_dataset().stack(all=("chain", "draw"))

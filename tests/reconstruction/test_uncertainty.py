@@ -13,6 +13,7 @@ from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, in_frame, make_record
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 METHODS = pytest.mark.parametrize("method", ["raw", "constrained"])
@@ -42,8 +43,8 @@ def scenes(swept):
     return {
         "plain": (swept, 0.0),
         "turning": (in_frame(swept, "turning"), 0.0),
-        "friction": (scan(paper_profile("II", q=0.5), drive_step=0.05, friction=0.3).record, 0.3),
-        "SI": (scan(Parabola(2.5, 0.1), drive_step=0.05, rod=WIRE).record, 0.0),
+        "friction": (scan(paper_profile("II", q=0.5), drive_step=0.05, rig=Rig(unknown={"friction": 0.3})).record, 0.3),
+        "SI": (scan(Parabola(2.5, 0.1), drive_step=0.05, rig=Rig(rod=WIRE)).record, 0.0),
     }
 
 
@@ -129,7 +130,7 @@ def test_contacts_scatter_as_stated(scenes, method, sensor, phase, direction):
     copies = record.isel(sample=np.full(COPIES, pick(record, phase, direction)))
     seed = [sum(map(ord, sensor + phase + direction))]
     measured = load_cell.measure(copies, seed=np.random.default_rng(seed))
-    contacts = reconstruct(measured, method=method, friction=friction)
+    contacts = reconstruct(measured, method=method, rig=Rig(unknown={"friction": friction}))
     assert set(contacts.status.values) <= {"ok", "beyond the tip"}
     if method == "constrained":
         assert (contacts.contact_phase == phase).all()
@@ -165,10 +166,10 @@ def test_errors_that_samples_share_are_in_each(swept, method, kind):
         loads = np.stack([one[name].values for name in CHANNELS], axis=-1)
         readings = load_cell.simulate(np.broadcast_to(loads, (records, late + 1, 3)), seed=1)[:, -1]
         angles = one.drive_angle.values[0] + load_cell.drive_angle_noise * np.random.default_rng(2).normal(size=records)
-        stated = reconstruct(one, method=method, load_cell=load_cell).isel(sample=-1)
+        stated = reconstruct(one, method=method, rig=Rig(load_cell=load_cell)).isel(sample=-1)
         table = {"sweep": 0, "direction": "forward", "drive_angle": angles}
         record = make_record(table | dict(zip(CHANNELS, readings.T, strict=True)))
-        contacts = reconstruct(record, method="raw", load_cell=LoadCell())
+        contacts = reconstruct(record, method="raw", rig=Rig(load_cell=LoadCell()))
         if method == "constrained":
             sheet = load_cell.covariance(np.zeros((late + 1, 3)))[-1]
             spread = np.sqrt(np.diag(sheet))
@@ -178,7 +179,7 @@ def test_errors_that_samples_share_are_in_each(swept, method, kind):
                 bias_uncertainty=(0.0, 0.0, float(np.sqrt(max(spread[2] ** 2 - spread[1] ** 2, 0.0)))),
                 drive_angle_noise=load_cell.drive_angle_noise,
             )
-            contacts = reconstruct(record, method=method, load_cell=white)
+            contacts = reconstruct(record, method=method, rig=Rig(load_cell=white))
         for name in (*SPREADS[:3], *(() if method == "constrained" and phase == "tip" else SPREADS[3:4])):
             found = contacts[name.removesuffix("_sd")].values.std()
             assert abs(found / float(stated[name]) - 1.0) < 4.5 / np.sqrt(2.0 * records), (phase, name)
@@ -202,7 +203,7 @@ def test_the_misfit_is_chi_square_clear_of_the_edge(scenes, sensor):
     name, load_cell = SENSORS[sensor]
     record, friction = scenes[name]
     contacts = [
-        reconstruct(measured, method="constrained", friction=friction)
+        reconstruct(measured, method="constrained", rig=Rig(unknown={"friction": friction}))
         for measured in noisy_records(in_contact(record), load_cell, 20)
     ]
     misfit, distance = (np.concatenate([c[name].values for c in contacts]) for name in ("misfit", "edge_distance"))
@@ -232,18 +233,21 @@ def test_the_attributes_sum_up_the_misfits(swept):
 
 
 def test_the_misfit_tells_of_friction_that_is_ignored():
-    record = scan(paper_profile("II", q=0.3), friction=0.3, drive_step=0.05).record
+    record = scan(paper_profile("II", q=0.3), rig=Rig(unknown={"friction": 0.3}), drive_step=0.05).record
     measured = FAMILIAR.measure(record, seed=1)
     assert reconstruct(measured, method="constrained").attrs["misfit_probability"] < 1e-12
-    assert reconstruct(measured, method="constrained", friction=0.3).attrs["misfit_probability"] > 1e-4
+    assert (
+        reconstruct(measured, method="constrained", rig=Rig(unknown={"friction": 0.3})).attrs["misfit_probability"]
+        > 1e-4
+    )
 
 
 def test_the_misfit_tells_of_a_rod_that_is_stiffer_than_stated():
-    record = scan(Parabola(1.5, 0.06), rod=WIRE, drive_step=0.05).record
+    record = scan(Parabola(1.5, 0.06), rig=Rig(rod=WIRE), drive_step=0.05).record
     load_cell = LoadCell(force_noise=0.05 * WIRE.force_unit, moment_noise=0.02 * WIRE.moment_unit)
     measured = load_cell.measure(record, seed=1)
     wrong = Rod(WIRE.length, 0.8 * WIRE.flexural_rigidity, diameter=WIRE.diameter)
-    assert reconstruct(measured, method="constrained", rod=wrong).attrs["misfit_probability"] < 1e-12
+    assert reconstruct(measured, method="constrained", rig=Rig(rod=wrong)).attrs["misfit_probability"] < 1e-12
     assert reconstruct(measured, method="constrained").attrs["misfit_probability"] > 1e-4
 
 
@@ -315,9 +319,13 @@ def lone(moment, force_x, force_y, angle=1.2):
 @METHODS
 def test_a_weak_load_is_nonlinear(method):
     """Twice the noise of the forces, and of the moment."""
-    contacts = reconstruct(lone(0.04, 0.0, 0.1), method=method, load_cell=LoadCell(force_noise=0.05, moment_noise=0.02))
+    contacts = reconstruct(
+        lone(0.04, 0.0, 0.1), method=method, rig=Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02))
+    )
     assert contacts.status.item() in ("no contact", "nonlinear")
-    strong = reconstruct(lone(0.4, 0.0, 1.0), method=method, load_cell=LoadCell(force_noise=5e-3, moment_noise=2e-3))
+    strong = reconstruct(
+        lone(0.4, 0.0, 1.0), method=method, rig=Rig(load_cell=LoadCell(force_noise=5e-3, moment_noise=2e-3))
+    )
     assert strong.status.item() == ("ok" if method == "raw" else "does not fit")  # the four numbers are arbitrary
 
 
@@ -328,7 +336,7 @@ def test_samples_near_the_edge_are_at_the_edge(swept):
     words = np.stack([reconstruct(m, method="constrained").status.values for m in noisy_records(record, FAMILIAR, 20)])
     share = (words == "at the edge").mean(axis=0)
     assert share.max() > 0.5
-    ideal = reconstruct(record, method="constrained", load_cell=FAMILIAR)
+    ideal = reconstruct(record, method="constrained", rig=Rig(load_cell=FAMILIAR))
     assert (share[ideal.edge_distance.values > 6.0] == 0.0).all()
     assert (share > 0.0).sum() < 0.3 * share.size
 
@@ -353,7 +361,7 @@ def test_without_a_noise_level_there_are_no_standard_deviations(swept):
 @pytest.mark.parametrize("load_cell", [None, LoadCell(force_noise=0.05), LoadCell(moment_noise=0.02)])
 def test_the_constrained_method_needs_noise_on_every_channel(swept, load_cell):
     with refused(ParameterError, "LoadCell(force_noise=..., moment_noise=...)"):
-        reconstruct(swept, method="constrained", load_cell=load_cell)
+        reconstruct(swept, method="constrained", rig=Rig(load_cell=load_cell))
 
 
 @pytest.mark.parametrize("nu", [1.0, 2.0])
@@ -396,7 +404,7 @@ def test_units_do_not_matter(method):
     )
     lengths = ("contact_x", "contact_y", "contact_arclength", "tangent_sd", "normal_sd")
     scale = dict.fromkeys((*lengths, *(f"{n}_sd" for n in lengths[:3])), rod.length)
-    here, there = reconstruct(measured, method=method), reconstruct(in_si, method=method, load_cell=si_cell)
+    here, there = reconstruct(measured, method=method), reconstruct(in_si, method=method, rig=Rig(load_cell=si_cell))
     assert_same(there, here, SETTLED[method], scale)
     assert there.contact_x_sd.attrs["units"] == "m"
     assert there.slope_angle_sd.attrs["units"] == "rad"
@@ -423,7 +431,7 @@ def test_a_mirrored_record_has_mirrored_contacts(method, frame):
         correlation=(0.5 * m * x, -0.3 * m * y, 0.2 * x * y),
     )
     forward = reconstruct(measured, method=method)
-    backward = reconstruct(other, method=method, load_cell=mirrored)
+    backward = reconstruct(other, method=method, rig=Rig(load_cell=mirrored))
     turned = dict.fromkeys(("contact_x", "slope_angle", "contact_xy_correlation"), -1.0)
     assert_same(backward, forward, SETTLED[method], signs=turned)
 
@@ -460,11 +468,11 @@ def test_one_bad_sample_leaves_the_others_as_they_are(swept, method, bad):
 def test_the_radius_of_the_rod_moves_points_and_their_spread():
     """A slope that is uncertain moves the object's surface about the rod's axis."""
     thin, thick = Rod(0.2, 2.4e-3), Rod(0.2, 2.4e-3, diameter=0.02)
-    record = scan(Parabola(2.5, 0.1), rod=thin, drive_step=0.1).record
+    record = scan(Parabola(2.5, 0.1), rig=Rig(rod=thin), drive_step=0.1).record
     load_cell = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
     measured = load_cell.measure(record, seed=1)
     for method in ("raw", "constrained"):
-        axis, surface = (reconstruct(measured, method=method, rod=rod) for rod in (thin, thick))
+        axis, surface = (reconstruct(measured, method=method, rig=Rig(rod=rod)) for rod in (thin, thick))
         alpha = axis.slope_angle
         np.testing.assert_allclose(surface.contact_x, axis.contact_x - 0.01 * np.sin(alpha), atol=1e-12)
         np.testing.assert_allclose(surface.contact_y, axis.contact_y + 0.01 * np.cos(alpha), atol=1e-12)
@@ -487,7 +495,9 @@ def test_the_force_along_the_rod_agrees_with_the_moment(frame, drive_angle_noise
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, frame=frame, drive_angle_noise=drive_angle_noise)
     record = scan(Parabola(0.5, 0.5), drive_step=np.radians(8.0)).record
     scores = [
-        reconstruct(load_cell.measure(record, seed=k), method="constrained", load_cell=load_cell).attrs["axial_score"]
+        reconstruct(load_cell.measure(record, seed=k), method="constrained", rig=Rig(load_cell=load_cell)).attrs[
+            "axial_score"
+        ]
         for k in range(count)
     ]
     assert abs(np.mean(scores)) < 4.5 / np.sqrt(count)
@@ -496,10 +506,12 @@ def test_the_force_along_the_rod_agrees_with_the_moment(frame, drive_angle_noise
 
 def test_friction_makes_it_disagree_unless_it_is_known():
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    record = scan(Parabola(0.5, 0.5), drive_step=np.radians(4.0), friction=0.1).record
+    record = scan(Parabola(0.5, 0.5), drive_step=np.radians(4.0), rig=Rig(unknown={"friction": 0.1})).record
     measured = load_cell.measure(record, seed=1)
     unknown, known = (
-        reconstruct(measured, method="constrained", load_cell=load_cell, friction=mu).attrs["axial_score"]
+        reconstruct(measured, method="constrained", rig=Rig(load_cell=load_cell, unknown={"friction": mu})).attrs[
+            "axial_score"
+        ]
         for mu in (0.0, 0.1)
     )
     assert unknown < -20.0

@@ -14,6 +14,7 @@ from tactile_bayes.mechanics.contacts.contact_coordinates import (
 )
 from tactile_bayes.mechanics.elastica import contact_from_wrench
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import Rig
 
 RODS = {
     "tapered": tb.Rod(diameter=0.04, taper=0.5),
@@ -28,7 +29,11 @@ TRUTHS = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
 
 
 def swept(name, friction=0.0):
-    return tb.scan(tb.contours.Circle(0.3, 0.5), rod=RODS[name], friction=friction, drive_step=np.radians(4.0)).record
+    return tb.scan(
+        tb.contours.Circle(0.3, 0.5),
+        rig=Rig(rod=RODS[name], unknown={"friction": friction}),
+        drive_step=np.radians(4.0),
+    ).record
 
 
 @pytest.mark.parametrize("method", ["raw", "constrained"])
@@ -36,7 +41,7 @@ def swept(name, friction=0.0):
 @pytest.mark.parametrize("name", RODS)
 def test_a_scan_without_noise_gives_its_contacts_back(name, friction, method):
     record = swept(name, friction)
-    found = tb.reconstruct(record, method=method, load_cell=CELL, friction=friction)
+    found = tb.reconstruct(record, method=method, rig=Rig(load_cell=CELL, unknown={"friction": friction}))
     loaded = record["truth_contact_phase"].values != "none"
     assert set(found["status"].values[loaded]) <= {"ok", "at the edge"}
     for truth in TRUTHS:
@@ -47,8 +52,10 @@ def test_a_scan_without_noise_gives_its_contacts_back(name, friction, method):
 def test_an_si_record_states_all_that_step_2_takes(name):
     own = RODS[name]
     rod = tb.Rod(0.1, 1.2e-5, taper=own.taper, rest_curvature=lambda s: 10.0 * _values(own, 10.0 * s))
-    record = tb.scan(tb.contours.Circle(0.03, 0.05), rod=rod, drive_step=np.radians(4.0), direction="forward").record
-    found = tb.reconstruct(record, load_cell=tb.LoadCell(force_noise=1e-12, moment_noise=1e-13))
+    record = tb.scan(
+        tb.contours.Circle(0.03, 0.05), rig=Rig(rod=rod), drive_step=np.radians(4.0), direction="forward"
+    ).record
+    found = tb.reconstruct(record, rig=Rig(load_cell=tb.LoadCell(force_noise=1e-12, moment_noise=1e-13)))
     loaded = record["truth_contact_phase"].values != "none"
     np.testing.assert_allclose(found["contact_x"].values[loaded], record["truth_contact_x"].values[loaded], atol=1e-10)
 
@@ -161,10 +168,10 @@ def _free_end(slope, angle, moment, arclength, ends):
 
 
 def test_a_contact_posterior_of_a_tapered_rod_holds_the_truth():
-    record = tb.scan(tb.contours.Circle(0.3, 0.5), rod=RODS["tapered"], drive_step=np.radians(10.0)).record
+    record = tb.scan(tb.contours.Circle(0.3, 0.5), rig=Rig(rod=RODS["tapered"]), drive_step=np.radians(10.0)).record
     cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
     measured = cell.measure(record, seed=3)
-    contacts = tb.infer_contacts(measured, load_cell=cell, seed=1)["posterior"].to_dataset()
+    contacts = tb.infer_contacts(measured, rig=Rig(load_cell=cell), seed=1)["posterior"].to_dataset()
     contacts = contacts.isel(sample=np.isfinite(contacts["contact_x"].values).all(axis=(0, 1)))
     truth = record["truth_contact_x"].values[contacts["sample"].values]
     low, high = contacts["contact_x"].quantile([0.005, 0.995], dim=("chain", "draw")).values

@@ -10,6 +10,7 @@ from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.record import carried_sweeps, travels_of
+from tactile_bayes.rig import Rig
 
 CIRCLE = tb.contours.Circle(0.3, 0.8)
 THERE = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
@@ -126,7 +127,7 @@ def test_an_inspection_reports_travels_and_finds_lost_samples():
 
 def test_lengths_of_a_stage_are_in_metres(tmp_path):
     drive = tb.Translation((0.08, 0.0), np.pi, 1.2, 0.16)
-    record = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rod=ROD).record
+    record = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rig=Rig(rod=ROD)).record
     path = _stage(tmp_path / "stage.csv", record, "# drive_angle: 68.75 [deg]\n")
     with pytest.warns(tb.errors.RecordWarning, match="for base_x, holding_moment, force_x and force_y: taken as m,"):
         read = tb.read_record(path, rod=ROD, split_sweeps=True)

@@ -41,7 +41,7 @@ def test_decimal_commas_need_no_known_names_to_be_told_from_separators(tmp_path,
     message = "there is no column 'sweep' (columns: Zeit, Winkel_grad, Mz_mNm, Fx_mN, Fy_mN)"
     assert (result.exit_code, result.stdout) == (2, "")
     assert message in result.stderr
-    assert "on the command line --column sweep=NAME" in result.stderr
+    assert 'sweep = "NAME" under [file] of rig.toml' in result.stderr
 
 
 def test_commas_in_names_part_no_columns_where_semicolons_do(tmp_path, plain):

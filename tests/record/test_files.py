@@ -277,7 +277,7 @@ def test_si_without_a_rod_is_refused_or_completed(tmp_path):
     with refused(
         RecordError,
         f"{path}: the record is SI, but rod_flexural_rigidity of its rod is not stated: give rod=Rod(length=..., "
-        "flexural_rigidity=...), on the command line --length and --flexural-rigidity",
+        "flexural_rigidity=...), length and flexural_rigidity under [rod] of rig.toml",
     ):
         read_record(path)
     assert rod_of(read_record(path, rod=WIRE)) == WIRE

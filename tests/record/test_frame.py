@@ -25,6 +25,7 @@ from tactile_bayes.record import (
     validate,
     write_record,
 )
+from tactile_bayes.rig import Rig
 
 EPS = np.finfo(float).eps
 ANGLES = np.array(columns()["drive_angle"])
@@ -79,7 +80,7 @@ def test_there_and_back_is_the_same_record(forces, turn, frame):
 )
 def test_the_axial_force_tells_the_phase_in_both_directions(contour, base, rod):
     """D = axial force − m0²/2 is zero in tangential contact, and positive in tip contact (without friction)."""
-    record = to_dimensionless(in_frame(tb.scan(contour, base=base, rod=rod).record, "turning"))
+    record = to_dimensionless(in_frame(tb.scan(contour, base=base, rig=Rig(rod=rod)).record, "turning"))
     excess = record["force_x"].values - 0.5 * record["holding_moment"].values ** 2
     phase = record["truth_contact_phase"].values
     for direction in ("forward", "backward"):

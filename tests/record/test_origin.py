@@ -1,7 +1,6 @@
-"""Columns of a rig: names, units, signs and zeros of its own."""
+"""Columns of a rig: names, units, factors, signs and zeros of its own."""
 
 import re
-import shlex
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError, RecordError, RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import make_record, read_record, rod_of, to_dimensionless, write_record
-from tactile_bayes.record.origin import Origin, column_option, origins_of
+from tactile_bayes.record.origin import Origin, column_entry, origins_of
 from tactile_bayes.record.table import Source
 
 
@@ -51,6 +50,16 @@ from tactile_bayes.record.table import Source
         ("90-F", ["90-F"], Origin("90-F")),
         ("-F-1[N]", ["F-1"], Origin("F-1", "N", -1)),
         ("5", ["5"], Origin("5")),
+        # Factors, and names that look like them.
+        ("1e-3 * Fx [N]", ["Fx"], Origin("Fx", "N", factor=1e-3)),
+        ("-0.5*Mz", ["Mz"], Origin("Mz", None, -1, factor=0.5)),
+        ("90 - 0.1 * Angle [deg]", ["Angle"], Origin("Angle", "deg", -1, 90.0, factor=0.1)),
+        ("2*Fx[mN]+1.5", ["Fx"], Origin("Fx", "mN", 1, 1.5, factor=2.0)),
+        ("2*Fx", ["2*Fx", "Fx"], Origin("2*Fx")),
+        ("-2*Fx[N]", ["2*Fx", "Fx"], Origin("2*Fx", "N", -1)),
+        ("3*2*Fx", ["2*Fx", "Fx"], Origin("2*Fx", factor=3.0)),
+        ("Fx*", ["Fx*", "Fx"], Origin("Fx*")),
+        ("Fx*Fy", ["Fx*Fy"], Origin("Fx*Fy")),
     ],
 )
 def test_what_stands_for_a_column(text, names, origin):
@@ -77,8 +86,11 @@ def test_one_value_for_all_samples(target, text, origin):
         ("force", "Fx", "columns: 'force' is no column of a record: did you mean 'force_x'?"),
         ("Q", "Fx", "columns: 'Q' is no column of a record"),
         ("force_x", "0.5", "'0.5' is given for 'force_x', which is measured"),
-        ("sweep", "-Fx", "'-Fx' is given for 'sweep', which has no unit, sign or zero"),
-        ("direction", "Fx[mm]", "'Fx[mm]' is given for 'direction', which has no unit, sign or zero"),
+        ("sweep", "-Fx", "'-Fx' is given for 'sweep', which has no unit, factor, sign or zero"),
+        ("sweep", "2*Fx", "'2*Fx' is given for 'sweep', which has no unit, factor, sign or zero"),
+        ("direction", "Fx[mm]", "'Fx[mm]' is given for 'direction', which has no unit, factor, sign or zero"),
+        ("force_x", "0*Fx", "give a factor above zero"),
+        ("force_x", "1e999*Fx", "give a factor above zero"),
         ("force_x", "Fx[kilopond]", "'kilopond' is no unit of it: it takes N, kN, mN, µN or gf"),
     ],
 )
@@ -186,7 +198,7 @@ def test_an_angle_that_counts_on_is_refused_with_what_to_subtract(tmp_path, lead
     angles = np.arange(393.7, 403.0) + 360 * turn
     path.write_text("\n".join(["Angle,Mz,Fx,Fy", *(f"{angle:.1f},1,2,3" for angle in angles), ""]), encoding="utf-8")
     given = {"drive_angle": f"{lead}Angle[{unit}]", "holding_moment": "Mz[Nm]", "force_x": "Fx[N]", "force_y": "Fy[N]"}
-    with refused(RecordError, "line 2", "beyond a turn", f"--column 'drive_angle={advice}'"):
+    with refused(RecordError, "line 2", "beyond a turn", f'drive_angle = "{advice}" under [file]'):
         read_record(path, columns=given, split_sweeps=True, rod=WIRE)
     angle = read_record(path, columns={**given, "drive_angle": advice}, split_sweeps=True, rod=WIRE).drive_angle
     assert np.abs(angle).max() <= 2.0 * np.pi
@@ -373,8 +385,8 @@ SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
             {"Moment": None},
             {"holding_moment": None},
             "there is no column 'holding_moment' (columns: Zeit [s], Hub, Richtung, Winkel [°], Fx (mN), Fy, a / b, "
-            "a [b]): add it, or say what stands for it, columns={'holding_moment': 'NAME[UNIT]'}, on the command line "
-            "--column 'holding_moment=NAME[UNIT]', or declare the channel missing",
+            "a [b]): add it, or say what stands for it, columns={'holding_moment': 'NAME[UNIT]'}, or "
+            'holding_moment = "NAME[UNIT]" under [file] of rig.toml, or declare the channel missing',
         ),
     ],
 )
@@ -392,8 +404,8 @@ def test_a_column_that_is_nearly_one_of_a_record_is_called_as_in_the_file(tmp_pa
     with refused(
         RecordError,
         "there is no column 'drive_angle', but a column 'drive/angle': did you mean 'drive_angle'? Rename it, or say "
-        "what stands for it, columns={'drive_angle': 'drive/angle'}, on the command line --column "
-        "drive_angle=drive/angle",
+        "what stands for it, columns={'drive_angle': 'drive/angle'}, or "
+        'drive_angle = "drive/angle" under [file] of rig.toml',
     ):
         read_record(path)
 
@@ -401,7 +413,7 @@ def test_a_column_that_is_nearly_one_of_a_record_is_called_as_in_the_file(tmp_pa
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("A", "columns={'drive_angle': 'A[deg]'} of read_record, on the command line --column 'drive_angle=A[deg]'"),
+        ("A", "columns={'drive_angle': 'A[deg]'} of read_record, or drive_angle = \"A[deg]\" under [file] of rig.toml"),
         ("-A", "columns={'drive_angle': '-A[deg]'} of read_record"),
         ("-A+90", "columns={'drive_angle': '90-A[deg]'} of read_record"),
         ("A-0.5", "columns={'drive_angle': '-0.5+A[deg]'} of read_record"),
@@ -421,7 +433,7 @@ def test_what_looks_like_degrees_may_be_said_to_be_in_the_words_of_the_file(tmp_
 def test_without_a_file_degrees_are_not_said_of_a_column_of_one():
     with refused(RecordError, "57.29577951308232 is more than a turn (2π), so the angles look like degrees") as one:
         make_record(columns(drive_angle=np.degrees(columns()["drive_angle"])))
-    assert "--column" not in str(one.value)
+    assert "rig.toml" not in str(one.value)
     assert "columns=" not in str(one.value)
 
 
@@ -440,8 +452,8 @@ def test_a_unit_in_the_header_and_another_one_given_contradict_each_other(tmp_pa
 
 @pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize("added", [0.0, 0.0182, -0.5])
-@pytest.mark.parametrize("given", ["Fx[mN]", "-Fx[mN]", "12.5-Fx[mN]", "Fx[mN]-0.125"])
-def test_an_option_reads_a_column_with_another_sign_and_zero(tmp_path, given, added, sense):
+@pytest.mark.parametrize("given", ["Fx[mN]", "-Fx[mN]", "12.5-Fx[mN]", "Fx[mN]-0.125", "12.5-0.1*Fx[mN]", "3*Fx[mN]"])
+def test_an_entry_reads_a_column_with_another_sign_and_zero(tmp_path, given, added, sense):
     path = tmp_path / "lab.csv"
     path.write_text("sweep,direction,drive_angle [rad],Fx\n0,forward,1.2,18.25\n0,forward,1.3,-7.5\n")
 
@@ -450,21 +462,28 @@ def test_an_option_reads_a_column_with_another_sign_and_zero(tmp_path, given, ad
         return read_record(path, columns={"force_x": text}, rod=Rod(0.1, 1.2e-5), missing=channels)["force_x"]
 
     first = read(given)
-    option, text = shlex.split(column_option(first, sense=sense, added=added))
-    assert option == "--column"
-    np.testing.assert_allclose(read(text.removeprefix("force_x=")), sense * first + added, rtol=1e-12, atol=1e-15)
+    text = column_entry(first, sense=sense, added=added)
+    np.testing.assert_allclose(read(text), sense * first + added, rtol=1e-12, atol=1e-15)
 
 
-def test_without_a_file_an_option_has_the_name_of_the_record():
-    assert (
-        column_option(xr.DataArray([0.0], name="force_x", attrs={"units": "1"}), sense=-1)
-        == "--column force_x=-force_x"
-    )
+def test_without_a_file_an_entry_has_the_name_of_the_record():
+    assert column_entry(xr.DataArray([0.0], name="force_x", attrs={"units": "1"}), sense=-1) == "-force_x"
 
 
-def test_there_is_no_option_after_a_conversion_by_the_rod(tmp_path):
+def test_a_column_is_scaled_by_its_factor(tmp_path):
+    """Readings of an amplifier: counts in a unit that no file states, and a column that is used twice."""
+    path = tmp_path / "counts.csv"
+    path.write_text("sweep,direction,phi,counts\n0,forward,130,2000\n0,forward,120,-500\n")
+    given = {"drive_angle": "90-0.1*phi[deg]", "force_x": "1e-3*counts[N]", "force_y": "-0.5*counts[mN]"}
+    record = read_record(path, columns=given, rod=WIRE, missing=["holding_moment"])
+    np.testing.assert_allclose(np.degrees(record.drive_angle), [77.0, 78.0], rtol=1e-12)
+    np.testing.assert_allclose(record.force_x, [2.0, -0.5], rtol=1e-12)
+    np.testing.assert_allclose(record.force_y, [-1.0, 0.25], rtol=1e-12)
+
+
+def test_there_is_no_entry_after_a_conversion_by_the_rod(tmp_path):
     path = tmp_path / "lab.csv"
     path.write_text("sweep,direction,drive_angle [rad],Fx\n0,forward,1.2,18.25\n")
     missing = ("holding_moment", "force_y")
     record = read_record(path, columns={"force_x": "Fx[mN]"}, rod=Rod(0.1, 1.2e-5), missing=missing)
-    assert column_option(to_dimensionless(record)["force_x"], added=1.0) == ""
+    assert column_entry(to_dimensionless(record)["force_x"], added=1.0) == ""

@@ -7,6 +7,7 @@ import pytest
 
 from helpers.report_pages import analysed_quickly, coarse_record, comparison, hostile_run
 from tactile_bayes.report import write_report
+from tactile_bayes.rig import Rig
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 
@@ -41,7 +42,7 @@ def driver():
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     folder = tmp_path_factory.mktemp("browser")
-    run = analysed_quickly(coarse_record(), folder, nuisances=[])
+    run = analysed_quickly(coarse_record(), folder, rig=Rig(unknown="nothing"))
     shapes = comparison(run.posterior.attrs["data_sha256"], shares=(0.9995, 0.0005, 0.0))
     shapes.to_netcdf(folder / "comparison.nc", engine="h5netcdf")
     return write_report(folder)

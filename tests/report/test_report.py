@@ -23,6 +23,7 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.contour_posteriors import only
 from helpers.refusals import refused
 from helpers.report_pages import (
     COLUMN,
@@ -54,6 +55,7 @@ from tactile_bayes.report.page import page_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import hindrances
 from tactile_bayes.report.trust import contacts_messages
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs.reconstruction import reconstruction_messages
 from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
@@ -63,8 +65,10 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     path = folder / "measured.csv"
     tb.write_record(coarse_record(), path)
-    command = ["tactile-bayes", "infer", "measured.csv", "--as-stated", "--out", "my run"]
-    analysed_quickly(tb.read_record(path), folder, nuisances=[], probability=0.9, record_file=path, command=command)
+    command = ["tactile-bayes", "infer", "measured.csv", "--rig", "rig.toml", "--out", "my run"]
+    analysed_quickly(
+        tb.read_record(path), folder, rig=tb.Rig(unknown="nothing"), probability=0.9, record_file=path, command=command
+    )
     return folder
 
 
@@ -303,7 +307,7 @@ def test_where_it_came_from_is_said(page, folder, posterior):
     assert versions["numpy"] == np.__version__
     assert versions["tactile-bayes"] == tb.__version__
     assert "Python" in versions
-    assert page.texts["code"][0] == "tactile-bayes infer measured.csv --as-stated --out 'my run'"
+    assert page.texts["code"][0] == "tactile-bayes infer measured.csv --rig rig.toml --out 'my run'"
     assert "The contour from measured.csv" in page.texts["h1"][0]
 
 
@@ -320,11 +324,11 @@ def test_what_hinders_that_is_said(posterior):
     record = record_of(posterior)
     assert hindrances(posterior, record) == []
     other = posterior.copy()
-    other.attrs["priors"] = json.dumps({"q": "norm(0.1, 0.01)"})
+    other.attrs["rig"] = "not written"
     other.attrs["settings"] = json.dumps({"max_seconds": 5.0})
     clock, priors = hindrances(other, record)
     assert clock.startswith("The run could end by the clock")
-    assert priors == "Priors of your own have to be given again: priors={…} for q."
+    assert priors == "A prior of your own is none of SciPy's: give rig= as before."
 
 
 # --- The moving rod -----------------------------------------------------------------------------------------------
@@ -335,7 +339,7 @@ def test_the_rod_moves_as_a_scan_of_the_most_probable_contour_has_it(posterior):
     record, rod = record_of(posterior), rod_of(record_of(posterior))
     for number_, direction in ((0, "forward"), (1, "backward")):
         angles = record["drive_angle"].values[record["sweep"].values == number_]
-        ideal = tb.scan(motion.contour, direction=direction, drive_angles=angles, rod=rod).record
+        ideal = tb.scan(motion.contour, direction=direction, drive_angles=angles, rig=Rig(rod=rod)).record
         of_sweep = motion.sweep == number_
         np.testing.assert_array_equal(motion.phase[of_sweep], ideal["truth_contact_phase"])
         for k, name in enumerate(CHANNELS):
@@ -430,7 +434,7 @@ def predicted(tree, rig):
     record = record_of(tree)
     best = posterior_draws(tree).isel(tree["sample_stats"]["lp"].argmax(("chain", "draw")))
     cell, rod = LoadCell.from_record(record), rod_of(record)
-    nuisances = nuisances_of(record, list(rig), {}, cell, 0.0)
+    nuisances = nuisances_of(record, tb.Rig(unknown=only(*rig)), cell)
     values = {name: np.array([value]) for name, value in rig.items()}
     likelihood = RecordLikelihood(record, cell, exact=True)
     loads, _ = likelihood.predict(contours_of(best, "parabola"), nuisances.rig(values))
@@ -466,7 +470,7 @@ def test_a_rig_that_measures_the_moment_only_has_no_contact_points(tmp_path):
     ideal = tb.scan(tb.contours.Parabola(0.5, 0.5), direction="backward", drive_step=0.1).record
     record = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(ideal, seed=1)
     record["force_x"][:] = record["force_y"][:] = np.nan
-    analysed_quickly(record, tmp_path, nuisances=[])
+    analysed_quickly(record, tmp_path, rig=tb.Rig(unknown="nothing"))
     page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
     assert "Contact points take all three channels, and force x and force y were not measured." in page.texts["p"]
     assert "There are sweeps in one direction only, so there is no gap between two." in page.texts["p"]
@@ -478,7 +482,7 @@ def test_a_rig_that_measures_the_moment_only_has_no_contact_points(tmp_path):
 @pytest.mark.slow
 def test_a_shape_free_contour_hides_its_directions_among_the_details(tmp_path):
     few = tb.SamplerSettings(ensembles=2, walkers=80, block_steps=5, max_steps=5)
-    analysed_quickly(coarse_record(), tmp_path, family="shape-free", nuisances=[], settings=few)
+    analysed_quickly(coarse_record(), tmp_path, family="shape-free", rig=tb.Rig(unknown="nothing"), settings=few)
     page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
     names = [row[0] for row in page.table("Estimates are medians")]
     assert "length_scale" in names

@@ -13,6 +13,7 @@ from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import to_dimensionless
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs import contour as module
 from tactile_bayes.runs.contour import RunFolder, analyse, complete
 from tactile_bayes.runs.demonstration import CONTOUR, ROD, TRUTH
@@ -106,7 +107,7 @@ def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
     record = scan(Parabola(0.5, 0.5), direction="backward", base=(0.1, 0.0), drive_step=0.05).record
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
     measured["force_x"][:] = measured["force_y"][:] = np.nan
-    run = analyse(measured, tmp_path, nuisances=[], settings=QUICK)
+    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK)
     assert run.contacts is None
     assert list(run.files) == ["posterior", "band", "verdicts", "summary", *(f for f in FIGURES if f != "gap")]
     assert_every_file_is_there(run, tmp_path)
@@ -120,7 +121,7 @@ def test_a_dimensionless_record_with_unknown_noise(tmp_path):
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
     for name in ("load_cell_force_noise", "load_cell_moment_noise"):
         del measured.attrs[name]
-    run = analyse(measured, tmp_path, family="circle", nuisances=[], settings=QUICK, truth=contour)
+    run = analyse(measured, tmp_path, family="circle", rig=Rig(unknown="nothing"), settings=QUICK, truth=contour)
     assert_every_file_is_there(run, tmp_path)
     table = summary(run.posterior)
     assert table.quantity.values.tolist() == ["r", "q", "x_c", "moment_noise", "force_noise"]
@@ -182,7 +183,7 @@ def test_another_rod_is_that_of_all_results(measured, tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_units_do_not_matter(analysed, measured, tmp_path):
     """To the rounding of the conversion; priors and random numbers scale with the rod."""
-    si, plain = analysed[0], analyse(to_dimensionless(measured), tmp_path, nuisances=[])
+    si, plain = analysed[0], analyse(to_dimensionless(measured), tmp_path, rig=Rig(unknown="nothing"))
     ratio = si.contacts.contact_x / plain.contacts.contact_x
     np.testing.assert_allclose(ratio[si.contacts.status == "ok"], ROD.length, rtol=1e-9)
     medians = [summary(run.posterior)["median"].sel(quantity="q").item() for run in (si, plain)]
@@ -192,7 +193,7 @@ def test_units_do_not_matter(analysed, measured, tmp_path):
 def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
     few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
-    run = analyse(measured, tmp_path, nuisances=[], settings=few)
+    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=few)
     assert not run.posterior.attrs["converged"]
     assert "not converged, the steps allowed ran out after 1 steps" in run.posterior.attrs["message"]
 
@@ -268,7 +269,7 @@ def test_a_posterior_outlives_its_predictions(measured, tmp_path, monkeypatch):
     """Its draws and what is made of them alone are there; all else says what it lacks."""
     monkeypatch.setattr("tactile_bayes.inference.contour.predicted_groups", broken)
     monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
-    run = analyse(measured, tmp_path, nuisances=[], settings=QUICK)
+    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK)
     assert list(run.left_out) == ["predictions", "band", "gap", "verdicts"]
     assert run.verdicts[0] == "Left out: predictions. Unexpected error, RuntimeError: it broke"
     assert run.verdicts[1].startswith("Left out: band. the posterior holds no events")

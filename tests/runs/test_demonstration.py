@@ -6,13 +6,14 @@ import pytest
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import MEASURED, read_record, rod_of, write_record
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 from tactile_bayes.sweep import scan
 
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    return measure_demo(tmp_path_factory.mktemp("demo") / "new", seed=1)
+    return measure_demo(tmp_path_factory.mktemp("demo") / "new", seed=1)[0]
 
 
 def test_the_record_is_complete_and_holds_no_truth(path):
@@ -27,7 +28,7 @@ def test_the_record_is_complete_and_holds_no_truth(path):
 
 def test_it_is_the_scan_of_the_contour_with_the_noise_that_is_stated(path):
     """Mean square over 3 n normal numbers: within five standard deviations, √(2 / 3n) each."""
-    record, true = read_record(path), scan(CONTOUR, rod=ROD).record
+    record, true = read_record(path), scan(CONTOUR, rig=Rig(rod=ROD)).record
     np.testing.assert_array_equal(record.drive_angle, true.drive_angle)
     deviations = LOAD_CELL.standard_deviations
     noise = np.concatenate([((record[name] - true[name]) / deviations[name]).values for name in deviations])
@@ -39,13 +40,13 @@ def test_the_truth_that_is_printed_is_that_of_the_contour():
 
 
 def test_the_seed_decides(path, tmp_path):
-    assert measure_demo(tmp_path / "same", seed=1).read_bytes() == path.read_bytes()
-    assert measure_demo(tmp_path / "other", seed=2).read_bytes() != path.read_bytes()
+    assert measure_demo(tmp_path / "same", seed=1)[0].read_bytes() == path.read_bytes()
+    assert measure_demo(tmp_path / "other", seed=2)[0].read_bytes() != path.read_bytes()
 
 
 def test_a_demonstration_is_replaced_by_another(tmp_path):
-    before = measure_demo(tmp_path, seed=1).read_bytes()
-    assert measure_demo(tmp_path, seed=2).read_bytes() != before
+    before = measure_demo(tmp_path, seed=1)[0].read_bytes()
+    assert measure_demo(tmp_path, seed=2)[0].read_bytes() != before
 
 
 def _of_another_rod(record):

@@ -11,6 +11,7 @@ import tactile_bayes as tb
 from helpers import drawn_sweeps
 from helpers.rest_lines import depth, rest_line
 from tactile_bayes.errors import ClearanceWarning, ContourError
+from tactile_bayes.rig import Rig
 
 PARABOLA = tb.contours.Parabola(0.6, 0.45, 0.1)
 
@@ -33,7 +34,7 @@ def carried_snap_offs(seed, count):
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             try:
-                scan = tb.scan(contour, drive=drive, rod=rod)
+                scan = tb.scan(contour, drive=drive, rig=Rig(rod=rod))
             except ContourError:
                 continue
         if scan.sweeps[0].snap_off.kind != "never":
@@ -71,7 +72,7 @@ def test_a_rod_at_rest_beyond_an_edge_is_not_clear():
     for stem in (0.0, 0.1, 0.2):
         rod = tb.Rod(stem=stem)
         with pytest.warns(ClearanceWarning, match="snaps at base"):
-            scan = tb.scan(contour, drive=drive, rod=rod)
+            scan = tb.scan(contour, drive=drive, rig=Rig(rod=rod))
         (sweep,) = scan.sweeps
         snap = sweep.snap_off
         assert inside(contour, rod, snap.base_x, snap.base_y, snap.drive_angle) > 0.01

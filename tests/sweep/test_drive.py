@@ -9,6 +9,7 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, RecordError
 from tactile_bayes.record import carried_sweeps
+from tactile_bayes.rig import Rig
 
 CIRCLE = tb.contours.Circle(0.3, 0.8)
 THERE = tb.Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
@@ -90,7 +91,7 @@ def test_turned_here_and_carried_there_is_one_record():
 @pytest.mark.parametrize("drive", [THERE, COMBINED, [tb.Rotation(), THERE]])
 @pytest.mark.parametrize("rod", [tb.Rod(), tb.Rod(rest_curvature=-0.3), tb.Rod(taper=0.5)])
 def test_step_2_brings_the_contacts_back(drive, rod):
-    record = tb.scan(CIRCLE, drive=drive, rod=rod).record
+    record = tb.scan(CIRCLE, drive=drive, rig=Rig(rod=rod)).record
     found = tb.reconstruct(record)
     loaded = np.hypot(record.force_x, record.force_y) > 1e-6
     assert loaded.sum() > 20
@@ -101,7 +102,7 @@ def test_step_2_brings_the_contacts_back(drive, rod):
 def test_lengths_are_in_metres_with_a_rod_in_si():
     rod = tb.Rod(length=0.1, flexural_rigidity=1.2e-5)
     drive = tb.Translation(base=(0.08, 0.0), heading=np.pi, drive_angle=1.2, travel=0.16)
-    scan = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rod=rod)
+    scan = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rig=Rig(rod=rod))
     plain = tb.scan(CIRCLE, drive=THERE)
     np.testing.assert_allclose(scan.record.base_x, 0.1 * plain.record.base_x, atol=1e-15)
     np.testing.assert_allclose(scan.record.force_y, rod.force_unit * plain.record.force_y, rtol=1e-9, atol=1e-15)
@@ -130,7 +131,11 @@ def test_a_drive_that_ends_in_contact_says_so():
     [
         (ReachError, {"drive": tb.Translation((0.8, -1.0), np.pi, 1.2, 1.6)}, ["does not touch"]),
         (ContourError, {"drive": tb.Translation((-0.2, 0.0), np.pi, 1.2, 1.0)}, ["from the beginning"]),
-        (ReachError, {"drive": tb.Motion([0.8, -0.3, 0.8], 0.0, 1.2), "friction": 0.2}, ["friction", "other way"]),
+        (
+            ReachError,
+            {"drive": tb.Motion([0.8, -0.3, 0.8], 0.0, 1.2), "rig": Rig(unknown={"friction": 0.2})},
+            ["friction", "other way"],
+        ),
         (ParameterError, {"drive": THERE, "direction": "backward"}, ["direction"]),
         (ParameterError, {"drive": THERE, "drive_angles": [0.1, 0.2]}, ["drive_angles"]),
         (ParameterError, {"drive": THERE, "base": (0.1, 0.0)}, ["base"]),
@@ -167,7 +172,9 @@ def test_two_pivots_in_one_sweep_are_still_refused():
 def test_a_released_rod_is_clear_however_its_last_touch_is_rounded(k):
     contour = tb.contours.Circle(*(np.array([1.01660456, 0.38756071, -0.80086393]) * (1.0 + 1e-9 * k)))
     carried = tb.Translation((-0.9, 0.0), 0.0, np.pi - 1.0, 1.8)
-    found = tb.scan(contour, drive=carried, drive_step=0.01, rod=tb.Rod(rest_curvature=0.4), friction=0.0177)
+    found = tb.scan(
+        contour, drive=carried, drive_step=0.01, rig=Rig(rod=tb.Rod(rest_curvature=0.4), unknown={"friction": 0.0177})
+    )
     assert found.events["backward"].snap_off.kind == "release"
     assert found.record.sizes["sample"] == 181
 
@@ -179,7 +186,7 @@ def test_a_tip_that_is_dragged_touches_with_the_side_to_which_it_is_turned(taper
     heading, angle = (0.05, 1.0) if side > 0.0 else (np.pi - 0.05, np.pi - 1.0)
     drive = tb.Translation(base=(-0.87 * side, -0.06), heading=heading, drive_angle=angle, travel=2.5)
     contour = tb.contours.Parabola(1.0, 0.65, 0.24 * side)
-    scan = tb.scan(contour, drive=drive, rod=tb.Rod(taper=taper))
+    scan = tb.scan(contour, drive=drive, rig=Rig(rod=tb.Rod(taper=taper)))
     assert scan.sweeps[0].direction == ("backward" if side > 0.0 else "forward")
     turn = (scan.record.truth_tip_angle - scan.record.truth_slope_angle).values
     turn = turn[np.isfinite(turn)]

@@ -10,6 +10,7 @@ from helpers.profiled_rods import given_rod, given_rods
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ClearanceWarning, ContourError
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import equilibria, scan
 
 RODS = given_rods()
@@ -28,7 +29,9 @@ def states_of_sweep(contour, direction, rod, friction=0.0, drive_step=np.pi / 18
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ClearanceWarning)
-            record = scan(contour, direction=direction, rod=rod, friction=friction, drive_step=drive_step).record
+            record = scan(
+                contour, direction=direction, rig=Rig(rod=rod, unknown={"friction": friction}), drive_step=drive_step
+            ).record
     except ContourError:
         return None
     record = record.isel(sample=np.flatnonzero(record.truth_contact_phase.values != "none"))
@@ -52,7 +55,9 @@ def test_states_of_sweeps_once_the_contact_comes_back(name):
                 swept += 1
                 slopes = swept_states.slope_angle.values
                 farthest = int(np.argmax(side * slopes))
-                found = equilibria(contour, slopes, direction=direction, rod=rod, friction=friction)
+                found = equilibria(
+                    contour, slopes, direction=direction, rig=Rig(rod=rod, unknown={"friction": friction})
+                )
                 off = np.max([np.abs(found[name].values - swept_states[name].values) for name in COLUMNS], axis=0)
                 assert np.all(off[farthest + 1 :] < 1e-9)
                 later = found.contact_phase.values[farthest + 1 :]
@@ -73,7 +78,7 @@ def test_backward_is_the_mirror_image(name, height):
     scene = Parabola(0.5, height, 0.1), "forward", rod
     mirror = Parabola(0.5, height, -0.1), "backward", mirrored
     states, mirror_states = (
-        equilibria(contour, sign * slopes, direction=direction, rod=of_scene, friction=0.2)
+        equilibria(contour, sign * slopes, direction=direction, rig=Rig(rod=of_scene, unknown={"friction": 0.2}))
         for sign, (contour, direction, of_scene) in ((1.0, scene), (-1.0, mirror))
     )
     for one, other in ((states, mirror_states), (states_of_sweep(*scene, 0.2), states_of_sweep(*mirror, 0.2))):
@@ -99,7 +104,9 @@ def test_a_sweep_in_other_units(direction):
         ("drive_angle", "tip_angle"), 1
     )
     slopes = (1.0 if direction == "forward" else -1.0) * np.linspace(0.0, 0.8, 9)
-    bare, of_si = (equilibria(c, slopes, direction=direction, rod=r) for c, r in zip(contours, (one, si), strict=True))
+    bare, of_si = (
+        equilibria(c, slopes, direction=direction, rig=Rig(rod=r)) for c, r in zip(contours, (one, si), strict=True)
+    )
     bare_sweep, si_sweep = (
         states_of_sweep(c, direction, r, drive_step=0.05) for c, r in zip(contours, (one, si), strict=True)
     )

@@ -18,6 +18,7 @@ from helpers.profiled_rods import GivenRod, RodAlong, given_rod, integrated_pose
 from tactile_bayes.contours import Circle, Contour, Parabola
 from tactile_bayes.errors import ClearanceWarning, ContourError, ReachError, StrainWarning
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 from tactile_bayes.sweep.events import SweepEvents
 
@@ -120,7 +121,9 @@ def swept(seed: int) -> tuple[Shooting, SweepEvents]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ClearanceWarning)
                 warnings.simplefilter("ignore", StrainWarning)
-                events = scan(contour, direction=direction, rod=thick, friction=friction, drive_step=0.1).events
+                events = scan(
+                    contour, direction=direction, rig=Rig(rod=thick, unknown={"friction": friction}), drive_step=0.1
+                ).events
         except (ContourError, ReachError):
             continue
         side = 1.0 if direction == "forward" else -1.0
@@ -179,7 +182,7 @@ HOOKED = {
 def test_a_hooked_rod_is_released_where_its_tip_touches_without_load(kind, friction):
     """A rod that yields along its chord passes a shallow object: the force grows, and vanishes without a jump."""
     rod, contour = HOOKED[kind]
-    found = scan(contour, direction="forward", rod=rod.rod, friction=friction, drive_step=2e-4)
+    found = scan(contour, direction="forward", rig=Rig(rod=rod.rod, unknown={"friction": friction}), drive_step=2e-4)
     first, last = found.events["forward"].first_contact, found.events["forward"].snap_off
     assert (first.kind, last.kind) == ("tip", "release")
     shooting = Shooting(contour, rod.in_sweep(1.0), rod.rod, 1.0, friction)

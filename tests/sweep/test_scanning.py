@@ -14,6 +14,7 @@ from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, from_func
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import equilibria, scan
 
 EPS = np.finfo(float).eps
@@ -98,7 +99,7 @@ SI = Rod(length=0.12, flexural_rigidity=3.5e-5)
 def test_si_is_the_dimensionless_answer_in_units():
     unit, big = Parabola(0.5, 0.5, 0.1), Parabola(0.5 / 0.12, 0.06, 0.012)
     alpha = [0.05, 0.3, 0.5]
-    one, si = equilibria(unit, alpha), equilibria(big, alpha, rod=SI)
+    one, si = equilibria(unit, alpha), equilibria(big, alpha, rig=Rig(rod=SI))
     scale = {
         "holding_moment": SI.moment_unit,
         **dict.fromkeys(("force_x", "force_y"), SI.force_unit),
@@ -108,7 +109,7 @@ def test_si_is_the_dimensionless_answer_in_units():
         np.testing.assert_allclose(si[name], one[name] * scale.get(name, 1.0), rtol=1e-12, err_msg=name)
     assert si.force_x.attrs["units"] == "N"
     assert one.force_x.attrs["units"] != "N"
-    a, b = scan(unit), scan(big, rod=SI)
+    a, b = scan(unit), scan(big, rig=Rig(rod=SI))
     assert a.record.sizes == b.record.sizes
     for name in CHANNELS:
         atol = 1e-9 * float(np.abs(b.record[name]).max())  # rounding of a sample just after a tip's onset
@@ -123,13 +124,13 @@ def test_a_thick_rod_is_a_thin_one_on_the_parallel_curve():
     alpha = [0.3, 0.45, 0.6]
     for direction in ("forward", "backward"):
         slopes = alpha if direction == "forward" else [-a for a in alpha]
-        one = equilibria(thick, slopes, direction=direction, rod=Rod(diameter=d))
+        one = equilibria(thick, slopes, direction=direction, rig=Rig(rod=Rod(diameter=d)))
         two = equilibria(thin, slopes, direction=direction)
         for name in (*CHANNELS, "drive_angle", "contact_arclength", "tip_angle"):
             np.testing.assert_allclose(one[name], two[name], rtol=1e-12, err_msg=name)
         np.testing.assert_array_equal(one.contact_phase, two.contact_phase)
         np.testing.assert_allclose([one.contact_x, one.contact_y], thick.point(slopes), rtol=1e-13)
-    a, b = scan(thick, rod=Rod(diameter=d)).events, scan(thin).events
+    a, b = scan(thick, rig=Rig(rod=Rod(diameter=d))).events, scan(thin).events
     for direction in ("forward", "backward"):
         assert a[direction].snap_off.drive_angle == pytest.approx(b[direction].snap_off.drive_angle, abs=1e-12)
         assert a[direction].first_contact.drive_angle == pytest.approx(
@@ -377,10 +378,10 @@ II = paper_profile("II", 0.5)
     ("call", "error", "named"),
     [
         (lambda: scan(paper_profile("II", 1.2)), ReachError, [1.2, "pivot", "1 long"]),
-        (lambda: scan(Parabola(5, 0.2), rod=SI), ReachError, [0.2, "pivot", "0.12 long"]),
+        (lambda: scan(Parabola(5, 0.2), rig=Rig(rod=SI)), ReachError, [0.2, "pivot", "0.12 long"]),
         (lambda: scan(II, base=(0.0, 0.6)), ContourError, ["x = 0", "y = 0.5", "y = 0.6"]),
         (lambda: scan(II, base=(0.0, 0.5)), ContourError, ["base"]),
-        (lambda: scan(II, base=(0.0, 0.495), rod=Rod(diameter=0.02)), ContourError, ["base"]),
+        (lambda: scan(II, base=(0.0, 0.495), rig=Rig(rod=Rod(diameter=0.02))), ContourError, ["base"]),
         (lambda: scan(Circle(0.2, 0.3, -0.6)), ContourError, ["forward sweep", "right end"]),
         (lambda: scan(Circle(0.2, 0.3, 0.6), direction="backward"), ContourError, ["left end"]),
         (lambda: scan(II, drive_step=1), ParameterError, ["drive_step", 1, 0.5, "np.radians"]),
@@ -389,7 +390,7 @@ II = paper_profile("II", 0.5)
         (lambda: equilibria(Parabola(np.array([0.5, 0.6]), 0.5), [0.1]), ParameterError, ["one contour"]),
         (lambda: equilibria(II, [10.0]), ParameterError, ["slope_angles", "(−π/2, π/2)"]),
         (lambda: equilibria(II, [0.1], base=[(0, 0), (1, 0)]), ParameterError, ["base", "one pivot"]),
-        (lambda: equilibria(II, [0.1], friction=0.85), ParameterError, ["friction", 0.85, 0.84]),
+        (lambda: equilibria(II, [0.1], rig=Rig(unknown={"friction": 0.85})), ParameterError, ["friction", 0.85]),
     ],
 )
 def test_refusals(call, error, named):
@@ -415,7 +416,7 @@ def test_a_pivot_just_below_the_contour():
             assert np.isfinite(sweep.snap_off.drive_angle)
             assert abs(sweep.snap_off.drive_angle - sweep.first_contact.drive_angle) > 1
     with refused(ContourError, 0.002, "(0, 0)", 0.004):
-        scan(Parabola(0.3, 0.002), rod=Rod(length=0.2, flexural_rigidity=1.0))
+        scan(Parabola(0.3, 0.002), rig=Rig(rod=Rod(length=0.2, flexural_rigidity=1.0)))
 
 
 def test_random_scans():

@@ -10,6 +10,7 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import Rig
 
 TRUTH = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
 ANGLES = np.linspace(0.4, 3.6, 240)
@@ -43,7 +44,9 @@ def test_each_is_what_its_own_scan_says(family, ranges, direction, friction, rod
         powers["a"] = 0
     values = {name: value * length ** powers[name] for name, value in values.items()}
     base = parameters(5, (-0.1 * length, 0.1 * length), (-0.1 * length, 0.0))
-    many = tb.scan_many(family(**values), ANGLES, direction=direction, base=base, rod=rod, friction=friction)
+    many = tb.scan_many(
+        family(**values), ANGLES, direction=direction, base=base, rig=Rig(rod=rod, unknown={"friction": friction})
+    )
     assert set(many.status.values) == {"ok"}
     for i in range(5):
         one = tb.scan(
@@ -51,8 +54,7 @@ def test_each_is_what_its_own_scan_says(family, ranges, direction, friction, rod
             direction=direction,
             base=(float(base[0][i]), float(base[1][i])),
             drive_angles=ANGLES,
-            rod=rod,
-            friction=friction,
+            rig=Rig(rod=rod, unknown={"friction": friction}),
         )
         record = one.record.sortby("drive_angle")
         events = one.sweeps[0]

@@ -22,6 +22,7 @@ from tactile_bayes.contours import (
 )
 from tactile_bayes.errors import ClearanceWarning, ContourError, ParameterError, StrainWarning
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import Rig
 
 
 def test_several_bases_are_the_single_ones_in_one_record():
@@ -162,7 +163,7 @@ def test_the_largest_strain_against_integration(direction, q):
     contour = Parabola(2.5, q)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StrainWarning)
-        result = scan(contour, direction=direction, rod=WIRE, drive_step=np.radians(0.5))
+        result = scan(contour, direction=direction, rig=Rig(rod=WIRE), drive_step=np.radians(0.5))
     record, greatest = result.record, 0.0
     for i in np.flatnonzero(record.truth_contact_phase.values != "none"):
         moment, fx, fy, angle, length = (
@@ -183,14 +184,18 @@ def test_the_largest_strain_against_integration(direction, q):
 
 def test_a_rod_bent_beyond_its_limit_is_warned_of():
     with pytest.warns(StrainWarning, match=r"0\.00\d+, .*0\.001"):
-        scan(Parabola(2.5, 0.1), rod=Rod.circular(0.2, 0.5e-3, 206e9, elastic_strain=0.001), direction="forward")
-    assert scan(Parabola(2.5, 0.1), rod=WIRE, direction="forward").sweeps[0].largest_strain < 0.02  # and no warning
+        scan(
+            Parabola(2.5, 0.1), rig=Rig(rod=Rod.circular(0.2, 0.5e-3, 206e9, elastic_strain=0.001)), direction="forward"
+        )
+    assert (
+        scan(Parabola(2.5, 0.1), rig=Rig(rod=WIRE), direction="forward").sweeps[0].largest_strain < 0.02
+    )  # and no warning
     assert scan(Parabola(0.5, 0.5)).sweeps[0].largest_strain == 0.0
 
 
 def test_a_strain_beyond_the_model_is_warned_of_whatever_the_rod_bears():
     with pytest.warns(StrainWarning, match=r"0\.6: .*0\.1"):
-        scan(Parabola(0.5, 0.5), rod=Rod(diameter=0.2, elastic_strain=0.9), direction="forward")
+        scan(Parabola(0.5, 0.5), rig=Rig(rod=Rod(diameter=0.2, elastic_strain=0.9)), direction="forward")
 
 
 def test_rods_are_equal_and_print_alike_if_they_bear_the_same():
@@ -214,13 +219,17 @@ def test_rods_are_equal_and_print_alike_if_they_bear_the_same():
 def test_scale_of_length_and_stiffness_leaves_the_dimensionless_answer_alone(length, rigidity, diameter, direction, mu):
     plain = Rod(diameter=diameter)
     scaled = Rod(length, rigidity, diameter * length)
-    one = scan(Ellipse(0.8, 0.6, 0.4, 0.1), base=(0.05, -0.1), direction=direction, rod=plain, friction=mu)
+    one = scan(
+        Ellipse(0.8, 0.6, 0.4, 0.1),
+        base=(0.05, -0.1),
+        direction=direction,
+        rig=Rig(rod=plain, unknown={"friction": mu}),
+    )
     other = scan(
         Ellipse(0.8 * length, 0.6 * length, 0.4 * length, 0.1 * length),
         base=(0.05 * length, -0.1 * length),
         direction=direction,
-        rod=scaled,
-        friction=mu,
+        rig=Rig(rod=scaled, unknown={"friction": mu}),
     )
     for event in ("first_contact", "snap_off"):
         a, b = (getattr(result.sweeps[0], event) for result in (one, other))

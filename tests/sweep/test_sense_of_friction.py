@@ -10,6 +10,7 @@ from helpers.handed_out import violations
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import ReachError
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep.scanning_many import scan_many
 
 PARABOLA = Parabola(0.6, 0.45, 0.1)
@@ -26,7 +27,7 @@ TURNED_BACK = {
 @pytest.mark.parametrize("drive", TURNED_BACK.values(), ids=TURNED_BACK)
 def test_a_drive_that_turns_back_in_contact_needs_no_friction(drive):
     with refused(ReachError, "friction", "friction=0", "split"):
-        tb.scan(PARABOLA, drive=drive, friction=0.3)
+        tb.scan(PARABOLA, drive=drive, rig=Rig(unknown={"friction": 0.3}))
     scan = tb.scan(PARABOLA, drive=drive, drive_step=0.02)
     assert violations(scan, tb.Rod(), 0.0) == {}
 
@@ -38,7 +39,7 @@ def test_without_friction_the_way_back_repeats_the_way_forth():
 
 
 def test_parts_of_a_drive_that_go_one_way_have_friction():
-    scan = tb.scan(PARABOLA, drive=tb.Motion(0.0, 0.0, [0.4, 2.2]), friction=0.3, drive_step=0.02)
+    scan = tb.scan(PARABOLA, drive=tb.Motion(0.0, 0.0, [0.4, 2.2]), rig=Rig(unknown={"friction": 0.3}), drive_step=0.02)
     assert scan.sweeps[0].snap_off.kind == "never"
     assert violations(scan, tb.Rod(), 0.3) == {}
 
@@ -48,7 +49,7 @@ def test_parts_of_a_drive_that_go_one_way_have_friction():
 def test_a_tip_that_is_carried_head_on_does_not_slide_at_first(side, heading, friction):
     drive = tb.Translation((side * 0.6, 0.0), heading, UPRIGHT, 1.2)
     with refused(ReachError, "friction", "friction=0"):
-        tb.scan(Circle(0.3, 0.9), drive=drive, friction=friction)
+        tb.scan(Circle(0.3, 0.9), drive=drive, rig=Rig(unknown={"friction": friction}))
     assert violations(tb.scan(Circle(0.3, 0.9), drive=drive), tb.Rod(), 0.0) == {}
 
 
@@ -56,7 +57,7 @@ def test_a_tip_that_is_carried_head_on_does_not_slide_at_first(side, heading, fr
 def test_a_rod_that_is_straightened_first_slides_outward(direction):
     sign = 1.0 if direction == "forward" else -1.0
     toward, away = (tb.Rod(rest_curvature=sign * curvature) for curvature in (0.4, -0.4))
-    scan = tb.scan(PARABOLA, rod=toward, direction=direction, friction=0.3, drive_step=0.002)
+    scan = tb.scan(PARABOLA, rig=Rig(rod=toward, unknown={"friction": 0.3}), direction=direction, drive_step=0.002)
     (sweep,), record = scan.sweeps, scan.record
     stuck = sign * (sweep.slides_from - sweep.first_contact.drive_angle)
     assert stuck > 0.01
@@ -64,16 +65,19 @@ def test_a_rod_that_is_straightened_first_slides_outward(direction):
     assert step.max() == pytest.approx(stuck, abs=0.005)
     assert violations(scan, toward, 0.3) == {}
     for rod, friction in ((toward, 0.0), (away, 0.3)):
-        scan = tb.scan(PARABOLA, rod=rod, direction=direction, friction=friction)
+        scan = tb.scan(PARABOLA, rig=Rig(rod=rod, unknown={"friction": friction}), direction=direction)
         assert scan.sweeps[0].slides_from == scan.sweeps[0].first_contact.drive_angle
         assert violations(scan, rod, friction) == {}
 
 
 def test_scan_many_says_which_contours_friction_would_hold():
     contours, angles = Parabola(np.array([0.4, 0.6]), 0.45), np.linspace(0.3, 3.3, 40)
-    many = scan_many(contours, angles, rod=tb.Rod(rest_curvature=0.4), friction=0.3)
+    many = scan_many(contours, angles, rig=Rig(rod=tb.Rod(rest_curvature=0.4), unknown={"friction": 0.3}))
     assert many.status.values.tolist() == ["held by friction"] * 2
     assert np.isnan(many.snap_off_drive_angle.values).all()
     assert (
-        scan_many(contours, angles, rod=tb.Rod(rest_curvature=-0.4), friction=0.3).status.values.tolist() == ["ok"] * 2
+        scan_many(
+            contours, angles, rig=Rig(rod=tb.Rod(rest_curvature=-0.4), unknown={"friction": 0.3})
+        ).status.values.tolist()
+        == ["ok"] * 2
     )

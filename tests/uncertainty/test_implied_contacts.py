@@ -20,6 +20,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import in_frame, record_hash
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.contact_moments import contact_moments
 from tactile_bayes.uncertainty.contact_region import contact_region
@@ -44,7 +45,7 @@ def tree_of(record, family, *, friction=0.0, nuisances=(), **draws) -> xr.DataTr
     attrs = ("units", "rod_length", "rod_flexural_rigidity", "rod_diameter", "load_cell_frame")
     tree.attrs = {name: record.attrs[name] for name in attrs if name in record.attrs} | {
         "family": family,
-        "friction": friction,
+        "known": json.dumps({"friction": friction} if friction else {}),
         "nuisances": json.dumps(nuisances),
         "data_sha256": record_hash(record),
         "message": "made up",
@@ -60,7 +61,7 @@ def implied() -> xr.DataTree:
 @cache
 def single() -> xr.Dataset:
     """Contacts of the same record, each by itself."""
-    return reconstruct(measured(), method="constrained", load_cell=CELL)
+    return reconstruct(measured(), method="constrained", rig=Rig(load_cell=CELL))
 
 
 def parameters(contour):
@@ -143,7 +144,9 @@ def test_inferred_friction_and_compliance_go_into_the_paths_draw_by_draw():
         draw = found.isel(draw=k).dropna("sample")
         for direction in ("forward", "backward"):
             on = draw.isel(sample=record.direction.values[draw.sample.values] == direction)
-            state = scan(contour, direction=direction, drive_angles=on.drive_angle, friction=friction[k]).record
+            state = scan(
+                contour, direction=direction, drive_angles=on.drive_angle, rig=Rig(unknown={"friction": friction[k]})
+            ).record
             state = state.isel(sample=np.argsort(state.drive_angle.values)[np.argsort(np.argsort(on.drive_angle))])
             driven = on.drive_angle + compliance[k] * state.holding_moment.values
             np.testing.assert_allclose(driven, record.drive_angle.values[on.sample], rtol=0.0, atol=1e-9)
@@ -220,7 +223,9 @@ def test_the_truth_is_within_reach_of_the_implied_contacts():
 
 
 def test_moments_are_those_of_the_draws():
-    single = infer_contacts(measured().isel(sample=[50, 60]), load_cell=CELL, seed=1, draws=400, method="importance")
+    single = infer_contacts(
+        measured().isel(sample=[50, 60]), rig=Rig(load_cell=CELL), seed=1, draws=400, method="importance"
+    )
     moments, draws = contact_moments(single), single["posterior"].to_dataset().isel(sample=1)
     x, y = draws.contact_x.values.ravel(), draws.contact_y.values.ravel()
     slope = draws.slope_angle.values.mean()
@@ -237,7 +242,7 @@ def test_moments_are_those_of_the_draws():
 
 def test_the_layout_is_that_of_infer_contacts():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    single = infer_contacts(measured().isel(sample=[50]), load_cell=cell, seed=1, draws=4, method="importance")
+    single = infer_contacts(measured().isel(sample=[50]), rig=Rig(load_cell=cell), seed=1, draws=4, method="importance")
     tree = implied()
     assert set(tree.children) == set(single.children)
     assert list(tree["posterior"].data_vars) == list(single["posterior"].data_vars)
@@ -306,7 +311,7 @@ def test_the_figure_shows_both_and_their_ratio():
 
 
 def test_the_figure_takes_posteriors_of_single_contacts_and_chosen_samples():
-    posteriors = infer_contacts(measured(), load_cell=CELL, seed=1, draws=40, method="importance")
+    posteriors = infer_contacts(measured(), rig=Rig(load_cell=CELL), seed=1, draws=40, method="importance")
     axes = plotting.tightening(implied(), posteriors, samples=[40, 60, 120], axes=own_axes(5))
     x = contact_moments(implied()).contact_x.values[[40, 60, 120]]
     assert [text.xy[0] for text in axes[0].texts] == x.tolist()

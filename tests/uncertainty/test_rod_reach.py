@@ -5,6 +5,7 @@ import xarray as xr
 from helpers.contour_posteriors import posterior
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.normal_band import normal_band
@@ -20,7 +21,9 @@ def test_a_band_says_where_the_rod_cannot_touch(band):
 
 def test_the_reach_is_that_of_all_pivots_and_of_stem_and_diameter():
     contour = paper_profile("II", q=0.5)
-    record = scan(contour, base=[(0.0, 0.0), (0.2, 0.0)], rod=Rod(stem=0.1, diameter=0.02), drive_step=0.1).record
+    record = scan(
+        contour, base=[(0.0, 0.0), (0.2, 0.0)], rig=Rig(rod=Rod(stem=0.1, diameter=0.02)), drive_step=0.1
+    ).record
     assert list(reach_attributes(record).values()) == pytest.approx([-1.11, 1.31])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any, NamedTuple
@@ -13,15 +13,16 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.comparison.families import SHAPES
-from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import ParameterError, StudyError, TactileBayesError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.misfit import is_inferred
-from tactile_bayes.inference.parameters.nuisances import STANDARD
+from tactile_bayes.inference.parameters.nuisances import belongs, stated_values
+from tactile_bayes.record import rod_of
+from tactile_bayes.rig.parameters import STANDARD
+from tactile_bayes.rig.rig import DEFAULT
 from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 
@@ -155,47 +156,46 @@ def alternatives_of(experiment: Experiment) -> list[Alternative]:
 
     Examples
     --------
-    >>> from tactile_bayes import scan
+    >>> from tactile_bayes import Rig, scan
     >>> from tactile_bayes.contours import paper_profile
+    >>> from tactile_bayes.rig import NOTHING
     >>> record = scan(paper_profile("II", q=0.5)).record
-    >>> [each.name for each in alternatives_of(Experiment(record, nuisances=["friction"]))][:3]
+    >>> rig = Rig(unknown={**NOTHING, "friction": "default"})
+    >>> [each.name for each in alternatives_of(Experiment(record, rig))][:3]
     ['rigidity_scale inferred', 'drive_angle_offset inferred', 'bias inferred']
     """
-    names, found = experiment.rig.names, []
+    names, found = set(experiment.nuisances.names), []
     for group in _NUISANCES:
-        members = {name for name in names if is_inferred(group, [name])}
-        left = [name for name in names if name not in members]
+        members = {name for name in names if belongs(name, group)}
         if members:
-            found.append(Alternative(f"{group} as stated", "fixed", _of_rig(experiment, left)))
-            continue
-        label = f"{group} inferred"
-        if group == "gain" and "rigidity_scale" in names:  # which has the same effect as all gains
-            left.remove("rigidity_scale")
-            label += " for rigidity_scale"
-        try:
-            other = _of_rig(experiment, [*left, group])
-            if set(other.rig.names) - set(names):
-                found.append(Alternative(label, "added", other))
-        except ParameterError:  # the record cannot identify it, or it is known
-            continue
-    families = [name for name in SHAPES if name != experiment.family]
-    return [*found, *(Alternative(f"family {name}", "family", _with(experiment, family=name)) for name in families)]
+            found.append(Alternative(f"{group} as stated", "fixed", _as_stated(experiment, members)))
+        elif not any(belongs(name, group) for name in experiment.nuisances.known):
+            found += _added(experiment, group)
+    families = [name for name in SHAPES if name != experiment.own_family.name]
+    return [*found, *(Alternative(f"family {name}", "family", replace(experiment, family=name)) for name in families)]
 
 
-def _of_rig(experiment: Experiment, nuisances: Sequence[str]) -> Experiment:
-    """Return the experiment with other nuisance parameters, to which the prior of a calibrated rig adds none."""
-    joint = experiment.joint
-    if joint is not None:
-        joint = joint.without(set(joint.priors) - set(nuisances))
-    return _with(experiment, nuisances=nuisances, joint=joint)
+def _as_stated(experiment: Experiment, names: Collection[str]) -> Experiment:
+    """Return the experiment in which some parameters of the rig are known to be as stated."""
+    stated = stated_values(rod_of(experiment.record), experiment.noise.cell)
+    rig = experiment.rig
+    found = None if rig.calibration is None else rig.calibration.without(names)
+    said = {**rig.entries, **{name: stated.get(name, 0.0) for name in names}}
+    return replace(experiment, rig=replace(rig, unknown=said, calibration=found))
 
 
-def _with(experiment: Experiment, **changes: Any) -> Experiment:
-    """Return the experiment with other fields, and the given priors of the parameters that remain."""
-    other = replace(experiment, **changes, priors={})
-    of_contour = family_named(experiment.family).parameters if other.family != experiment.family else ()
-    kept = {n: p for n, p in experiment.priors.items() if n in other.default_priors and n not in of_contour}
-    return replace(other, priors=kept)
+def _added(experiment: Experiment, group: str) -> list[Alternative]:
+    """Return the alternative in which a parameter of the rig, or a group, is unknown; none if no record shows it."""
+    names, label, other = experiment.nuisances.names, f"{group} inferred", experiment
+    if group == "gain" and "rigidity_scale" in names:  # which has the same effect as all gains
+        label += " for rigidity_scale"
+        other = _as_stated(other, ["rigidity_scale"])
+    other = replace(other, rig=other.rig.with_unknown(**{group: DEFAULT}))
+    try:
+        is_shown = bool(set(other.nuisances.names) - set(names))
+    except ParameterError:  # it has the same effect as another unknown
+        return []
+    return [Alternative(label, "added", other)] if is_shown else []
 
 
 def _inferred(task: tuple[_Study, int]) -> _Outcome:

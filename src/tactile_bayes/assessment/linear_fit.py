@@ -136,13 +136,13 @@ class Linearisation:
         self.model = model
         self._count = len(model.forward_parameters)
         self._scales = np.maximum(scales[: self._count], 1e-12)
-        precision = prior_precision(model)[: self._count]
+        precision = prior_precision(model)[: self._count, : self._count]
         names = model.forward_parameters
         means = [
             float(model.priors[name].mean()) if known > 0.0 else 0.0  # type: ignore[attr-defined]
-            for name, known in zip(names, precision, strict=True)
+            for name, known in zip(names, np.diag(precision), strict=True)
         ]
-        self._mean, self._prior = np.array(means), precision * self._scales**2
+        self._mean, self._prior = np.array(means), precision * np.outer(self._scales, self._scales)
         margin, ends = 2.0 * _DIFFERENCE * self._scales, model.ends  # differences stay within the bounds
         self._low, self._high = ends.low[: self._count] + margin, ends.high[: self._count] - margin
         self._shared: Whitening | None = None
@@ -195,7 +195,7 @@ class Linearisation:
         for k in np.flatnonzero(usable):
             residuals = self._whitening(points[k], here[k], None)[0](self._off(readings[k], here[k]))
             pull = (self._mean - points[k, : self._count]) / self._scales
-            costs[k] = np.sum(np.clip(residuals, -_CLIPPED, _CLIPPED) ** 2) + np.sum(self._prior * pull**2)
+            costs[k] = np.sum(np.clip(residuals, -_CLIPPED, _CLIPPED) ** 2) + pull @ self._prior @ pull
         return costs
 
     def _around(self, readings: Floats, points: Floats) -> list[_Around | None]:
@@ -225,12 +225,12 @@ class Linearisation:
         residuals = np.clip(white(self._off(readings, here)), -_CLIPPED, _CLIPPED)
         pull = (self._mean - point[:count]) / self._scales
         flat = by_parameters.reshape(-1, count)
-        covariance = np.asarray(np.linalg.inv(flat.T @ flat + np.diag(self._prior)), dtype=np.float64)
-        change = covariance @ (flat.T @ residuals.ravel() + self._prior * pull)
+        covariance = np.asarray(np.linalg.inv(flat.T @ flat + self._prior), dtype=np.float64)
+        change = covariance @ (flat.T @ residuals.ravel() + self._prior @ pull)
         left = np.asarray(residuals[..., 0] - by_parameters @ change, dtype=np.float64)
         unit = np.broadcast_to(noise * np.eye(noise.size), (*here.shape, noise.size))
         zeros = white(unit)[..., self.model.present]
-        fit = LinearFit(by_parameters, left, covariance, np.diag(self._prior), zeros)
+        fit = LinearFit(by_parameters, left, covariance, self._prior, zeros)
         return _Around(fit, change)
 
     def _off(self, readings: Floats, expected: Floats) -> Floats:

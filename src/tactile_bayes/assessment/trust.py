@@ -25,12 +25,12 @@ from tactile_bayes.checks import (
     check_switch,
     check_whole_number,
 )
-from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import contour_draws, read_result
 from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.rig.rig import Rig
 from tactile_bayes.tasks import TaskProgress
 from tactile_bayes.tasks.workers import check_pool
 from tactile_bayes.uncertainty.band import contour_band
@@ -58,7 +58,8 @@ def trust(
     replicates: int = 100,
     assumptions: bool = True,
     probability: float | None = None,
-    priors: Mapping[str, Prior] | None = None,
+    family: Family | None = None,
+    rig: Rig | None = None,
     seed: int = 1,
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
@@ -87,8 +88,8 @@ def trust(
         Whether the band is computed again under other assumptions, which takes some ten seconds each.
     probability : float, optional
         Probability of the band, in (0, 1); by default that of the run, or 0.95.
-    priors : mapping of str to frozen scipy.stats distribution, optional
-        The argument of `infer_contour`, if its text does not determine them, as for histograms.
+    family, rig : Family and Rig, optional
+        Arguments of `infer_contour`, needed only if one of their distributions is none of SciPy's, like a histogram.
     seed : int
         Seed of all random numbers; the results do not depend on the number of workers.
     out : path-like, optional
@@ -124,8 +125,8 @@ def trust(
         If an argument is impossible.
     InferenceError
         If there is no posterior of a contour with its predictions, too few samples are loaded, or it is one without
-        unloaded samples (``events=False``), or with more than 2000 samples that share a drift process or a bias that is
-        integrated out.
+        unloaded samples (``SamplerSettings(events=False)``), or with more than 2000 samples that share a drift process
+        or a bias that is integrated out.
     CalibrationError
         If `out` holds replicates of another posterior, or another run uses it.
     TaskError
@@ -139,13 +140,13 @@ def trust(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> quick = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.05)
     >>> for friction in (0.0, 0.005):
     ...     sweep = scan(paper_profile("II", q=0.5), drive_step=0.1, friction=friction).record
-    ...     posterior = infer_contour(cell.measure(sweep, seed=1), nuisances=[], seed=1, settings=quick)
+    ...     posterior = infer_contour(cell.measure(sweep, seed=1), rig=Rig(unknown="nothing"), seed=1, settings=quick)
     ...     print(trust(posterior, replicates=0, assumptions=False).attrs["conclusion"])
     holds
     do not rely on it
@@ -160,7 +161,7 @@ def trust(
     posterior = _posterior_of(run_or_posterior)
     stated = posterior.attrs.get("probability", _USUAL) if probability is None else probability
     chance = check_probability("probability", stated)
-    experiment = experiment_of(posterior, priors)
+    experiment = experiment_of(posterior, family, rig)
     if not experiment.events:
         raise InferenceError("the posterior leaves unloaded samples out (events=False): infer it with them")
     x = reach(posterior)
@@ -217,7 +218,7 @@ def trust(
     found.attrs = {
         "conclusion": concluded,
         "summary": summary,
-        "words": "\n".join(sentences(found, parts, calibrated, mute=family_named(experiment.family).roughness)),
+        "words": "\n".join(sentences(found, parts, calibrated, mute=experiment.contours.roughness)),
         "probability": chance,
         "seed": seed,
         "replicates": replicates,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -18,7 +19,6 @@ from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.checks import (
     check_choice,
-    check_number,
     check_numbers,
     check_optional,
     check_path,
@@ -29,11 +29,10 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
-from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.sweep import Drive, Rotation, drives_of, record_template
+from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.sweep import Carried, Drive, drives_of, record_template
 from tactile_bayes.tasks import ResultsStore, TaskProgress, keep_outcomes, open_results_store
 
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
@@ -50,23 +49,19 @@ _AGAIN = replace(_SETTINGS, max_steps=6000)
 
 
 def calibrate(
+    family: Family | str = "parabola",
+    rig: Rig | None = None,
     *,
     seed: int,
-    family: str = "parabola",
     replicates: int = 200,
-    load_cell: LoadCell | None = None,
-    rod: Rod | None = None,
     drive: Drive | Sequence[Drive] | None = None,
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
     direction: Literal["both", "forward", "backward"] = "both",
     drive_angles: ArrayLike | None = None,
-    priors: Mapping[str, Prior] | None = None,
-    nuisances: Sequence[str] = STANDARD,
-    friction: float | None = None,
-    events: bool = True,
     settings: SamplerSettings | None = None,
     probability: float = 0.9,
-    world: Misspecification | None = None,
+    truth: Rig | None = None,
+    misspecification: Misspecification | None = None,
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -76,25 +71,23 @@ def calibrate(
 
     If a posterior is right, the rank of the truth among its draws is uniform, for every quantity (simulation-based
     calibration: Talts et al. 2018, arXiv:1804.06788), and a statement with 90 % probability holds in nine of ten
-    replicates. Conversely, ranks that are not uniform prove that sampler, likelihood or prior are wrong. With a
-    misspecification (`world`), the rig differs from what inference assumes, and the ranks show the effect on intervals.
+    replicates. Conversely, ranks that are not uniform prove that sampler, likelihood or prior are wrong. With a rig of
+    its own for the simulation (`truth`), the ranks show the effect on intervals of what inference assumes wrongly.
 
     An error in a replicate does not end the run: the replicate is lost, and no claim holds in it;
     `calibration_replicate` repeats it alone. An interrupt ends the run.
 
     Parameters
     ----------
+    family : str or Family
+        As in `infer_contour`; truths are drawn from the same priors.
+    rig : Rig, optional
+        As in `infer_contour`; what is unknown of it is drawn from the same priors. Its load cell, with noise, is by
+        default one of force_noise 0.05 EI/L² and moment_noise 0.02 EI/L, and its rod the dimensionless one.
     seed : int
         Seed of all random numbers; the results, except the seconds, do not depend on the number of workers.
-    family : str
-        As in `infer_contour`.
     replicates : int
         Number of replicates; each takes some two seconds on one core.
-    load_cell : LoadCell, optional
-        Load cell of simulation and inference, with noise, in the record's units; by default force_noise 0.05 EI/L²
-        and moment_noise 0.02 EI/L.
-    rod : Rod, optional
-        By default the dimensionless rod.
     drive : Rotation, Translation or Motion, or a sequence of them, optional
         As in `scan`; those that carry the base are sampled at as many places as there are drive angles.
     base : (float, float) or sequence of them
@@ -104,8 +97,6 @@ def calibrate(
     drive_angles : array_like, shape (n,), optional
         Readings of a perfect encoder [rad], in every sweep; by default every 2° from −30° to 210°. They do not depend
         on the contour, and so carry no information about it.
-    priors, nuisances, friction, events
-        As in `infer_contour`; truths are drawn from the same priors.
     settings : SamplerSettings, optional
         By default 2 ensembles of 20 walkers, or two more than twice the parameters if that is larger, until R̂ is
         below 1.05 and the effective draws number 200, five for every walker, in 500 steps at most; if they do not
@@ -113,8 +104,13 @@ def calibrate(
         unconverged are counted.
     probability : float
         Stated probability of the bands, regions and intervals, in (0, 1).
-    world : Misspecification, optional
-        Misspecification: differences between the simulated rig and what inference assumes.
+    truth : Rig, optional
+        The rig from which records are simulated, if it is another than inference assumes: it has the numbers of its
+        `unknown`, the distributions are drawn, and what is not named has the default distribution of a real rig. Its
+        rod and load cell, where it states them, take the place of those of `rig`. The true value of an inferred
+        parameter is that of the simulated rig relative to what `rig` states.
+    misspecification : Misspecification, optional
+        Further differences, which no rig can state.
     out : path-like, optional
         Folder of the results store replicates.json: a run that was killed resumes, and one with more replicates
         begins with those that are stored.
@@ -145,7 +141,8 @@ def calibrate(
         pointwise_in_gap and so on, width_, bias_ and off_ (mean width of the band, mean and largest distance of its
         median from the truth [length], in_gap and beside), check_passed, misfit_probability, axial_score, converged,
         effective_draws, evaluations, seconds, message, traceback (replicate)
-            Results of each replicate; misfit_probability and axial_score, of single samples, only with a `world`. The
+            Results of each replicate; misfit_probability and axial_score, of single samples, only with a `truth` or a
+            `misspecification`. The
             message of a replicate that is lost is its error, and only it has a traceback.
 
         Attributes: verdict, a text; conclusion, "calibrated", "not calibrated", "undecided" (more than 1 % of the
@@ -167,7 +164,8 @@ def calibrate(
     Examples
     --------
     >>> from scipy import stats
-    >>> found = calibrate(replicates=2, nuisances=[], priors={"a": stats.uniform(0.4, 0.4)}, seed=1, workers=1)
+    >>> family = Family("parabola", a=stats.uniform(0.4, 0.4))
+    >>> found = calibrate(family, Rig(unknown="nothing"), replicates=2, seed=1, workers=1)
     >>> found.quantity.values.tolist()
     ['a', 'q', 'x_c', 'noise_scale', 'log_likelihood', 'snap_off_forward', 'snap_off_backward']
     >>> found.attrs["verdict"].partition(":")[0]
@@ -175,21 +173,17 @@ def calibrate(
     """
     check_whole_number("replicates", replicates, 1)
     experiment = experiment_of(
+        family,
+        rig,
         seed=seed,
-        family=family,
-        load_cell=load_cell,
-        rod=rod,
         drive=drive,
         base=base,
         direction=direction,
         drive_angles=drive_angles,
-        priors=priors,
-        nuisances=nuisances,
-        friction=friction,
-        events=events,
         settings=settings,
         probability=probability,
-        world=world,
+        truth=truth,
+        misspecification=misspecification,
     )
     with open_results_store(experiment.identity, out, REPLICATES) as store:
         kept = keep_outcomes(
@@ -199,7 +193,13 @@ def calibrate(
 
 
 def calibration_replicate(
-    number: int, *, out: str | os.PathLike[str] | None = None, throw: bool = True, **options: Any
+    number: int,
+    family: Family | str = "parabola",
+    rig: Rig | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    throw: bool = True,
+    **options: Any,
 ) -> Replicate:
     """Repeat one replicate of a calibration alone: the same record, the same posterior, or the same error.
 
@@ -207,6 +207,8 @@ def calibration_replicate(
     ----------
     number : int
         Number of the replicate, from 0 up.
+    family, rig
+        As they were given to `calibrate`.
     out : path-like, optional
         Folder of the calibration, to verify that it is the same one; nothing is written.
     throw : bool
@@ -230,41 +232,37 @@ def calibration_replicate(
     Examples
     --------
     >>> from scipy import stats
-    >>> again = calibration_replicate(1, nuisances=[], priors={"a": stats.uniform(0.4, 0.4)}, seed=1)
+    >>> family = Family("parabola", a=stats.uniform(0.4, 0.4))
+    >>> again = calibration_replicate(1, family, Rig(unknown="nothing"), seed=1)
     >>> list(again.truth), "posterior" in again.posterior
     (['a', 'q', 'x_c', 'noise_scale'], True)
     """
     number = check_whole_number("number of the replicate", number, 0)
     check_switch("throw", throw)
-    experiment = experiment_of(**options)
+    experiment = experiment_of(family, rig, **options)
     folder = None if out is None else check_path("out", out)
     ResultsStore(experiment.identity, folder, REPLICATES)  # refuses that of another experiment
     return make_replicate(experiment, number, throw=throw)
 
 
 def experiment_of(
+    family: Family | str = "parabola",
+    rig: Rig | None = None,
     *,
     seed: int,
-    family: str = "parabola",
-    load_cell: LoadCell | None = None,
-    rod: Rod | None = None,
     drive: Drive | Sequence[Drive] | None = None,
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
     direction: str = "both",
     drive_angles: ArrayLike | None = None,
-    priors: Mapping[str, Prior] | None = None,
-    nuisances: Sequence[str] = STANDARD,
-    friction: float | None = None,
-    events: bool = True,
     settings: SamplerSettings | None = None,
     probability: float = 0.9,
-    world: Misspecification | None = None,
+    truth: Rig | None = None,
+    misspecification: Misspecification | None = None,
 ) -> SimulatedExperiment:
     """Return the experiment that `calibrate` repeats, from the same arguments and defaults."""
-    check_optional("load_cell", load_cell, LoadCell)
-    check_optional("rod", rod, Rod)
     check_optional("settings", settings, SamplerSettings)
-    check_optional("world", world, Misspecification)
+    check_optional("truth", truth, Rig)
+    check_optional("misspecification", misspecification, Misspecification)
     directions = {"both": ("forward", "backward"), "forward": ("forward",), "backward": ("backward",)}
     check_choice("direction", direction, directions)
     correction = "give a list of at least 3 different finite numbers [rad]"
@@ -272,28 +270,22 @@ def experiment_of(
     angles = np.unique(check_numbers("drive_angles", given, correction, shape=(None,)))
     if angles.size < 3:
         raise refused("drive_angles", drive_angles, correction)
-    drives, cell = drives_of(drive, base), load_cell or usual_load_cell(rod or Rod())
-    bases = tuple(one.base for one in drives if isinstance(one, Rotation))
-    assumed = Experiment(
-        record_template(drives, directions[direction], angles, rod, cell),
-        family,
-        cell,
-        {} if priors is None else priors,
-        rod,
-        None if friction is None else check_number("friction", friction),
-        nuisances,
-        events,
-    )
+    drives, rig = drives_of(drive, base), rig_of(rig)
+    rig = replace(rig, load_cell=rig.load_cell or usual_load_cell(rig.rod or Rod()))
+    assert rig.load_cell is not None
+    template = record_template(drives, directions[direction], angles, rig.rod, rig.load_cell)
     experiment = SimulatedExperiment(
-        assumed,
-        tuple(angles.tolist()),
-        bases,
-        directions[direction],
+        Experiment(template, rig, family, (settings or _SETTINGS).events),
+        {
+            "drives": json.dumps([one.poses.tolist() if isinstance(one, Carried) else one.base for one in drives]),
+            "directions": json.dumps(directions[direction]),
+            "drive_angles": json.dumps(angles.tolist()),
+        },
         settings=settings or _SETTINGS,
         probability=probability,
         seed=check_seed(seed),
-        world=world or Misspecification(),
-        drives=() if len(bases) == len(drives) else tuple(drives),
+        truth=truth,
+        misspecification=misspecification or Misspecification(),
     )
     default = replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS))
     return replace(experiment, settings=default, again=_AGAIN) if settings in (None, default) else experiment

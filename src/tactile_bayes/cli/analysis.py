@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,17 +13,18 @@ import typer
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.interrupts import acknowledge_interrupt
-from tactile_bayes.cli.record_options import Record, RecordOptions
-from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
+from tactile_bayes.cli.rig_options import RigOptions
 from tactile_bayes.cli.sampling_bar import sampling_bar
-from tactile_bayes.runs.names import CHECKPOINT, INFERENCE, OF_POSTERIOR, WATCH_PAGE
+from tactile_bayes.cli.task_bar import counted, resumable_bar
+from tactile_bayes.runs.names import CHECKPOINT, INFERENCE, MANY, OF_POSTERIOR, WATCH_PAGE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     import xarray as xr
     from rich.table import Table
 
+    from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.contour import ContourRun
 
 __all__ = ["Family", "answer_of", "decimals", "demo", "infer", "quantities"]
@@ -35,20 +37,24 @@ Family = Annotated[
     ),
 ]
 
+Records = Annotated[
+    list[Path], typer.Argument(help="Record, .csv or .nc, or a bag of ROS; or several, or a folder of them.")
+]
+
+_SHOWN = ("a", "b", "r", "n", "w", "q", "x_c", "gap width")
+"""Quantities in the table of several records; the file has all."""
+
 _STOPPING = "stopping; the draws made so far are checked, plotted and written now (Ctrl-C again discards them)"
 
 
 def infer(
     *,
     ctx: typer.Context,
-    record: Record,
-    out: Annotated[Out, Writes((*INFERENCE, *OF_POSTERIOR, WATCH_PAGE))],
+    record: Records,
+    out: Annotated[Out, Writes((*INFERENCE, *OF_POSTERIOR, WATCH_PAGE, *MANY))],
     family: Family = "parabola",
-    reading: RecordOptions,
-    unknown: UnknownOptions,
-    rig: KnownRig = None,
+    rig: RigOptions,
     probability: Annotated[float, typer.Option(help="Probability of band and intervals.", min=0.0, max=1.0)] = 0.95,
-    max_steps: Annotated[int, typer.Option(help="Largest number of steps of each walker.", min=1)] = 20_000,
     max_seconds: Annotated[
         float | None,
         typer.Option(
@@ -67,26 +73,32 @@ def infer(
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
-    """Infer the contour from a measured record: contact points, posterior, band and figures."""
+    """Infer the contour from a measured record: contact points, posterior, band and figures.
+
+    Of several records, or a folder of them, each has a folder in --out, made by a process for each core, and there is
+    one table of all; the same command goes on with those that are not done, and records may be added.
+    """
     from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.contour import analyse
+    from tactile_bayes.runs.many import records_in
 
-    nuisances, known = unknown.nuisances, rig_in(rig)
-    measured, cell = reading.read(record)
+    settings = SamplerSettings(max_seconds=max_seconds)
+    if (paths := records_in(record)) != record[:1]:
+        if checkpoint is not None:
+            raise typer.BadParameter("--checkpoint is for one record: of several, those that are done are kept")
+        return _of_many(paths, rig, out, family, probability, settings, seed, output)
+    measured, of_record = rig.read(paths[0])
     with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent, max_seconds=max_seconds) as progress:
         run = analyse(
             measured,
             out,
             family=family,
-            load_cell=cell,
-            friction=unknown.friction,
-            nuisances=nuisances,
-            rig=known,
+            rig=of_record,
             checkpoint=checkpoint,
             probability=probability,
             seed=seed,
-            settings=SamplerSettings(max_steps=max_steps, max_seconds=max_seconds),
-            record_file=record,
+            settings=settings,
+            record_file=paths[0],
             command=ctx.meta["words"],
             progress=progress,
         )
@@ -94,6 +106,59 @@ def infer(
     if checkpoint is not None:
         go_on = f"the same command resumes from the steps in {checkpoint}"
     return answer_of(ctx, run, run.files, {}, go_on)
+
+
+def _of_many(
+    paths: Sequence[Path],
+    rig: RigOptions,
+    out: Path,
+    family: str,
+    probability: float,
+    settings: SamplerSettings,
+    seed: int,
+    output: Output,
+) -> Answer:
+    """Infer the contours of several records."""
+    from tactile_bayes.runs.many import infer_contours
+
+    stated = rig.stated
+    of_all = replace(stated, load_cell=rig.in_place_of(stated.load_cell))
+    with resumable_bar(len(paths), "record", output.is_silent, _done) as note:
+        table = infer_contours(
+            paths,
+            of_all,
+            out=out,
+            family=family,
+            seed=seed,
+            settings=settings,
+            probability=probability,
+            progress=lambda made: note(made.done),
+        )
+    files = {"table": out / "runs.csv", "table, as NetCDF": out / "runs.nc"}
+    return Answer([_rows_of(table), "", files], lambda: {"records": table.to_dict()["data_vars"], "files": files})
+
+
+def _done(made: int | None) -> str:
+    return "no record was done" if made is None else f"{counted(made, 'record')} done"
+
+
+def _rows_of(table: xr.Dataset) -> Table:
+    """Return a row for each record: parameters of the contour, time, and first verdict, or reason of its failure."""
+    import numpy as np
+
+    shown = [name for name in table.quantity.values.tolist() if name in _SHOWN]
+    rows = []
+    for name in table.record.values.tolist():
+        row: Any = table.sel(record=name)
+        cells = []
+        for quantity in shown:
+            one = row.sel(quantity=quantity)
+            digits = decimals(float(one.upper - one.lower))
+            missing = bool(np.isnan(one["median"]))
+            cells.append("" if missing else f"{float(one['median']):.{digits}f}")
+        said = str(row.error.values) or str(row.verdict.values)
+        rows.append([name, *cells, f"{float(row.seconds):.0f} s", said])
+    return table_of(["record", *shown, "time", "verdict"], rows, left=["record", "verdict"], may_wrap=True)
 
 
 def demo(
@@ -105,32 +170,34 @@ def demo(
 ) -> Answer:
     """Simulate a steel wire that sweeps along a parabola, and infer the contour with a band from its noisy record."""
     from tactile_bayes.record import read_record
+    from tactile_bayes.rig import Rig
     from tactile_bayes.runs.contour import analyse
     from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 
-    path = measure_demo(out, seed=seed)
+    path, of_rig = measure_demo(out, seed=seed)
     if not output.is_silent:
         print(
             f"A wire of {ROD.length * 1e3:g} mm and {ROD.diameter * 1e3:g} mm diameter has swept forward and backward "
             f"along a parabola; a load cell\nwith {LOAD_CELL.force_noise * 1e3:g} mN and "
             f"{LOAD_CELL.moment_noise * 1e3:g} mN m of noise has recorded {path}.\nFrom here on only this file is "
-            f"used, and the rig is taken as stated; for your own record: tactile-bayes infer RECORD --as-stated "
-            f"--out RUN\n",
+            f"used, and {of_rig}, which takes the rig as stated; for your own record:\ntactile-bayes infer RECORD "
+            f"--rig rig.toml --out RUN\n",
             flush=True,
         )
+    rig = Rig.read(of_rig)
     with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent) as progress:
         run = analyse(
-            read_record(path),
+            read_record(path, rig),
             out,
             family="parabola",
-            nuisances=[],
+            rig=rig,
             seed=seed,
             truth=CONTOUR,
             record_file=path,
             command=ctx.meta["words"],
             progress=progress,
         )
-    return answer_of(ctx, run, {"record": path, **run.files}, TRUTH, "the same command starts again")
+    return answer_of(ctx, run, {"record": path, "rig": of_rig, **run.files}, TRUTH, "the same command starts again")
 
 
 def answer_of(

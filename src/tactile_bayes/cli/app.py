@@ -14,6 +14,7 @@ from tactile_bayes.cli.calibration import calibrate
 from tactile_bayes.cli.command import as_command
 from tactile_bayes.cli.comparison import compare
 from tactile_bayes.cli.dataset import dataset
+from tactile_bayes.cli.describing import rig
 from tactile_bayes.cli.design import design
 from tactile_bayes.cli.figures import figures
 from tactile_bayes.cli.inspection import inspect
@@ -122,10 +123,11 @@ app = typer.Typer(
 _EXAMPLES: dict[Callable[..., Answer], str] = {
     scan: "scan --profile II --distance 0.5 --out ideal.csv",
     measure: "measure ideal.csv --force-noise 0.05 --moment-noise 0.02 --out measured.csv",
+    rig: "rig inspection/rig.toml",
     inspect: "inspect rig.csv --length 0.2 --flexural-rigidity 0.0024 --split-sweeps --column 'force_x=Fx[mN]' "
     "--out inspection/",
     reconstruct: "reconstruct record.csv --out contacts/",
-    infer: "infer record.csv --family parabola --out run/",
+    infer: "infer record.csv --rig rig.toml --family parabola --out run/",
     compare: "compare record.csv --out run/",
     calibrate: "calibrate --family parabola --replicates 200 --out calibration/",
     sensitivity: "sensitivity --profile II --distance 0.5 --out sensitivity/",

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
-from tactile_bayes.cli.numbers import assigned, numbers_asked
-from tactile_bayes.cli.rig_options import NoiseOptions, RigOptions, UnknownOptions
+from tactile_bayes.cli.drive_options import Pivots, pivots_in
+from tactile_bayes.cli.rig_options import RigFile
 from tactile_bayes.cli.task_bar import resumable_bar
 from tactile_bayes.cli.worker_options import WorkerOptions
 from tactile_bayes.runs.names import CALIBRATION
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.calibration.misspecification import Misspecification
     from tactile_bayes.calibration.replicate import Replicate
 
 __all__ = ["calibrate"]
@@ -32,16 +32,14 @@ def calibrate(
     out: Annotated[Out, Writes((*CALIBRATION, "replicates.json"))],
     family: Annotated[str, typer.Option(help="Shape of the contours, as for infer, shape-free too.")] = "parabola",
     replicates: Annotated[int, typer.Option(help="Number of records.", min=1)] = 200,
-    noise: NoiseOptions,
-    rig: RigOptions,
+    rig: RigFile,
+    base: Pivots = None,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 2.0,
-    unknown: UnknownOptions,
-    world: Annotated[
-        list[str] | None,
+    truth: Annotated[
+        Path | None,
         typer.Option(
-            help="Misspecification, the rig's difference from what inference assumes: friction=0.3, "
-            "rigidity_scale=1.05, drive_angle_offset=0.02, base_shift=0.01,0, bias=0.02,0.05,0.05, drift=0.04,0.1,0.1, "
-            "flat_spot=ANGLE,FACTOR; may be repeated."
+            help="Another rig.toml, by which the records are simulated: what inference assumes is then wrong.",
+            dir_okay=False,
         ),
     ] = None,
     probability: Annotated[float, typer.Option(help="Probability of the bands and regions that are judged.")] = 0.9,
@@ -63,19 +61,17 @@ def calibrate(
     """
     import numpy as np
 
+    from tactile_bayes.rig import Rig
     from tactile_bayes.runs.calibration import calibrate_into
 
     common = ctx.find_root().params
     common["debug"] = common["debug"] or debug
     experiment: dict[str, Any] = {
         "family": family,
-        "load_cell": noise.load_cell,
-        "rod": rig.rod,
-        "base": rig.pivots,
+        "rig": rig.stated,
+        "base": pivots_in(base),
         "drive_angles": np.radians(np.arange(-30.0, 210.0 + 0.5 * drive_step, drive_step)),
-        "friction": unknown.friction,
-        "nuisances": unknown.nuisances,
-        "world": _world(world),
+        "truth": None if truth is None else Rig.read(truth),
         "probability": probability,
         "seed": seed,
     }
@@ -90,8 +86,9 @@ def calibrate(
         )
 
     with resumable_bar(replicates, "replicate", output.is_silent, have) as note:
+        experiment |= work.arguments
         run = calibrate_into(
-            out, replicates=replicates, progress=lambda calibrating: note(calibrating.done), **vars(work), **experiment
+            out, replicates=replicates, progress=lambda calibrating: note(calibrating.done), **experiment
         )
     found = run.result
     names = ("conclusion", "lost", "probability", "power", "noticed_shift", "noticed_narrow", "noticed_wide")
@@ -104,16 +101,6 @@ def calibrate(
             "files": run.files,
         },
     )
-
-
-def _world(options: Sequence[str] | None) -> Misspecification:
-    from tactile_bayes.calibration.misspecification import NUMBERS, Misspecification
-
-    given: dict[str, Any] = {}
-    for name, value in assigned("--world", options, known=NUMBERS).items():
-        numbers = numbers_asked(value, f"--world {name}", NUMBERS[name])
-        given[name] = numbers[0] if NUMBERS[name] == 1 else numbers
-    return Misspecification(**given)
 
 
 def _of_replicate(made: Replicate) -> Answer:

@@ -3,8 +3,8 @@
 A command is a function. Its parameters are options or groups of options: a group is a dataclass whose fields are
 options and whose properties interpret them. The last group is `Output`. The function returns an `Answer`.
 
-A path is read by the command unless it is marked with `Writes`. An output that is an input is refused before the
-function is called.
+A path is read by the command unless it is marked with `Writes`, and a text that is marked with `Reads` may be a path.
+An output that is an input is refused before the function is called.
 """
 
 from __future__ import annotations
@@ -100,8 +100,9 @@ def _refuse_replaced_inputs(options: Iterable[Parameter], given: Mapping[str, An
     outputs, inputs = list[Path](), list[Path]()
     for option in options:
         value, marks = given.get(option.name), getattr(option.annotation, "__metadata__", ())
-        mark = next((mark for mark in marks if isinstance(mark, Writes | Reads)), Reads())
-        paths = [path for path in (value if isinstance(value, list) else [value]) if isinstance(path, Path)]
+        stated = next((mark for mark in marks if isinstance(mark, Writes | Reads)), None)
+        mark, kinds = stated or Reads(), Path if stated is None else Path | str
+        paths = [Path(path) for path in (value if isinstance(value, list) else [value]) if isinstance(path, kinds)]
         (outputs if isinstance(mark, Writes) else inputs).extend(file for path in paths for file in mark.files(path))
     if outputs and inputs:
         refuse_replacing(outputs, inputs)

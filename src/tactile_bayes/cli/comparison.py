@@ -8,8 +8,7 @@ import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
-from tactile_bayes.cli.record_options import Record, RecordOptions
-from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
+from tactile_bayes.cli.rig_options import Record, RigOptions
 from tactile_bayes.cli.sampling_bar import sampling_bar
 from tactile_bayes.runs.names import COMPARISON
 
@@ -38,9 +37,7 @@ def compare(
             "default parabola, circle, ellipse, power-law, power-law/power-law and shape-free."
         ),
     ] = None,
-    reading: RecordOptions,
-    unknown: UnknownOptions,
-    rig: KnownRig = None,
+    rig: RigOptions,
     leave_one_out: Annotated[
         bool,
         typer.Option(
@@ -60,8 +57,7 @@ def compare(
     from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.comparison import compare_into
 
-    nuisances, known = unknown.nuisances, rig_in(rig)
-    measured, cell = reading.read(record)
+    measured, of_record = rig.read(record)
     with sampling_bar(output.is_silent, max_seconds=max_seconds) as show:
 
         def note(name: str, progress: Progress) -> None:
@@ -72,10 +68,7 @@ def compare(
             measured,
             out,
             families=family or SHAPES,
-            load_cell=cell,
-            friction=unknown.friction,
-            nuisances=nuisances,
-            rig=known,
+            rig=of_record,
             leave_one_out=leave_one_out,
             seed=seed,
             settings=SamplerSettings(max_seconds=max_seconds),

@@ -74,7 +74,7 @@ def generate(
             last = production
             note(production.records)
 
-        datasets.generate(spec, out, progress=progress, **vars(work))
+        datasets.generate(spec, out, progress=progress, **work.arguments)
     manifest = read_manifest(out)
     return Answer(_words(out, manifest, last), lambda: {**_numbers(out, manifest), "made": last.made if last else 0})
 

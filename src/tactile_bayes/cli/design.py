@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,7 +11,7 @@ from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.drive_options import CarryOptions
 from tactile_bayes.cli.numbers import numbers_asked
-from tactile_bayes.cli.rig_options import NoiseOptions, RodOptions, UnknownOptions
+from tactile_bayes.cli.rig_options import RigFile
 from tactile_bayes.cli.task_bar import counted, resumable_bar
 from tactile_bayes.cli.worker_options import WorkerOptions
 from tactile_bayes.runs.names import DESIGN
@@ -27,25 +26,6 @@ __all__ = ["design"]
 Criterion = Literal["band", "gap", "information"]
 
 
-@dataclass(frozen=True)
-class _NoiseOptions(NoiseOptions):
-    """Noise of the load cell, if no run states it."""
-
-    force_noise: Annotated[
-        float | None, typer.Option(help="Without a run: noise of the forces [N, or EI/L²]; by default 0.05 EI/L².")
-    ] = None
-    moment_noise: Annotated[
-        float | None, typer.Option(help="Likewise of the moment [N m, or EI/L]; by default 0.02 EI/L.")
-    ] = None
-
-
-@dataclass(frozen=True)
-class _RodOptions(RodOptions):
-    """The rod, if no run states it."""
-
-    length: Annotated[float | None, typer.Option(help="Likewise the rod's length [m].")] = None
-
-
 def design(
     *,
     out: Annotated[Out, Writes((*DESIGN, "nested/*"))],
@@ -58,7 +38,7 @@ def design(
     base: Annotated[
         list[str] | None,
         typer.Option(
-            help="A pivot to choose from, X,Y [m, or L]; may be repeated. By default, without --carry and --poses, "
+            help="A pivot to choose from, X,Y [m, or L]; may be repeated. By default, without --carry, "
             "eleven across at three heights."
         ),
     ] = None,
@@ -78,19 +58,18 @@ def design(
     ] = False,
     draws: Annotated[int, typer.Option(help="Number of objects drawn from posterior or prior.", min=2)] = 24,
     carries: CarryOptions,
-    noise: _NoiseOptions,
-    rod: _RodOptions,
-    unknown: UnknownOptions,
+    rig: RigFile,
     work: WorkerOptions,
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
     """Choose the drive of the next record, so that the contour's band becomes narrowest.
 
-    Candidates are pivots (--base) and drives that carry the base (--carry, --poses), each with every --drive-step.
+    Candidates are pivots (--base) and drives that carry the base (--carry), each with every --drive-step.
     """
     import numpy as np
 
+    from tactile_bayes.errors import ParameterError
     from tactile_bayes.planning.design import ABOVE, ACROSS
     from tactile_bayes.runs.design import design_into
 
@@ -99,14 +78,11 @@ def design(
     options: dict[str, Any] = {}
     known: xr.DataTree | str = family
     if run is not None:
+        if rig.rig is not None:
+            raise ParameterError("a run has its rig: leave out --rig, or the run")
         known = _posterior(run)
     else:
-        options = {
-            "load_cell": noise.load_cell,
-            "rod": rod.rod,
-            "friction": unknown.friction,
-            "nuisances": unknown.nuisances,
-        }
+        options = {"rig": rig.stated}
     steps = drive_step or [2.0]
     usual = 0 if drives else ACROSS.size * ABOVE.size
     count = (len(pivots or ()) + len(drives or ()) or usual) * len(steps)
@@ -129,7 +105,7 @@ def design(
             nested=nested,
             draws=draws,
             progress=lambda designing: note(designing.done),
-            **vars(work),
+            **work.arguments,
             **options,
         )
     words = made.files["words"].read_text(encoding="utf-8").splitlines()

@@ -9,17 +9,37 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_bayes.cli.numbers import columns_in, numbers_asked
+from tactile_bayes.cli.command import Reads
+from tactile_bayes.cli.numbers import numbers_asked
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tactile_bayes.sweep import Carried, Drive
 
-__all__ = ["CarryOptions", "DriveOptions"]
+__all__ = ["CarryOptions", "DriveOptions", "Pivots", "pivots_in"]
+
+_STEPS = (0.001, 28.0)
+"""Smallest and largest step of rotations [degrees]."""
 
 _USUAL_STEP = 1.0
 """Step of rotations if no option gives one [degrees]."""
+
+
+Pivots = Annotated[
+    list[str] | None, typer.Option("--base", help="A pivot, X,Y [m, or L]; may be repeated. By default one at 0,0.")
+]
+
+
+def pivots_in(texts: Sequence[str] | None) -> list[tuple[float, ...]]:
+    """Return the coordinates of pivots.
+
+    Raises
+    ------
+    ParameterError
+        If one has not two numbers.
+    """
+    return [numbers_asked(text, "--base", 2) for text in texts or ["0,0"]]
 
 
 @dataclass(frozen=True)
@@ -30,43 +50,23 @@ class CarryOptions:
         list[str] | None,
         typer.Option(
             help="Carry the base along a line, the rod clamped: X,Y,HEADING,DRIVE_ANGLE,TRAVEL, where it begins, its "
-            "direction and the slope of the rod [degrees], and how far it moves, with lengths as of --base; may be "
-            "repeated. There are rotations beside it only about each --base that is given."
+            "direction and the slope of the rod [degrees], and how far it moves, with lengths as of --base; or along "
+            "any path: a CSV file with columns x, y [m, or L] and drive_angle [degrees], a line for each pose. May be "
+            "repeated; there are rotations beside it only about each --base that is given."
         ),
+        Reads(),
     ] = None
-    poses: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Carry the base along any path: a CSV file with columns x, y [m, or L] and drive_angle [degrees], a "
-            "line for each pose; may be repeated.",
-            dir_okay=False,
-        ),
-    ] = None
-
-    @property
-    def carries(self) -> bool:
-        """True if an option carries the base."""
-        return bool(self.carry or self.poses)
 
     @property
     def carried(self) -> list[Carried]:
-        """Translations, then motions.
+        """Translations along lines, and motions along paths.
 
         Raises
         ------
         ParameterError
             If an option is no drive.
         """
-        from tactile_bayes.sweep import Motion, Translation
-
-        drives: list[Carried] = []
-        for text in self.carry or []:
-            x, y, heading, angle, travel = numbers_asked(text, "--carry", 5)
-            drives.append(Translation((x, y), math.radians(heading), math.radians(angle), travel))
-        for path in self.poses or []:
-            x_of, y_of, angle_of = columns_in(path, ("x", "y", "drive_angle"), "pose")
-            drives.append(Motion(x_of, y_of, [math.radians(angle) for angle in angle_of]))
-        return drives
+        return [_motion(Path(text)) if _is_file(text) else _translation(text) for text in self.carry or []]
 
 
 @dataclass(frozen=True)
@@ -75,13 +75,9 @@ class DriveOptions(CarryOptions):
 
     drive_step: Annotated[
         float | None,
-        typer.Option(help="Step of rotations [degrees]; by default 1.", min=0.001, max=28.0),
-    ] = None
-    travel_step: Annotated[
-        float | None,
         typer.Option(
-            help="Step along --carry and --poses [m, or L]; by default a hundredth of the rod's length, or the poses "
-            "if they are more than 8."
+            help="Step of rotations [degrees], by default 1; of --carry [m, or L], by default a hundredth of the rod's "
+            "length, or the poses if they are more than 8."
         ),
     ] = None
 
@@ -103,22 +99,41 @@ class DriveOptions(CarryOptions):
         Raises
         ------
         ParameterError
-            If the step is for other drives than there are, or there are drives of both kinds.
+            If a step is given, and there are drives of both kinds, or it is one that no rotation has.
         """
         from tactile_bayes.errors import ParameterError
         from tactile_bayes.sweep import Rotation
 
         turns = [isinstance(drive, Rotation) for drive in drives]
-        given = [name for name in ("drive_step", "travel_step") if getattr(self, name) is not None]
-        for name, is_for, what in (("drive_step", any(turns), "rotations"), ("travel_step", not all(turns), "--carry")):
-            option = f"--{name.replace('_', '-')}"
-            if name in given and not is_for:
-                raise ParameterError(f"{option} is for {what}, and there is none: leave it out")
-            if name in given and any(turns) != all(turns):
-                raise ParameterError(
-                    f"{option}: rotations and drives that carry the base have their default steps in one record; leave "
-                    "it out, or scan them one by one"
-                )
-        if all(turns):
-            return math.radians(_USUAL_STEP if self.drive_step is None else self.drive_step)
-        return self.travel_step
+        step = self.drive_step
+        if step is not None and any(turns) != all(turns):
+            raise ParameterError(
+                "--drive-step: rotations and drives that carry the base have their default steps in one record; leave "
+                "it out, or scan them one by one"
+            )
+        if not all(turns):
+            return step
+        low, high = _STEPS
+        if step is not None and not low <= step <= high:
+            raise ParameterError(f"--drive-step is {step:g}: give a step of rotations from {low:g} to {high:g} degrees")
+        return math.radians(_USUAL_STEP if step is None else step)
+
+
+def _is_file(text: str) -> bool:
+    """Return True for the name of a file, which has no comma unless there is one of that name."""
+    return "," not in text or Path(text).is_file()
+
+
+def _translation(text: str) -> Carried:
+    from tactile_bayes.sweep import Translation
+
+    x, y, heading, angle, travel = numbers_asked(text, "--carry", 5)
+    return Translation((x, y), math.radians(heading), math.radians(angle), travel)
+
+
+def _motion(path: Path) -> Carried:
+    from tactile_bayes.record.plain_csv import columns_in
+    from tactile_bayes.sweep import Motion
+
+    x, y, angles = columns_in(path, ("x", "y", "drive_angle"), "pose")
+    return Motion(x, y, [math.radians(angle) for angle in angles])

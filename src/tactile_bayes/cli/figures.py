@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from tactile_bayes.cli.answer import Answer
-from tactile_bayes.cli.command import Out, Output, Seed, Writes
+from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.drive_options import DriveOptions
 from tactile_bayes.cli.rig_options import NoiseOptions
 from tactile_bayes.cli.task_bar import resumable_bar
 from tactile_bayes.runs.names import FIGURES
 
 if TYPE_CHECKING:
+    from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.sweep import Carried
 
 __all__ = ["figures"]
@@ -29,21 +29,17 @@ class _DriveOptions(DriveOptions):
         list[str] | None,
         typer.Option(
             help="Carry the base along a line, the rod clamped, instead of turning it: X,Y,HEADING,DRIVE_ANGLE,TRAVEL, "
-            "where it begins [L], its direction and the slope of the rod [degrees], and how far it moves [L]."
+            "where it begins [L], its direction and the slope of the rod [degrees], and how far it moves [L]; or along "
+            "any path: a CSV file with columns x, y [L] and drive_angle [degrees], a line for each pose."
         ),
+        Reads(),
     ] = None
-    poses: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Likewise along any path: a CSV file with columns x, y [L] and drive_angle [degrees], a line for each "
-            "pose.",
-            dir_okay=False,
-        ),
-    ] = None
-    drive_step: Annotated[float | None, typer.Option(help="Step of rotations [degrees]; by default 1.")] = None
-    travel_step: Annotated[
+    drive_step: Annotated[
         float | None,
-        typer.Option(help="Step along --carry or --poses [L]; by default 0.01, or the poses if they are more than 8."),
+        typer.Option(
+            help="Step of rotations [degrees], by default 1; of --carry [L], by default 0.01, or the poses if they are "
+            "more than 8."
+        ),
     ] = None
 
     @property
@@ -59,7 +55,7 @@ class _DriveOptions(DriveOptions):
 
         carried = self.carried
         if len(carried) > 1:
-            raise ParameterError(f"figures show one drive, and there are {len(carried)}: give --carry or --poses once")
+            raise ParameterError(f"figures show one drive, and there are {len(carried)}: give --carry once")
         return carried[0] if carried else None
 
 
@@ -71,6 +67,21 @@ class _NoiseOptions(NoiseOptions):
         float | None, typer.Option(help="Noise of the forces in figure 11 [EI/L²]; by default none.")
     ] = None
     moment_noise: Annotated[float | None, typer.Option(help="Likewise of the moment [EI/L].")] = None
+
+    @property
+    def load_cell(self) -> LoadCell | None:
+        """The load cell, or None if no option gives one.
+
+        Raises
+        ------
+        ParameterError
+            If one of the two options is missing.
+        """
+        from tactile_bayes.errors import ParameterError
+
+        if (not self.force_noise) != (not self.moment_noise):
+            raise ParameterError("--force-noise and --moment-noise go together, above zero: give both, or neither")
+        return self.in_place_of(None)
 
 
 def figures(
@@ -101,7 +112,7 @@ def figures(
 ) -> Answer:
     """Draw Figures 2 to 11 of Merker et al. 2018 (doi 10.1155/2018/1613945) from our own computation.
 
-    The drive turns the rod about the origin, as in the paper, or carries its base (--carry, --poses).
+    The drive turns the rod about the origin, as in the paper, or carries its base (--carry).
     """
     from tactile_bayes.paper_figures import NUMBERS, caption, draw_all
     from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH

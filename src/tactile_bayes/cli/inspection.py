@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Output, Writes
-from tactile_bayes.cli.record_options import Record, RecordOptions
-from tactile_bayes.cli.rig_options import Friction
+from tactile_bayes.cli.numbers import assigned
+from tactile_bayes.cli.rig_options import Record, RigOptions
 from tactile_bayes.cli.task_bar import step_bar
 from tactile_bayes.runs.names import INSPECTION
 
@@ -22,11 +23,12 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from tactile_bayes.diagnostics.inspection import Inspection
+    from tactile_bayes.rig import Rig
 
 __all__ = ["inspect"]
 
 _SOURCES = {
-    "given": "as the options say",
+    "given": "as rig.toml and options say",
     "data sheet": "as the file states",
     "unloaded samples": "not stated, found in the unloaded samples",
     "nothing": "neither stated nor found",
@@ -34,21 +36,71 @@ _SOURCES = {
 }
 
 
+@dataclass(frozen=True)
+class _FileOptions(RigOptions):
+    """The rig, and how its file is written, as long as no rig.toml says it."""
+
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Source of a column with another name, unit, sign, factor or zero in the file: force_x=Fx[mN], "
+            "force_y=-1e-3*Fy[N], drive_angle=90-Angle[deg], base_x=12[mm]; may be repeated."
+        ),
+    ] = None
+    split_sweeps: Annotated[
+        bool,
+        typer.Option(
+            "--split-sweeps", help="Find sweeps and directions by the turns of the drive, if not in the file."
+        ),
+    ] = False
+    missing: Annotated[
+        list[str] | None, typer.Option(help="Channel without a column, like force_x; may be repeated.")
+    ] = None
+    frame: Annotated[
+        Literal["fixed", "turning"] | None,
+        typer.Option(
+            help="Axes of the forces, if not in the file: fixed in the laboratory, or turning with the drive."
+        ),
+    ] = None
+
+    @property
+    def stated(self) -> Rig:
+        """The rig as file and options state it, apart from its noise."""
+        from tactile_bayes.load_cell import LoadCell
+
+        rig = super().stated
+        file = replace(
+            rig.file,
+            columns={**rig.file.columns, **assigned("--column", self.column, "COLUMN=NAME[UNIT], like force_x=Fx[mN]")},
+            split_sweeps=self.split_sweeps or rig.file.split_sweeps,
+            missing=(*rig.file.missing, *(self.missing or ())),
+        )
+        cell = rig.load_cell
+        return replace(
+            rig, file=file, load_cell=replace(cell or LoadCell(), frame=self.frame) if self.frame is not None else cell
+        )
+
+    @property
+    def describes_file(self) -> bool:
+        """True if an option says how the file is written, which only rig.toml can say to other commands."""
+        return bool(self.column or self.split_sweeps or self.missing or self.frame)
+
+
 def inspect(
     *,
     record: Record,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder for a figure, tables and this text; created if missing.", file_okay=False),
+        typer.Option(help="Folder for rig.toml, a figure, tables and this text; created if missing.", file_okay=False),
         Writes(INSPECTION),
     ] = None,
-    reading: RecordOptions,
-    friction: Friction = 0.0,
+    rig: _FileOptions,
     output: Output,
 ) -> Answer:
     """Inspect a record before anything is inferred: what looks wrong, and the contents of the file.
 
-    It takes the options of infer that say how a file is read; the last line is the next command.
+    Say by options how the file is written: rig.toml then says it to all other commands, with the noise and the zeros of
+    the unloaded samples if nobody states them. The last line is the next command.
     """
     with step_bar(output.is_silent) as show:
         import warnings
@@ -58,16 +110,16 @@ def inspect(
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RecordWarning)  # they are among the contents
-            measured, cell = reading.read(record)
-        found = inspect_record(measured, load_cell=cell, friction=friction, progress=show)
+            measured, of_record = rig.read(record)
+        found = inspect_record(measured, of_record, progress=show)
         beside = _beside(measured)
-        contents = [*_contents(found, reading.origins), *(f"{name:<12}{text}" for name, text in beside)]
+        contents = [*_contents(found, of_record.file.columns), *(f"{name:<12}{text}" for name, text in beside)]
         files: Mapping[str, Path] = {}
         if out is not None:
             from tactile_bayes.runs.inspection import write_inspection
 
-            files = write_inspection(found, out, text=["", *contents])
-    again = f"tactile-bayes infer {shlex.quote(str(record))}{_as_options(reading, friction)} --out run/"
+            files = write_inspection(found, out, text=["", *contents], rig=_to_write(of_record, rig))
+    again = _next_command(record, rig, out)
     return Answer(_words(found, contents, again, files), lambda: _numbers(found, again, files) | _texts(beside))
 
 
@@ -96,18 +148,34 @@ def _texts(beside: list[tuple[str, str]]) -> dict[str, list[str]]:
     return {key: [text for name, text in beside if name == key.replace("_", " ")] for key in ("reading", "not_used")}
 
 
-def _as_options(reading: RecordOptions, friction: float) -> str:
+def _to_write(rig: Rig, options: _FileOptions) -> Rig:
+    """Return the rig of a record with its frame, which is stated even if there is no load cell beside it."""
+    stated = options.stated.load_cell
+    return rig if rig.load_cell is not None else replace(rig, load_cell=stated)
+
+
+def _next_command(record: Path, rig: _FileOptions, out: Path | None) -> str:
+    """Return the command that goes on: infer, or again inspect where only its options say how the file is written."""
+    path = shlex.quote(str(record))
+    if out is not None:
+        return f"tactile-bayes infer {path} --rig {shlex.quote(str(out / 'rig.toml'))} --out run/"
+    if rig.describes_file:
+        return f"tactile-bayes inspect {path}{_as_options(rig)} --out inspection/"
+    return f"tactile-bayes infer {path}{_as_options(rig)} --out run/"
+
+
+def _as_options(rig: _FileOptions) -> str:
     """Return the given options as words of a command."""
     words = ""
-    for name, value in {**vars(reading), "friction": friction}.items():
+    for name, value in vars(rig).items():
         option = f" --{name.replace('_', '-')}"
-        for part in value if isinstance(value, list) else [value] if value else []:
+        for part in value if isinstance(value, list) else [value] if value not in (None, False) else []:
             words += option if part is True else f"{option} {shlex.quote(str(part))}"
     return words
 
 
 def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
-    """Return the contents of the file, except its sweeps and channels; origins are those of `RecordOptions`."""
+    """Return the contents of the file, except its sweeps and channels; origins are those of the rig's file."""
     from tactile_bayes.diagnostics.inspection.messages import quantity
     from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
 

@@ -6,11 +6,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
-    from pathlib import Path
 
-    from tactile_bayes.arrays import Floats
 
-__all__ = ["as_typed", "assigned", "columns_in", "numbers_asked"]
+__all__ = ["as_typed", "assigned", "numbers_asked"]
 
 
 def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
@@ -73,36 +71,3 @@ def assigned(
             raise ParameterError(f"{option} {name}= is given twice: keep one of them")
         values[name] = value
     return values
-
-
-def columns_in(path: Path, names: Sequence[str], what: str = "point") -> list[Floats]:
-    """Return columns of a CSV file, a line for each point or pose.
-
-    Raises
-    ------
-    ParameterError
-        If the file cannot be read, lacks a column, or a value is no number.
-    """
-    import csv
-
-    import numpy as np
-
-    from tactile_bayes.errors import ParameterError
-    from tactile_bayes.record.cell import number_in
-
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ParameterError(f"{path}: the {what}s cannot be read ({error})") from error
-    columns = []
-    for name in names:
-        values = [number_in(row.get(name) or "") for row in rows]
-        if not values or None in values:
-            at = values.index(None) + 1 if values else 0
-            raise ParameterError(
-                f"{path}: {what} {at} has no number in column {name!r}: write a line '{','.join(names)}', then a "
-                f"{what} in each line, with decimal points"
-            )
-        columns.append(np.array(values, dtype=float))
-    return columns

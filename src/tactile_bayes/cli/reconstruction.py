@@ -9,8 +9,7 @@ import typer
 
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Writes
-from tactile_bayes.cli.record_options import Record, RecordOptions
-from tactile_bayes.cli.rig_options import Friction
+from tactile_bayes.cli.rig_options import Record, RigOptions
 from tactile_bayes.cli.task_bar import step_bar
 from tactile_bayes.runs.names import RECONSTRUCTION
 
@@ -39,20 +38,20 @@ def reconstruct(
             "the most probable contact that a rod can make."
         ),
     ] = None,
-    reading: RecordOptions,
-    friction: Friction = 0.0,
+    rig: RigOptions,
     output: Output,
 ) -> Answer:
     """Find contact points with standard deviations (Step 2), from every sample in contact.
 
-    Noise that is not stated is estimated from the samples before first contact and after snap-off.
+    Numbers under [unknown] of rig.toml, like friction = 0.2, are taken into account. Noise that is not stated is
+    estimated from the samples before first contact and after snap-off.
     """
     with step_bar(output.is_silent) as show:
         from tactile_bayes.runs.reconstruction import reconstruct_into, reconstruction_messages
 
-        measured, cell = reading.read(record)
+        measured, of_record = rig.read(record)
         show(1, 2)
-        run = reconstruct_into(measured, out, method=method, load_cell=cell, friction=friction)
+        run = reconstruct_into(measured, out, method=method, rig=of_record)
     words = reconstruction_messages(run.result)
     source = [_SOURCES[run.source]] if run.source in _SOURCES else []
     return Answer([*words, *source, "", run.files], lambda: _numbers(run, words))

@@ -11,8 +11,7 @@ from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.cli.answer import Answer, columns_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.contour_options import GaugeOptions
-from tactile_bayes.cli.record_options import RecordOptions
-from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
+from tactile_bayes.cli.rig_options import RigOptions
 from tactile_bayes.cli.sampling_bar import sampling_bar
 from tactile_bayes.runs.names import RIG
 
@@ -30,41 +29,35 @@ def calibrate_rig(
     ],
     out: Annotated[Out, Writes(RIG)],
     gauge: GaugeOptions,
-    reading: RecordOptions,
-    unknown: UnknownOptions,
-    rig: KnownRig = None,
+    rig: RigOptions,
     probability: Annotated[float, typer.Option(help="Probability of the intervals.", min=0.0, max=1.0)] = 0.95,
-    max_steps: Annotated[int, typer.Option(help="Largest number of steps of each walker.", min=1)] = 20_000,
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
     """Calibrate the rig on a gauge: infer stiffness, encoder, lever and the like from sweeps along a known contour.
 
-    infer --rig takes the result over. With --rig, records of another gauge or place add to a former calibration.
+    Its rig.toml is for --rig of the other commands, and of this one, where records of another gauge or place add to it.
     """
-    from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.rig import calibrate_rig_into
 
-    contour, nuisances, known = gauge.contour, unknown.nuisances, rig_in(rig)
-    records = [reading.read(path) for path in record]
+    contour, read = gauge.contour, [rig.read(path) for path in record]
     with sampling_bar(output.is_silent) as progress:
         run = calibrate_rig_into(
             out,
-            records,
+            [measured for measured, _ in read],
             contour=contour,
             probability=probability,
-            rig=known,
-            friction=unknown.friction,
-            nuisances=nuisances,
+            rig=read[0][1],
             seed=seed,
-            settings=SamplerSettings(max_steps=max_steps),
             progress=progress,
         )
     return Answer([*run.messages, "", quantities(run.summary, {}), "", run.files], lambda: _numbers(run))
 
 
 def _numbers(run: RigRun) -> dict[str, Any]:
-    attrs = run.result.attrs
+    assert run.result.calibration is not None
+    assert run.result.calibration.posterior is not None
+    attrs = run.result.calibration.posterior.attrs
     return {
         "words": run.messages,
         "converged": bool(attrs["converged"]),

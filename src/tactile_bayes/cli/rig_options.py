@@ -1,205 +1,204 @@
-"""Options that describe a rig: its simulated parts, and its unknowns."""
+"""Options that describe a rig: its file, and single numbers that replace those of the file."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_bayes.cli.numbers import columns_in, numbers_asked
+from tactile_bayes.cli.command import Reads
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.mechanics.rods.rod import Rod
+    from tactile_bayes.rig import Rig
 
-__all__ = ["Friction", "KnownRig", "NoiseOptions", "RigOptions", "RodOptions", "UnknownOptions", "rig_in"]
+__all__ = ["NoiseOptions", "Record", "RigFile", "RigOptions", "report_units"]
 
-Friction = Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)]
+Record = Annotated[Path, typer.Argument(help="Record, .csv or .nc, or a bag of ROS.")]
+
+
+class _ReadsRig(Reads):
+    """Mark of the file of a rig, which may name another one, that of the rod's shape."""
+
+    def files(self, path: Path) -> Iterator[Path]:
+        """Yield both, if they are there."""
+        yield path
+        from tactile_bayes.errors import TactileBayesError
+        from tactile_bayes.tasks.documents import read_toml
+
+        with suppress(OSError, ValueError, TactileBayesError):  # whoever reads the file reports it
+            shape = read_toml(path.read_text(encoding="utf-8-sig")).get("rod", {})
+            if isinstance(shape, dict) and isinstance(shape.get("shape"), str):
+                yield path.parent / shape["shape"]
+
+
+@dataclass(frozen=True)
+class RigFile:
+    """The file of a rig."""
+
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help="rig.toml, the rig: rod, load cell, names and units in its files, and what is unknown of it; "
+            "calibrate-rig and inspect write one. By default as the record states, with the doubts of a real rig.",
+            dir_okay=False,
+        ),
+        _ReadsRig(),
+    ] = None
+
+    @property
+    def of_file(self) -> Rig:
+        """The rig as the file states it; without a file, one that says nothing.
+
+        Raises
+        ------
+        ParameterError
+            If the file is none of a rig.
+        """
+        from tactile_bayes.rig import Rig
+
+        return Rig() if self.rig is None else Rig.read(self.rig)
+
+    @property
+    def stated(self) -> Rig:
+        """The rig as file and options state it, apart from its noise.
+
+        Raises
+        ------
+        ParameterError
+            If the file is none of a rig, or options contradict each other.
+        """
+        return self.of_file
+
+    def read(self, path: Path) -> tuple[xr.Dataset, Rig]:
+        """Read a record, and return it with its rig; report assumed units.
+
+        Raises
+        ------
+        ParameterError
+            If options contradict each other, or the record.
+        RecordError
+            If the file holds no record.
+        """
+        from tactile_bayes.record import read_record
+
+        rig = self.stated
+        record = read_record(path, rig)
+        report_units(record)
+        return record, self._for(record, rig.without_bare_cell)
+
+    def _for(self, record: xr.Dataset, rig: Rig) -> Rig:
+        """Return the rig of a record."""
+        return rig
+
+
+def report_units(record: xr.Dataset) -> None:
+    """Report assumed units on stderr."""
+    if record.attrs.get("units_source") == "assumed":
+        typer.echo(
+            "The record states no units: its numbers are taken as dimensionless, in units of the rod (L, EI/L, "
+            "EI/L²). If they are SI, give --length and --flexural-rigidity, or a [rod] in rig.toml.",
+            err=True,
+        )
 
 
 @dataclass(frozen=True)
 class NoiseOptions:
-    """Noise of a simulated load cell."""
+    """Noise of a load cell."""
 
     force_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²]; by default 0.05 EI/L².")
+        float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²], in place of the stated one.")
     ] = None
     moment_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; by default 0.02 EI/L.")
+        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; likewise.")
     ] = None
 
-    @property
-    def load_cell(self) -> LoadCell | None:
-        """The load cell, or None if no option gives one.
+    def in_place_of(self, cell: LoadCell | None) -> LoadCell | None:
+        """Return a load cell with the noise that is given.
 
         Raises
         ------
         ParameterError
-            If one of the two options is missing.
+            If it is negative.
         """
-        from tactile_bayes.errors import ParameterError
         from tactile_bayes.load_cell import LoadCell
 
-        if self.force_noise is None and self.moment_noise is None:
-            return None
-        if not self.force_noise or not self.moment_noise:
-            raise ParameterError("--force-noise and --moment-noise go together, above zero: give both, or neither")
-        return LoadCell(force_noise=self.force_noise, moment_noise=self.moment_noise)
+        names = ("force_noise", "moment_noise")
+        noise = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return replace(cell or LoadCell(), **noise) if noise else cell
 
 
 @dataclass(frozen=True)
-class RodOptions:
-    """A simulated rod."""
+class RigOptions(NoiseOptions, RigFile):
+    """The file of a rig, and numbers that replace those in it."""
 
     length: Annotated[
-        float | None,
-        typer.Option(help="Rod length [m], if no file states it; by default all is in units of the rod."),
+        float | None, typer.Option(help="Rod length [m], if no file states it, or in place of that in rig.toml.")
     ] = None
-    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], with --length.")] = None
-    diameter: Annotated[float, typer.Option(help="Rod diameter [m], at the base.")] = 0.0
-    rest_curvature: Annotated[
-        float,
-        typer.Option(help="Curvature of the unloaded rod, an arc [1/m, or 1/L]; > 0 counter-clockwise from the base."),
-    ] = 0.0
-    taper: Annotated[
-        float, typer.Option(help="Part by which the diameter of a tapered rod has fallen at its tip, 0 to 0.95.")
-    ] = 0.0
-    stem: Annotated[
-        float,
-        typer.Option(help="Rigid, straight piece between pivot and rod [m, or L], as of a clamp on a hinge.", min=0.0),
-    ] = 0.0
-    rod_shape: Annotated[
-        Path | None,
-        typer.Option(
-            help="CSV file with columns x and y [m], points traced along the unloaded rod from its base: its rest "
-            "curvature, in place of --rest-curvature, and its length unless --length gives a larger one, beyond them."
-        ),
-    ] = None
+    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²]; likewise.")] = None
+    diameter: Annotated[float | None, typer.Option(help="Rod diameter [m], at the base; likewise.")] = None
 
     @property
-    def rod(self) -> Rod | None:
-        """The rod, or None if no option gives one.
+    def stated(self) -> Rig:
+        """The rig as file and options state it, apart from its noise."""
+        rig = self.of_file
+        return replace(rig, rod=self._rod(rig.rod))
+
+    def _for(self, record: xr.Dataset, rig: Rig) -> Rig:
+        """Return the rig of a record, with the noise that is given.
 
         Raises
         ------
         ParameterError
-            If options of the rod are missing, or contradict each other.
+            If the noise of a measured channel is left out.
+        """
+        from tactile_bayes.errors import ParameterError
+        from tactile_bayes.load_cell import LoadCell
+        from tactile_bayes.record import present_channels
+
+        if self.force_noise is None and self.moment_noise is None:
+            return rig
+        cell = self.in_place_of(rig.load_cell or LoadCell.from_record(record))
+        assert cell is not None
+        bare = [name for name in present_channels(record) if not cell.standard_deviations[name]]
+        if bare:
+            option = "--moment-noise" if "holding_moment" in bare else "--force-noise"
+            raise ParameterError(
+                f"{bare[0]} is measured too: give {option} as well, above zero, or leave both out to have them inferred"
+            )
+        return replace(rig, load_cell=cell)
+
+    def _rod(self, rod: Rod | None) -> Rod | None:
+        """Return the rod of the file with the numbers that are given.
+
+        Raises
+        ------
+        ParameterError
+            If one of them is missing, as no file states it.
         """
         from tactile_bayes.errors import ParameterError
         from tactile_bayes.mechanics.rods.rod import Rod
 
-        if self.rod_shape is not None:
-            if self.rest_curvature:
-                raise ParameterError("--rod-shape gives the rest curvature: leave out --rest-curvature")
-            x, y = columns_in(self.rod_shape, ("x", "y"))
-            return Rod.from_shape(
-                x,
-                y,
-                self.flexural_rigidity,
-                length=self.length,
-                diameter=self.diameter,
-                taper=self.taper,
-                stem=self.stem,
-            )
-        if (self.length is None) != (self.flexural_rigidity is None):
-            raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
-        if self.diameter and self.length is None:
-            raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
-        if self.length is None or self.flexural_rigidity is None:
-            return Rod(**self.shape) if self.shape else None
-        return Rod(self.length, self.flexural_rigidity, self.diameter, **self.shape)
-
-    @property
-    def shape(self) -> dict[str, Any]:
-        """Given properties by which the rod differs from a straight, uniform one."""
-        given = {"rest_curvature": self.rest_curvature, "taper": self.taper, "stem": self.stem}
-        return {name: value for name, value in given.items() if value}
-
-
-@dataclass(frozen=True)
-class RigOptions(RodOptions):
-    """A simulated rod and its pivots."""
-
-    base: Annotated[list[str] | None, typer.Option(help="A pivot, X,Y; may be repeated. By default one at 0,0.")] = None
-
-    @property
-    def pivots(self) -> list[tuple[float, ...]]:
-        """Coordinates of the pivots."""
-        return [numbers_asked(pivot, "--base", 2) for pivot in self.base or ["0,0"]]
-
-
-KnownRig = Annotated[
-    Path | None,
-    typer.Option(
-        help="rig.nc of calibrate-rig: its posterior is the prior of stiffness, encoder, lever, gains and shape of the "
-        "rod, in place of the default priors; with --as-stated nothing else of the rig is inferred.",
-        dir_okay=False,
-    ),
-]
-"""File of a rig that a gauge has calibrated."""
-
-
-def rig_in(path: Path | None) -> xr.DataTree | None:
-    """Return the posterior of a rig from its file; None without a file.
-
-    Raises
-    ------
-    InferenceError
-        If there is no such file, or it holds no posterior or is damaged.
-    """
-    from tactile_bayes.inference.result import read_result
-
-    return None if path is None else read_result(path)
-
-
-@dataclass(frozen=True)
-class UnknownOptions:
-    """Unknowns of a rig that are inferred beside a contour."""
-
-    friction: Annotated[
-        float | None,
-        typer.Option(help="Coulomb's coefficient, if known; else it is inferred.", min=0.0, max=0.84),
-    ] = None
-    nuisance: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Unknown of the rig to be inferred, in place of rigidity_scale, drive_angle_offset, bias, lever, "
-            "backlash and friction: one of these, standard (all of these), or drift, gain, moment_curve, "
-            "suspension_compliance, rest_curvature, taper, stem, length, base (positions of further pivots), or gauge "
-            "(place of the gauge, for calibrate-rig); may be repeated."
-        ),
-    ] = None
-    as_stated: Annotated[
-        bool, typer.Option("--as-stated", help="Assume the rig as stated: fewer parameters, narrower bands.")
-    ] = False
-
-    discrepancy: Annotated[
-        bool,
-        typer.Option(
-            "--discrepancy",
-            help="Infer a smooth deviation of the readings from the model as well, for hysteresis, stick-slip and the "
-            "like: wider bands.",
-        ),
-    ] = False
-
-    @property
-    def nuisances(self) -> list[str]:
-        """Names of the nuisance parameters that are inferred.
-
-        Raises
-        ------
-        ParameterError
-            If the options contradict each other.
-        """
-        from tactile_bayes.errors import ParameterError
-        from tactile_bayes.inference.parameters.discrepancy import DISCREPANCY
-        from tactile_bayes.inference.parameters.nuisances import STANDARD
-
-        if self.as_stated and self.nuisance:
-            raise ParameterError("--as-stated and --nuisance contradict each other: leave one of them out")
-        smooth = [DISCREPANCY] if self.discrepancy else []
-        return smooth if self.as_stated else [*(self.nuisance or STANDARD), *smooth]
+        given: dict[str, Any] = {
+            name: value
+            for name in ("length", "flexural_rigidity", "diameter")
+            if (value := getattr(self, name)) is not None
+        }
+        if not given:
+            return rod
+        if rod is None or rod.is_dimensionless:
+            if (self.length is None) != (self.flexural_rigidity is None):
+                raise ParameterError(
+                    "--length and --flexural-rigidity go together where no rig.toml states the rod: give both, or "
+                    "neither"
+                )
+            if self.length is None:
+                raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
+        return replace(rod or Rod(), **given)

@@ -11,8 +11,8 @@ import typer
 from tactile_bayes.cli.answer import Answer, table_of
 from tactile_bayes.cli.command import Output, Writes
 from tactile_bayes.cli.contour_options import ContourOptions
-from tactile_bayes.cli.drive_options import DriveOptions
-from tactile_bayes.cli.rig_options import Friction, RigOptions
+from tactile_bayes.cli.drive_options import DriveOptions, Pivots, pivots_in
+from tactile_bayes.cli.rig_options import RigFile
 from tactile_bayes.cli.task_bar import step_bar
 
 if TYPE_CHECKING:
@@ -36,12 +36,12 @@ def scan(
     *,
     out: RecordFile,
     choice: ContourOptions,
-    rig: RigOptions,
+    rig: RigFile,
+    base: Pivots = None,
     drive: DriveOptions,
     direction: Annotated[
         Literal["both", "forward", "backward"], typer.Option(help="Sense of the rotations about each pivot.")
     ] = "both",
-    friction: Friction = 0.0,
     figure: Annotated[
         Path | None,
         typer.Option(
@@ -53,25 +53,24 @@ def scan(
 ) -> Answer:
     """Sweep an ideal rod along a contour (Step 1), and write the record of its base, without noise, and its events.
 
-    The drive turns the rod about each --base, or carries its base (--carry, --poses); with both, the record holds both.
+    The drive turns the rod about each --base, or carries its base (--carry); with both, the record holds both.
     """
     refuse_other_suffix(out)
     if figure is not None:
         refuse_other_suffix(figure, (".png", ".pdf", ".svg"), "a figure")
     with step_bar(output.is_silent) as show:
-        from tactile_bayes.mechanics.rods.rod import Rod
         from tactile_bayes.record import write_record
         from tactile_bayes.sweep import scan as sweep
 
-        rod = rig.rod or Rod()
-        drives = drive.drives(rig.pivots if rig.base or not drive.carries else [])
+        stated = rig.stated
+        rod = stated.known_rod
+        drives = drive.drives([] if drive.carry and not base else pivots_in(base))
         made = sweep(
             choice.contour(rod.length),
+            stated,
             drive=drives,
             direction=direction,
             drive_step=drive.step(drives),
-            rod=rod,
-            friction=friction,
         )
         show(1, 3 if figure else 2)
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -3,75 +3,47 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
-from tactile_bayes.cli.rig_options import NoiseOptions, RigOptions, UnknownOptions
+from tactile_bayes.cli.drive_options import Pivots, pivots_in
+from tactile_bayes.cli.rig_options import RigFile
 from tactile_bayes.cli.task_bar import counted, resumable_bar, task_bar
 from tactile_bayes.cli.worker_options import WorkerOptions
 from tactile_bayes.runs.names import SENSITIVITY
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.load_cell import LoadCell
-    from tactile_bayes.mechanics.rods.rod import Rod
+    from tactile_bayes.rig import Rig
     from tactile_bayes.runs.sensitivity import Material, SensitivityRun
 
 __all__ = ["sensitivity"]
-
-Profile = Literal["I", "II", "III", "IV"]
-
-
-@dataclass(frozen=True)
-class StudyOptions:
-    """A study with simulated records."""
-
-    study: Annotated[
-        bool,
-        typer.Option(
-            "--study", help="Simulate records as well, over profile, distance and noise, from one pivot below each."
-        ),
-    ] = False
-    study_profile: Annotated[
-        list[str] | None,
-        typer.Option(help="A profile of the study; may be repeated. By default that of --profile."),
-    ] = None
-    study_distance: Annotated[
-        list[float] | None,
-        typer.Option(help="Height of the vertex above the pivot [rod lengths]; may be repeated; default --distance."),
-    ] = None
-    noise_factor: Annotated[
-        list[float] | None,
-        typer.Option(help="Factor on the load cell's noise; may be repeated. By default 0.1, 0.3, 1 and 3."),
-    ] = None
-    replicates: Annotated[int | None, typer.Option(help="Records in each cell of the study; by default 20.", min=1)] = (
-        None
-    )
-    posterior_cells: Annotated[
-        int | None, typer.Option(help="Cells in which posteriors are inferred too; by default none.", min=0)
-    ] = None
 
 
 def sensitivity(
     *,
     out: Annotated[Out, Writes((*SENSITIVITY, "study/*"))],
     profile: Annotated[
-        Profile, typer.Option(help="Profile of Merker et al. 2018; with --length scaled to the rod.")
-    ] = "II",
-    distance: Annotated[float, typer.Option(help="Height of its vertex above the x axis [rod lengths].")] = 0.5,
-    noise: NoiseOptions,
-    drive_angle_noise: Annotated[
-        float, typer.Option(help="Standard deviation of the drive angle [degrees].", min=0.0)
-    ] = 0.0,
-    rig: RigOptions,
+        list[str] | None,
+        typer.Option(
+            help="Profile of Merker et al. 2018, I, II, III or IV, by default II, scaled to the rod; further ones are "
+            "for the study."
+        ),
+    ] = None,
+    distance: Annotated[
+        list[float] | None,
+        typer.Option(help="Height of its vertex above the x axis [rod lengths], by default 0.5; likewise."),
+    ] = None,
+    rig: RigFile,
+    base: Pivots = None,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 1.0,
-    unknown: UnknownOptions,
     band_width: Annotated[
         list[float] | None,
         typer.Option(
@@ -79,17 +51,26 @@ def sensitivity(
             "By default 0.0005 to 0.01 rod lengths."
         ),
     ] = None,
-    youngs_modulus: Annotated[
-        float | None,
+    best_rod: Annotated[
+        bool,
         typer.Option(
-            help="Young's modulus of the rod [Pa], with --elastic-strain: find the rod that suits the load cell."
+            "--best-rod",
+            help="Find the rod of the same material that suits the load cell: rig.toml states diameter, "
+            "elastic_strain (0.005 spring steel, 0.05 nitinol) and noise.",
         ),
+    ] = False,
+    replicates: Annotated[
+        int,
+        typer.Option(
+            help="Simulate records as well, so many for each profile, distance and noise, from one pivot below each; 0 "
+            "leaves this study out.",
+            min=0,
+        ),
+    ] = 0,
+    noise_factor: Annotated[
+        list[float] | None,
+        typer.Option(help="Factor on the load cell's noise in the study; may be repeated. By default 0.1, 0.3, 1, 3."),
     ] = None,
-    elastic_strain: Annotated[
-        float | None, typer.Option(help="Largest elastic bending strain: 0.005 spring steel, 0.05 nitinol.")
-    ] = None,
-    samples: Annotated[int, typer.Option(help="Samples for shares of the variance, a power of two.", min=2)] = 1024,
-    studying: StudyOptions,
     work: WorkerOptions,
     seed: Seed = 1,
     output: Output,
@@ -103,41 +84,34 @@ def sensitivity(
     from tactile_bayes.planning.family_parameters import enlarged
     from tactile_bayes.runs.sensitivity import sensitivity_into, steps_of
 
-    if not studying.study:
-        _refuse_without_study(studying, work)
-    rod, pivots = rig.rod, rig.pivots
-    for name in studying.study_profile or []:
+    profiles, distances = profile or ["II"], distance or [0.5]
+    if not replicates:
+        _refuse_without_study(profiles, distances, noise_factor, work)
+    stated, pivots = rig.stated, pivots_in(base)
+    for name in profiles:
         paper_profile(name, q=0.5)  # type: ignore[arg-type]  # refuses any other
-    common: dict[str, Any] = {
-        "load_cell": _load_cell(rod, noise.load_cell, drive_angle_noise),
-        "rod": rod,
-        "drive_step": math.radians(drive_step),
-        "friction": unknown.friction,
-        "nuisances": unknown.nuisances,
-        "seed": seed,
-    }
-    material = _material(youngs_modulus, elastic_strain)
+    common: dict[str, Any] = {"rig": stated, "drive_step": math.radians(drive_step), "seed": seed}
+    material = _material(stated) if best_rod else None
+    first: Any = profiles[0]
     analysis = {
         **common,
         "material": material,
-        "contour": enlarged(paper_profile(profile, q=distance), (rod or Rod()).length),
+        "contour": enlarged(paper_profile(first, q=distances[0]), (stated.rod or Rod()).length),
         "base": pivots,
         "band_widths": band_width or None,
-        "samples": samples,
     }
-    if not studying.study:
+    if not replicates:
         with task_bar(steps_of(material), "step", output.is_silent) as show:
             run = sensitivity_into(out, progress=show, **analysis)
         return _answer(run)
     study = {
         **common,
-        "contours": studying.study_profile or [profile],
-        "distances": studying.study_distance or [distance],
-        "noise_factors": studying.noise_factor or [0.1, 0.3, 1.0, 3.0],
+        "contours": profiles,
+        "distances": distances,
+        "noise_factors": noise_factor or [0.1, 0.3, 1.0, 3.0],
         "base_x": pivots[0][0],
-        "replicates": 20 if studying.replicates is None else studying.replicates,
-        "posterior_cells": studying.posterior_cells or 0,
-        **vars(work),
+        "replicates": replicates,
+        **work.arguments,
     }
     count = math.prod(len(study[name]) for name in ("contours", "distances", "noise_factors"))
 
@@ -152,33 +126,36 @@ def sensitivity(
     return _answer(run)
 
 
-def _refuse_without_study(studying: StudyOptions, work: WorkerOptions) -> None:
+def _refuse_without_study(
+    profiles: Sequence[str], distances: Sequence[float], factors: Sequence[float] | None, work: WorkerOptions
+) -> None:
     from tactile_bayes.errors import ParameterError
 
-    for name, value in {**vars(studying), **vars(work)}.items():
-        if name != "study" and value is not None and value != []:
-            option = f"--{name.replace('_', '-')}"
-            raise ParameterError(f"{option} is for a study: give --study as well, or leave it out")
+    given = {
+        "more than one --profile": len(profiles) > 1,
+        "more than one --distance": len(distances) > 1,
+        "--noise-factor": bool(factors),
+        "--workers": work.workers is not None,
+    }
+    for option, is_given in given.items():
+        if is_given:
+            raise ParameterError(f"{option} is for a study: give --replicates as well, like --replicates 20")
 
 
-def _material(youngs_modulus: float | None, elastic_strain: float | None) -> Material | None:
+def _material(rig: Rig) -> Material:
+    """Return the material of a rig's rod, of Young's modulus EI / (π d⁴ / 64)."""
     from tactile_bayes.errors import ParameterError
     from tactile_bayes.runs.sensitivity import Material
 
-    if youngs_modulus is None and elastic_strain is None:
-        return None
-    if not youngs_modulus or not elastic_strain or min(youngs_modulus, elastic_strain) < 0.0:
-        raise ParameterError("--youngs-modulus and --elastic-strain go together, above zero: give both, or neither")
-    return Material(youngs_modulus, elastic_strain)
-
-
-def _load_cell(rod: Rod | None, cell: LoadCell | None, drive_angle_noise: float) -> LoadCell | None:
-    from tactile_bayes.inference.experiment import usual_load_cell
-    from tactile_bayes.mechanics.rods.rod import Rod
-
-    if not drive_angle_noise:
-        return cell
-    return replace(cell or usual_load_cell(rod or Rod()), drive_angle_noise=math.radians(drive_angle_noise))
+    rod = rig.rod
+    if rod is None or rod.is_dimensionless or not rod.diameter or rod.elastic_strain is None:
+        raise ParameterError(
+            "--best-rod is for a rod of a known material: state length, flexural_rigidity, diameter and elastic_strain "
+            "under [rod] of rig.toml"
+        )
+    if rig.load_cell is None or not rig.load_cell.has_variances:
+        raise ParameterError("--best-rod is for a known load cell: state its noise under [load_cell] of rig.toml")
+    return Material(rod.flexural_rigidity / (math.pi * rod.diameter**4 / 64.0), rod.elastic_strain)
 
 
 def _answer(run: SensitivityRun) -> Answer:

@@ -71,7 +71,7 @@ def trust(
             probability=probability,
             seed=seed,
             progress=note,
-            **vars(work),
+            **work.arguments,
         )
     found = made.result
     words = [found.attrs["summary"], *found.attrs["words"].splitlines()]

@@ -15,8 +15,7 @@ from tactile_bayes.cli.answer import Answer, columns_of, print_object
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.interrupts import acknowledge_interrupt
 from tactile_bayes.cli.numbers import numbers_asked
-from tactile_bayes.cli.record_options import RecordOptions
-from tactile_bayes.cli.rig_options import KnownRig, UnknownOptions, rig_in
+from tactile_bayes.cli.rig_options import RigFile, report_units
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
 
 if TYPE_CHECKING:
@@ -55,9 +54,7 @@ def watch(
             "and the band is averaged over them."
         ),
     ] = None,
-    reading: RecordOptions,
-    unknown: UnknownOptions,
-    rig: KnownRig = None,
+    rig: RigFile,
     probability: Annotated[float, typer.Option(help="Probability of band and intervals.", min=0.0, max=1.0)] = 0.95,
     particles: Annotated[
         int, typer.Option(help="Number of particles: four times as many are twice as exact, and take as long.", min=100)
@@ -101,7 +98,8 @@ def watch(
 
     if until_width is not None and between is None:
         raise ParameterError("--until-width is for a stretch of the contour: give its ends, like --between -0.02,0.02")
-    growing = GrowingRecord(record, **reading.arguments)
+    stated = rig.stated
+    growing = GrowingRecord(record, stated)
     with open_watch(
         out,
         probability=probability,
@@ -112,13 +110,11 @@ def watch(
         families=family or ["parabola"],
         record_file=record,
         command=ctx.meta["words"],
-        friction=unknown.friction,
-        nuisances=unknown.nuisances,
         seed=seed,
         particles=particles,
-        rig=rig_in(rig),
+        rig=stated.without_bare_cell,
     ) as watched:
-        follower = _Follower(record, growing, watched, reading, output, poll, idle)
+        follower = _Follower(record, growing, watched, stated.file.split_sweeps, output, poll, idle)
         try:
             with acknowledge_interrupt(_STOPPING):
                 reason = follower.follow()
@@ -134,11 +130,10 @@ class _Follower:
     path: Path
     growing: GrowingRecord
     watched: Watch
-    reading: RecordOptions
+    splits_sweeps: bool
     output: Output
     poll: float
     idle: float | None
-    load_cell: Any = None
     last: WatchUpdate | None = None
     refusal: Exception | None = None
     messages: list[str] = field(default_factory=list)
@@ -176,18 +171,17 @@ class _Follower:
             self.tell(message)
         if growth.is_other:
             self.watched.forget()
-        if growth.error is not None and not (self.has_begun or growth.error.lines or self.reading.split_sweeps):
+        if growth.error is not None and not (self.has_begun or growth.error.lines or self.splits_sweeps):
             raise growth.error
         if growth.record is None:
             self._refuse(growth.error)
             return
-        record, self.load_cell = self.reading.completed(growth.record)
         if not self.has_begun:
-            self.reading.report_units(record)
-            self._show(self.watched.resume(record, self.load_cell, growth.sha256), growth)
+            report_units(growth.record)
+            self._show(self.watched.resume(growth.record, growth.sha256), growth)
             self.has_begun = True
         try:
-            update = self.watched.take(record, self.load_cell, growth.sha256)
+            update = self.watched.take(growth.record, growth.sha256)
         except TactileBayesError as error:
             if self.last is None and isinstance(error, ParameterError):  # of an option, which no sample will change
                 raise
@@ -229,7 +223,7 @@ class _Follower:
             self.tell(
                 f"samples are not what the shape, the rig and the noise predict (e-value {update.e_value:.2g}; that of "
                 f"a right model exceeds {_SURPRISING:,.0f} in one record of a thousand at most): do not rely on the "
-                "band, and try another --family, or infer more of the rig (--nuisance)"
+                "band, and try another --family, or infer more of the rig ([unknown] of rig.toml)"
             )
         self.e_value = max(self.e_value, update.e_value)
         words = [
@@ -303,7 +297,7 @@ def _answer(ctx: typer.Context, follower: _Follower, reason: str) -> Answer:
         if "Ctrl-C" in reason:
             raise KeyboardInterrupt("interrupted before the first answer")
         raise InferenceError(f"{follower.path}: {reason}, and there is no sample in it")
-    run = follower.watched.finish(follower.load_cell)
+    run = follower.watched.finish()
     left_out = f", one of {last.every} that were measured" if last.every > 1 else ""
     said = f"Ended after {last.samples:,} samples{left_out}: {reason}"
     words = [*run.verdicts, *_families(last), f"{sentence(_band(last))}."]

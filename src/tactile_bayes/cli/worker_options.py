@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,18 +12,33 @@ __all__ = ["WorkerOptions"]
 
 @dataclass(frozen=True)
 class WorkerOptions:
-    """Local processes or a Dask scheduler; both together are refused."""
+    """Local processes, or a Dask scheduler."""
 
     workers: Annotated[
-        int | None, typer.Option(help="Number of local processes; by default one for each core.", min=1)
-    ] = None
-    scheduler: Annotated[
         str | None,
-        typer.Option(help="Address of a Dask scheduler in place of --workers, like tcp://10.0.0.1:8786."),
+        typer.Option(
+            help="Number of local processes, by default one for each core; or the address of a Dask scheduler, like "
+            "tcp://10.0.0.1:8786."
+        ),
     ] = None
 
-    def __post_init__(self) -> None:
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of the functions that share their tasks.
+
+        Raises
+        ------
+        ParameterError
+            If it is neither a number nor an address.
+        """
         from tactile_bayes.errors import ParameterError
 
-        if self.workers is not None and self.scheduler is not None:
-            raise ParameterError("--workers and --scheduler exclude each other: give one of them")
+        if self.workers is None:
+            return {}
+        if "://" in self.workers:
+            return {"scheduler": self.workers}
+        if not (self.workers.isascii() and self.workers.isdigit() and int(self.workers)):
+            raise ParameterError(
+                f"--workers is {self.workers!r}: give a number of processes, or the address of a scheduler"
+            )
+        return {"workers": int(self.workers)}

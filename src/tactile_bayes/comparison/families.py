@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_function, check_mapping, check_names, check_probability, check_switch
+from tactile_bayes.checks import check_function, check_probability, check_switch, refused
 from tactile_bayes.comparison.leave_one_out import difference, stacking_weights
 from tactile_bayes.comparison.left_out import PredictedSamples, predicted_samples
 from tactile_bayes.comparison.verdict import verdict_on
@@ -27,18 +27,16 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, settings_of, spawn
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.parameters.matched_priors import matched_priors
-from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior, check_priors
-from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig, rig_prior
+from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import record_hash, rod_of
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.uncertainty.rod_reach import reach_attributes
 
-__all__ = ["GIVEN_UP", "SHAPES", "checked_families", "compare_families"]
+__all__ = ["GIVEN_UP", "SHAPES", "checked_families", "compare_families", "matched", "with_known"]
 
 SHAPES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
 """Families that are compared by default; the last but one has flanks of two shapes."""
@@ -74,19 +72,14 @@ class _Tried(NamedTuple):
 
 def compare_families(
     measured: xr.Dataset,
+    families: Sequence[Family | str] = SHAPES,
+    rig: Rig | None = None,
     *,
-    families: Sequence[str] = SHAPES,
-    load_cell: LoadCell | None = None,
-    priors: Mapping[str, Mapping[str, Prior]] | None = None,
     seed: Seed,
-    rod: Rod | None = None,
-    friction: float | None = None,
-    nuisances: Sequence[str] = STANDARD,
     leave_one_out: bool = True,
     false_alarm: float = 1e-3,
     settings: SamplerSettings | None = None,
     progress: Callable[[str, Progress], object] | None = None,
-    rig: xr.DataTree | None = None,
 ) -> xr.Dataset:
     """Compare families of contours for a record, and return the probability of each.
 
@@ -100,12 +93,10 @@ def compare_families(
     ----------
     measured : xr.Dataset
         A record, as for `infer_contour`.
-    families : sequence of str
-        Two or more families of `infer_contour`.
-    load_cell, rod, friction, nuisances
-        As for `infer_contour`, the same for all families.
-    priors : mapping of str to mapping, optional
-        Priors by family and parameter that replace default priors (see Notes).
+    families : sequence of str or Family
+        Two or more families of `infer_contour`; the distributions of a `Family` replace default priors (see Notes).
+    rig : Rig, optional
+        As in `infer_contour`, the same for all families.
     seed : int or numpy.random.SeedSequence
         Seed of all random numbers; the same seed gives the same result.
     leave_one_out : bool
@@ -116,8 +107,6 @@ def compare_families(
         Settings of the sampler for every posterior.
     progress : callable, optional
         Called with a family and a `Progress` after each diagnosis.
-    rig : xr.DataTree, optional
-        Result of `infer_rig`, as for `infer_contour`, the same for all families.
 
     Returns
     -------
@@ -181,13 +170,13 @@ def compare_families(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, SamplerSettings, scan
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, scan
     >>> from tactile_bayes.contours import Circle
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(Circle(1.0, q=0.5), drive_step=0.04).record, seed=1)
     >>> quick = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.1)
-    >>> options = {"load_cell": cell, "nuisances": [], "leave_one_out": False, "settings": quick}
-    >>> found = compare_families(measured, families=["circle", "ellipse", "parabola"], seed=1, **options)
+    >>> options = {"rig": Rig(load_cell=cell, unknown="nothing"), "leave_one_out": False, "settings": quick}
+    >>> found = compare_families(measured, ["circle", "ellipse", "parabola"], seed=1, **options)
     >>> found.attrs["most_probable"], found.fits.values.tolist()
     ('circle', [True, True, False])
     """
@@ -195,18 +184,17 @@ def compare_families(
     check_switch("leave_one_out", leave_one_out)
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
     check_function("progress", progress)
-    names = checked_families(families, priors)
-    joint = None if rig is None else rig_prior(rig)
-    experiment = Experiment(measured, SHAPE_FREE.name, load_cell, {}, rod, friction, nuisances, joint=joint)
-    if rig is not None:
-        refuse_other_rig(rig.attrs, experiment.about)
+    compared = {family.name: family for family in checked_families(families)}
+    names = list(compared)
+    experiment = Experiment(measured, rig_of(rig), SHAPE_FREE.name, settings.events)
+    if experiment.rig.calibration is not None:
+        refuse_other_rig(experiment.rig.calibration, experiment.about)
     length = rod_of(experiment.record).length
     seeds = dict(zip(names, spawn(seed, len(names)), strict=True))
     tried: dict[str, _Tried] = {}
-    problems = {}
-    for name in names:
-        own = {**matched_priors(name, length), **(priors or {}).get(name, {})}
-        problems[name] = contour_problem(replace(experiment, family=name, priors=own))
+    problems = {
+        name: contour_problem(replace(experiment, family=matched(family, length))) for name, family in compared.items()
+    }
     # The shape-free family fits any record and comes first, so that families far from fitting need not be sampled.
     for name, problem in sorted(problems.items(), key=lambda item: item[0] != SHAPE_FREE.name):
         best = max((one.evidence.log_evidence[_USUAL] for one in tried.values() if one.evidence), default=-np.inf)
@@ -230,6 +218,8 @@ def compare_families(
         tried[name] = _Tried(ceiling, found.draws, evidence, predicted, p_value, passed)
     asked = {name: problem.about[name] for name in ("nuisances", "friction")}
     comparison = _labelled({name: tried[name] for name in names}, asked)
+    drawn = [(family, tried[name].draws) for name, family in compared.items()]
+    comparison["contour_draws"] = (_BY_DRAW, _contour_draws(drawn))
     record = experiment.record
     about = {"data_sha256": record_hash(record), "units": record.attrs["units"], **reach_attributes(record)}
     return comparison.assign_attrs(about)
@@ -241,25 +231,36 @@ def _ceiling(model: ContourModel, walk: Walk) -> float:
     return float(np.max(model.log_probability(points) - model.log_prior(points)))
 
 
-def checked_families(families: Sequence[str], priors: Mapping[str, Mapping[str, Prior]] | None) -> list[str]:
-    """Return the names of families that are to be compared, with their own priors.
+def checked_families(families: Sequence[Family | str]) -> list[Family]:
+    """Return the families that are to be compared.
 
     Raises
     ------
     ParameterError
-        If they are fewer than two different ones, unknown, or not those of the priors.
+        If they are fewer than two different ones, or unknown.
     """
-    if isinstance(families, str):
+    if isinstance(families, str | Family):
         raise ParameterError(f"families is {families!r}: give several, like ['parabola', {families!r}]")
-    names = [family_named(name).name for name in check_names("families", families)]
+    listed: Any = families.tolist() if isinstance(families, np.ndarray) else families
+    if not isinstance(listed, Sequence | Set):
+        raise refused("families", families, "give several, like ['parabola', 'circle']")
+    found = [family_of(family) for family in listed]
+    names = [family.name for family in found]
     if len(set(names)) < 2 or len(set(names)) < len(names):
         raise ParameterError(f"families are {', '.join(names) or 'none'}: give two or more different ones")
-    check_mapping("priors", priors, "give those of each family by its name, {'circle': {'r': ...}}")
-    for name, of_family in (priors or {}).items():
-        if name not in names:
-            raise ParameterError(f"there are priors for {name!r}, which is not among the families {', '.join(names)}")
-        check_priors(f"priors[{name!r}]", of_family)
-    return names
+    return found
+
+
+def matched(family: Family, length: float) -> Family:
+    """Return a family with matched priors of its sizes, for a rod of a length, where nothing is said of them."""
+    return Family(family.name, **{**matched_priors(family.name, length), **family.priors, **family.known})
+
+
+def with_known(family: Family, points: Floats) -> Floats:
+    """Return all parameters of contours, shape (n, parameters), from points that begin with the unknown ones."""
+    values: dict[str, Any] = {**family.known, **dict(zip(family.contours.parameters, points.T, strict=False))}
+    every = [values[name] for name in family_named(family.name).parameters]
+    return np.stack(np.broadcast_arrays(*every), axis=1)
 
 
 def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Dataset:
@@ -287,7 +288,6 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
         "steps": ("family", [0 if run is None else run.steps_run for run in runs]),
         "seconds": ("family", [0.0 if run is None else run.seconds for run in runs]),
     }
-    variables["contour_draws"] = (_BY_DRAW, _contour_draws({name: one.draws for name, one in tried.items()}))
     predicted = [one.predicted for one in tried.values()]
     if any(of_family is not None for of_family in predicted):
         variables |= _left_out(predicted)
@@ -300,16 +300,16 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
     return result
 
 
-def _contour_draws(drawn: Mapping[str, Draws | None]) -> Floats:
+def _contour_draws(drawn: Sequence[tuple[Family, Draws | None]]) -> Floats:
     """Return draws of the contours' parameters, evenly picked, shape (families, draws, parameters)."""
-    sizes = [len(family_named(name).parameters) for name in drawn]
-    kept = [draws.samples.reshape(-1, len(draws.names)) for draws in drawn.values() if draws is not None]
+    sizes = [len(family_named(family.name).parameters) for family, _ in drawn]
+    kept = [draws.samples.reshape(-1, len(draws.names)) for _, draws in drawn if draws is not None]
     count = min([_KEPT_DRAWS, *(len(samples) for samples in kept)])
     found = np.full((len(sizes), count, max(sizes)), np.nan)
-    for of_family, size, draws in zip(found, sizes, drawn.values(), strict=True):
+    for of_family, size, (family, draws) in zip(found, sizes, drawn, strict=True):
         if draws is not None:
             every = draws.samples.reshape(-1, len(draws.names))
-            of_family[:, :size] = every[evenly_spread(len(every), count), :size]
+            of_family[:, :size] = with_known(family, every[evenly_spread(len(every), count)])
     return found
 
 

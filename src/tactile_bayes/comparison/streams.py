@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from time import perf_counter
 from typing import Any, Self, cast
@@ -15,15 +15,16 @@ from numpy.typing import ArrayLike
 from scipy.special import softmax
 
 from tactile_bayes.checks import check_function, check_numbers, check_path
-from tactile_bayes.comparison.families import GIVEN_UP, checked_families
+from tactile_bayes.comparison.families import GIVEN_UP, checked_families, matched, with_known
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
-from tactile_bayes.inference.parameters.matched_priors import matched_priors
-from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.inference.ensembles import Seed
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.streams.stream import LEVELS, Stream
 from tactile_bayes.inference.streams.stream_state import read_tree
 from tactile_bayes.record import rod_of, validate
 from tactile_bayes.record.netcdf import write_netcdf
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.uncertainty.averaged_contours import averaged_heights
 
@@ -46,17 +47,14 @@ class StreamComparison:
 
     Parameters
     ----------
-    families : sequence of str
-        Two or more families of `infer_contour`.
-    priors : mapping of str to mapping, optional
-        Priors by family and parameter that replace default priors, as in `compare_families`.
+    families : sequence of str or Family
+        Two or more families, as in `compare_families`.
+    rig, seed, particles
+        As in `Stream`, the same for all families.
     x : array_like, optional
         Positions at which every update states quantiles of the contour's height, averaged over families [length].
     stop : callable, optional
         Rule for the end of measuring, as in `Stream`.
-    **options
-        Other arguments of `Stream`, the same for all families: `seed`, `load_cell`, `rod`, `friction`, `nuisances`,
-        `particles`, `rig`.
 
     Raises
     ------
@@ -71,12 +69,12 @@ class StreamComparison:
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, scan
+    >>> from tactile_bayes import LoadCell, Rig, scan
     >>> from tactile_bayes.contours import Circle
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(Circle(0.3, q=0.5), drive_step=0.05).record, seed=1)
-    >>> options = {"load_cell": cell, "nuisances": [], "seed": 1, "particles": 200}
-    >>> streams = StreamComparison(families=["circle", "parabola"], **options)
+    >>> rig = Rig(load_cell=cell, unknown="nothing")
+    >>> streams = StreamComparison(["circle", "parabola"], rig=rig, seed=1, particles=200)
     >>> now = streams.update(measured)
     >>> now.attrs["most_probable"]
     'circle'
@@ -84,21 +82,21 @@ class StreamComparison:
 
     def __init__(
         self,
+        families: Sequence[Family | str],
         *,
-        families: Sequence[str],
-        priors: Mapping[str, Mapping[str, Prior]] | None = None,
+        rig: Rig | None = None,
+        seed: Seed,
+        particles: int = 1000,
         x: ArrayLike | None = None,
         stop: Callable[[xr.Dataset], object] | None = None,
-        **options: Any,
     ) -> None:
         check_function("stop", stop)
-        self._families = checked_families(families, priors)
-        self._priors, self._options, self._stop = priors or {}, options, stop
+        self._compared = {family.name: family for family in checked_families(families)}
+        self._families = list(self._compared)
+        self._rig, self._seed, self._particles, self._stop = rig_of(rig), seed, particles, stop
         self._x = None if x is None else check_numbers("x", x, "give a list of finite numbers", shape=(None,))
-        if "family" in options:
-            raise ParameterError("there is no argument 'family': give families, like families=['circle', 'parabola']")
-        for name in self._families:
-            Stream(family=name, **options)  # refuses what it can before the first sample
+        for family in self._compared.values():
+            self._stream(family)  # refuses what it can before the first sample
         self._streams: dict[str, Stream] = {}
         self._lost: dict[str, str] = {}
 
@@ -181,7 +179,8 @@ class StreamComparison:
         draws = np.full((len(sizes), _KEPT_DRAWS, max(sizes)), np.nan)
         for of_family, name, size in zip(draws, self._families, sizes, strict=True):
             if name in every:
-                of_family[:, :size] = self._streams[name].contour_draws(_KEPT_DRAWS)
+                drawn = self._streams[name].contour_draws(_KEPT_DRAWS)
+                of_family[:, :size] = with_known(self._compared[name], drawn)
 
         def of_each(what: str, otherwise: float = np.nan) -> tuple[str, list[float]]:
             return "family", [float(every[name][what]) if name in every else otherwise for name in self._families]
@@ -295,15 +294,11 @@ class StreamComparison:
 
     def _first(self, samples: xr.Dataset) -> dict[str, Stream]:
         """Return streams without samples."""
-        length = rod_of(validate(samples)).length if self._options.get("rod") is None else self._options["rod"].length
-        return {
-            name: Stream(
-                family=name,
-                priors={**matched_priors(name, length), **self._priors.get(name, {})},
-                **self._options,
-            )
-            for name in self._families
-        }
+        length = (self._rig.rod or rod_of(validate(samples))).length
+        return {name: self._stream(matched(family, length)) for name, family in self._compared.items()}
+
+    def _stream(self, family: Family) -> Stream:
+        return Stream(family=family, rig=self._rig, seed=self._seed, particles=self._particles)
 
     def _left(self) -> list[str]:
         """Return the families that are not lost."""

@@ -14,7 +14,7 @@ from tactile_bayes.checks import shown
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.family import (
     VERTEX,
-    Family,
+    ContourFamily,
     FamilyParameter,
     log_normal,
     parabola_through,
@@ -64,7 +64,7 @@ class Flank:
 
 
 @dataclass(frozen=True)
-class FlankFamily(Family):
+class FlankFamily(ContourFamily):
     """Family of contours with one flank on both sides, or with two different flanks.
 
     Parameters
@@ -195,7 +195,7 @@ def _of_flanks(name: str) -> FlankFamily:
     return FlankFamily(name, {side: FLANKS[flank] for side, flank in sides_of(name).items()})
 
 
-FAMILIES: dict[str, Family] = {
+FAMILIES: dict[str, ContourFamily] = {
     **{name: _of_flanks(name) for name in FLANKS},
     SHAPE_FREE.name: SHAPE_FREE,
     **{f"{left}/{right}": _of_flanks(f"{left}/{right}") for left in FLANKS for right in FLANKS},
@@ -203,7 +203,7 @@ FAMILIES: dict[str, Family] = {
 """Families by name; "parabola/circle" is a parabola on the left of the vertex and a circle on the right."""
 
 
-def family_named(name: str) -> Family:
+def family_named(name: str) -> ContourFamily:
     """Return the family with a name.
 
     Raises

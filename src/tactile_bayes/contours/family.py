@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Contour
 
-__all__ = ["DefaultPrior", "Family", "FamilyParameter", "log_normal", "parabola_through", "robust_least_squares"]
+__all__ = ["ContourFamily", "DefaultPrior", "FamilyParameter", "log_normal", "parabola_through", "robust_least_squares"]
 
 _MOST_STEPS = 100
 
@@ -53,7 +53,7 @@ VERTEX = {"q": FamilyParameter("height of the vertex", 1), "x_c": FamilyParamete
 """The last two parameters of every family."""
 
 
-class Family(ABC):
+class ContourFamily(ABC):
     """Contours that a vector of parameters describes; the last two are those of the vertex, q and x_c."""
 
     name: str

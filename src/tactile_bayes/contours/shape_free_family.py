@@ -13,7 +13,14 @@ from scipy.special import ndtri
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Contour, refuse_unless
-from tactile_bayes.contours.family import VERTEX, DefaultPrior, Family, FamilyParameter, log_normal, parabola_through
+from tactile_bayes.contours.family import (
+    VERTEX,
+    ContourFamily,
+    DefaultPrior,
+    FamilyParameter,
+    log_normal,
+    parabola_through,
+)
 from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.contours.smooth import Smooth
 from tactile_bayes.numerics.scatter import robust_deviation
@@ -34,7 +41,7 @@ _POINTS = 500
 
 
 @dataclass(frozen=True)
-class ShapeFreeFamily(Family):
+class ShapeFreeFamily(ContourFamily):
     """Family of all smooth contours between vertical ends.
 
     Parameters

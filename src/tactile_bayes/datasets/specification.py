@@ -12,8 +12,8 @@ import numpy as np
 
 from tactile_bayes.arrays import Index
 from tactile_bayes.checks import check_switch
-from tactile_bayes.datasets.distributions import Distribution
 from tactile_bayes.datasets.specification_text import meaning
+from tactile_bayes.datasets.variations import Variation
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import Frame
 
@@ -29,7 +29,7 @@ class Group:
 
     family: str
     weight: float
-    distributions: Mapping[str, Distribution]
+    distributions: Mapping[str, Variation]
 
 
 @dataclass(frozen=True)
@@ -70,21 +70,21 @@ class Specification:
         Families of contours.
     each_group : bool
         Whether the groups are used in turn, and not drawn.
-    rod : mapping of str to Distribution
+    rod : mapping of str to Variation
         length [m], flexural_rigidity [N m²], diameter [m], rest_curvature [1/m] and taper; of a dimensionless data set
         only diameter, rest_curvature [L, 1/L] and taper, or nothing.
-    bases : tuple of (Distribution, Distribution)
+    bases : tuple of (Variation, Variation)
         Pivots (x, y) [m, or rod lengths].
     directions : tuple of str
         Directions of the sweeps about each pivot.
-    translations : tuple of mapping of str to Distribution
+    translations : tuple of mapping of str to Variation
         Sweeps in which the base is carried along a line, in place of pivots: base[0], base[1], travel or step [m, or
         rod lengths], heading, drive_angle, and turn, the change of the drive angle on the way [rad].
     drive : Drive
         Number of samples, and drive angles of rotations.
     friction : float
         Coulomb's coefficient μ.
-    load_cell : mapping of str to Distribution
+    load_cell : mapping of str to Variation
         Entries of a data sheet, in the units of the data set.
     frame : {"fixed", "turning"}
         Frame of the load cell.
@@ -100,13 +100,13 @@ class Specification:
     seed: int
     groups: tuple[Group, ...]
     each_group: bool
-    rod: Mapping[str, Distribution]
-    bases: tuple[tuple[Distribution, Distribution], ...]
+    rod: Mapping[str, Variation]
+    bases: tuple[tuple[Variation, Variation], ...]
     directions: tuple[str, ...]
-    translations: tuple[Mapping[str, Distribution], ...]
+    translations: tuple[Mapping[str, Variation], ...]
     drive: Drive
     friction: float
-    load_cell: Mapping[str, Distribution]
+    load_cell: Mapping[str, Variation]
     frame: Frame
     single: bool
 
@@ -159,7 +159,7 @@ class Specification:
         return np.array_split(np.arange(records), max(1, -(-samples // _AT_HAND)))
 
     @property
-    def distributions(self) -> tuple[tuple[str, Distribution], ...]:
+    def distributions(self) -> tuple[tuple[str, Variation], ...]:
         """All distributions with their keys, in the order in which numbers are drawn."""
         tables = {
             **{f"contours[{g}].": group.distributions for g, group in enumerate(self.groups)},

@@ -22,10 +22,10 @@ from tactile_bayes.checks import (
     refused,
 )
 from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
-from tactile_bayes.contours.family import Family
-from tactile_bayes.datasets.distributions import Distribution, distribution_of
+from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.datasets.specification import Drive, Group, Specification
 from tactile_bayes.datasets.specification_text import DEFAULTS, SCAN, left_out, toml_of
+from tactile_bayes.datasets.variations import Variation, variation_of
 from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
@@ -192,7 +192,7 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
     if weight == 0.0 or (each and "weight" in group):
         why = "it must be positive" if not each else "with each_contour every family comes as often"
         raise SpecificationError(f"{key}.weight is {weight!r}: {why}")
-    distributions = {parameter: distribution_of(values[parameter], f"{key}.{parameter}") for parameter in names}
+    distributions = {parameter: variation_of(values[parameter], f"{key}.{parameter}") for parameter in names}
     _refuse_no_contour(family, distributions, key)
     return Group(name, weight, distributions)
 
@@ -212,7 +212,7 @@ def _refuse_replaced(group: Mapping[str, Any], name: str, key: str) -> None:
         )
 
 
-def _refuse_no_contour(family: Family, distributions: Mapping[str, Distribution], key: str) -> None:
+def _refuse_no_contour(family: ContourFamily, distributions: Mapping[str, Variation], key: str) -> None:
     """Refuse parameters that are impossible for any values of the others, by the ends of the distributions; draws from
     unbounded distributions are tested later."""
     possible = {name: np.full(1, 2.0 if name.endswith("n") else 1.0) for name in family.parameters}
@@ -228,7 +228,7 @@ def _refuse_no_contour(family: Family, distributions: Mapping[str, Distribution]
                 raise SpecificationError(f"{key}.{name} {verb} {number:g}: {rule_of(error)}") from error
 
 
-def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
+def _rod(rod: Mapping[str, Any]) -> dict[str, Variation]:
     if not rod:
         return {}
     if ("length" in rod) != ("flexural_rigidity" in rod):
@@ -236,7 +236,7 @@ def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
             "rod needs length [m] and flexural_rigidity [N m²] together; without them lengths are in rod lengths"
         )
     given = {"diameter": 0.0, **rod} if "length" in rod else rod
-    distributions = {name: distribution_of(given[name], f"rod.{name}") for name in _TABLES["rod."] if name in given}
+    distributions = {name: variation_of(given[name], f"rod.{name}") for name in _TABLES["rod."] if name in given}
     signed = {"rest_curvature", "taper"}
     _refuse_negative({name: of for name, of in distributions.items() if name not in signed}, "rod.", {"diameter"})
     if "taper" in distributions:
@@ -248,7 +248,7 @@ def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
     return distributions
 
 
-def _refuse_taper(taper: Distribution) -> None:
+def _refuse_taper(taper: Variation) -> None:
     """Refuse tapers out of range."""
     least, greatest = taper.least, taper.greatest
     if not 0.0 <= least <= greatest <= STEEPEST_TAPER:
@@ -260,10 +260,10 @@ def _refuse_taper(taper: Distribution) -> None:
         )
 
 
-def _load_cell(table: Mapping[str, Any]) -> dict[str, Distribution]:
-    distributions = {name: distribution_of(value, f"load_cell.{name}") for name, value in table.items()}
+def _load_cell(table: Mapping[str, Any]) -> dict[str, Variation]:
+    distributions = {name: variation_of(value, f"load_cell.{name}") for name, value in table.items()}
     if any(name.startswith("ornstein_uhlenbeck") for name in distributions):
-        distributions.setdefault("ornstein_uhlenbeck_time", Distribution("constant", (OrnsteinUhlenbeck().time,)))
+        distributions.setdefault("ornstein_uhlenbeck_time", Variation("constant", (OrnsteinUhlenbeck().time,)))
     for share in (0.05, 0.5, 0.95):
         try:
             LoadCell.from_entries(_at_share(distributions, share))
@@ -284,13 +284,13 @@ def _load_cell(table: Mapping[str, Any]) -> dict[str, Distribution]:
     return distributions
 
 
-def _at_share(distributions: Mapping[str, Distribution], share: float) -> dict[str, float]:
+def _at_share(distributions: Mapping[str, Variation], share: float) -> dict[str, float]:
     """Return the quantiles of distributions at a probability."""
     turn = np.zeros(1, dtype=np.intp)
     return {name: float(distribution.at(np.full(1, share), turn)[0]) for name, distribution in distributions.items()}
 
 
-def _refuse_negative(distributions: Mapping[str, Distribution], prefix: str, or_zero: Container[str]) -> None:
+def _refuse_negative(distributions: Mapping[str, Variation], prefix: str, or_zero: Container[str]) -> None:
     for name, distribution in distributions.items():
         low = distribution.least
         if low < 0.0 or (low == 0.0 and name not in or_zero):
@@ -300,11 +300,11 @@ def _refuse_negative(distributions: Mapping[str, Distribution], prefix: str, or_
             )
 
 
-def _bases(value: Any) -> tuple[tuple[Distribution, Distribution], ...]:
+def _bases(value: Any) -> tuple[tuple[Variation, Variation], ...]:
     if not isinstance(value, list) or not value or not all(isinstance(pair, list) and len(pair) == 2 for pair in value):
         raise refused("scan.bases", value, "give a list of pivots, each [x, y]")
     return tuple(
-        (distribution_of(x, f"scan.bases[{i}][0]"), distribution_of(y, f"scan.bases[{i}][1]"))
+        (variation_of(x, f"scan.bases[{i}][0]"), variation_of(y, f"scan.bases[{i}][1]"))
         for i, (x, y) in enumerate(value)
     )
 
@@ -315,7 +315,7 @@ def _directions(value: Any) -> tuple[str, ...]:
     return tuple(value)
 
 
-def _translations(scan: Mapping[str, Any]) -> tuple[dict[str, Distribution], ...]:
+def _translations(scan: Mapping[str, Any]) -> tuple[dict[str, Variation], ...]:
     if "translations" not in scan:
         return ()
     if of_rotations := [name for name in _OF_ROTATIONS if name in scan]:
@@ -330,7 +330,7 @@ def _translations(scan: Mapping[str, Any]) -> tuple[dict[str, Distribution], ...
     return tuple(_translation(one, f"scan.translations[{k}]") for k, one in enumerate(value))
 
 
-def _translation(said: Mapping[str, Any], key: str) -> dict[str, Distribution]:
+def _translation(said: Mapping[str, Any], key: str) -> dict[str, Variation]:
     _refuse_unknown(said, _OF_TRANSLATIONS, f"{key}.")
     for name in ("base", "heading", "drive_angle"):
         if name not in said:
@@ -348,7 +348,7 @@ def _translation(said: Mapping[str, Any], key: str) -> dict[str, Distribution]:
         "base[1]": base[1],
         **{name: said[name] for name in _OF_TRANSLATIONS[1:] if name in said},
     }
-    found = {name: distribution_of(value, f"{key}.{name}") for name, value in values.items()}
+    found = {name: variation_of(value, f"{key}.{name}") for name, value in values.items()}
     for name in ("heading", "drive_angle", "turn"):
         for angle in (found[name].least, found[name].greatest) if name in found else ():
             if math.isfinite(angle) and abs(angle) > 2.0 * math.pi:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from itertools import zip_longest
 from typing import Any
 
-import numpy as np
-
 from tactile_bayes.contours.families import FAMILIES
-from tactile_bayes.contours.family import Family
-from tactile_bayes.errors import SpecificationError
-from tactile_bayes.tasks.documents import read_toml
+from tactile_bayes.contours.family import ContourFamily
+from tactile_bayes.errors import ParameterError, SpecificationError
+from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
 __all__ = ["DEFAULTS", "SCAN", "UNNAMED", "differences", "left_out", "meaning", "toml_of", "without"]
 
@@ -43,7 +40,7 @@ def meaning(text: str) -> dict[str, Any]:
     return dict(canonical(said))
 
 
-def left_out(family: Family) -> dict[str, Any]:
+def left_out(family: ContourFamily) -> dict[str, Any]:
     """Default values of the parameters of a family: x_c = 0, and standard normal weights."""
     standard = {"normal": [0.0, 1.0]}
     return {
@@ -97,20 +94,7 @@ def differences(one: Any, other: Any, key: str = "") -> list[tuple[str, Any, Any
 
 def toml_of(table: Mapping[str, Any]) -> str:
     """Convert a mapping of numbers, words, lists and mappings to TOML, with inline values."""
-
-    def inline(value: Any) -> str:
-        if isinstance(value, bool | str):
-            return json.dumps(value, ensure_ascii=False)
-        if isinstance(value, int | np.integer):
-            return str(int(value))
-        if isinstance(value, float | np.floating):
-            return repr(float(value))
-        if isinstance(value, Mapping):
-            return f"{{ {', '.join(f'{inline(str(k))} = {inline(v)}' for k, v in value.items())} }}"
-        if isinstance(value, list | tuple | np.ndarray):
-            return "[" + ", ".join(inline(v) for v in value) + "]"
-        raise SpecificationError(
-            f"a specification holds numbers, words, lists and tables, and no {type(value).__name__}"
-        )
-
-    return "".join(f"{inline(str(key))} = {inline(value)}\n" for key, value in table.items())
+    try:
+        return "".join(f"{toml_key(str(key))} = {toml_value(value)}\n" for key, value in table.items())
+    except ParameterError as error:
+        raise SpecificationError(f"a specification cannot be written: {error}") from error

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.errors import InferenceError
+from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.stored_experiment import experiment_of, points_of
 from tactile_bayes.numerics.selection import evenly_spread
@@ -34,7 +34,7 @@ def cut_off_parameters(posterior: xr.DataTree) -> dict[str, str]:
         return {}
     try:
         model = experiment_of(posterior).model
-    except InferenceError:  # a prior that its text does not determine
+    except (InferenceError, ParameterError):  # no whole posterior, or a prior that no text determines
         return {}
     points = points_of(posterior, model.names).reshape(-1, len(model.names))
     if len(points) < _DRAWS:

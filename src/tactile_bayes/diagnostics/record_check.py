@@ -18,6 +18,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.blocks import are_blocks
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
+from tactile_bayes.record.rig_entry import rig_entry
 
 __all__ = ["DISCREPANCIES", "LOST_BELOW", "Residuals", "check_record", "residuals_of"]
 
@@ -301,7 +302,7 @@ def _suggestion(smooth: dict[str, float]) -> str:
     return (
         f"In contact the residuals of {named} are larger than the noise between neighbouring samples, and smooth: "
         "where neither another family nor more of the rig describes them, infer a discrepancy of the model "
-        "(--discrepancy, or nuisances=['standard', 'discrepancy'])."
+        f"({rig_entry('discrepancy', 'default', 'unknown')})."
     )
 
 

@@ -23,7 +23,8 @@ from tactile_bayes.inference.result import is_streamed, posterior_draws, record_
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM, contact_sides
 from tactile_bayes.record import CHANNELS, carried_sweeps
-from tactile_bayes.record.origin import column_option
+from tactile_bayes.record.origin import column_entry
+from tactile_bayes.record.rig_entry import rig_entries, rig_entry
 from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["CONTRADICTION", "NOISE_FACTOR", "OFF_ZERO", "doubtful_sides", "verdicts"]
@@ -170,7 +171,7 @@ def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
     named = f"{'Sweeps' if len(sweeps) > 1 else 'Sweep'} {', '.join(map(str, sweeps))}"
     return [
         f"{named} went back in contact, where friction acts the other way, which is not modelled: infer the record "
-        "without these samples, or without friction (friction=0.0, on the command line --friction 0), and compare."
+        f"without these samples, or without friction ({rig_entry('friction', 0, 'unknown')}), and compare."
     ]
 
 
@@ -196,7 +197,7 @@ def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
 
 def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
     """Report channels whose unloaded readings differ from what the posterior expects."""
-    off, options = [], []
+    off, entries = [], {}
     for name, of_channel in residuals.items():
         unloaded = found.unloaded.values & ~of_channel.loaded
         uncertainty = float(found.bias_uncertainty.sel(channel=name))
@@ -207,10 +208,10 @@ def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residu
         if abs(means[0]) > OFF_ZERO * error > 0.0:
             unit = _unit(record, name)
             off.append(f"{name} is off by {means[0]:.3g}{unit} ({abs(means[0]) / error:.0f} standard errors)")
-            options.append(column_option(record[name], added=-float(means[0])))
+            entries[name] = column_entry(record[name], added=-float(means[0]))
     if not off:
         return []
-    how = f" as they are read ({' '.join(options)})" if all(options) else ""
+    how = f" as they are read ({rig_entries(entries)})" if all(entries.values()) else ""
     return [
         f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? Take it out of "
         f"the readings{how}, or give LoadCell.from_zero_load(record)."
@@ -230,8 +231,8 @@ def _moved_zero(posterior: xr.DataTree, record: xr.Dataset, found: xr.Dataset) -
     if not moved or (cell is not None and cell.drift is not None):
         return []
     return [
-        f"The zero moved from one unloaded stretch to another, of {', '.join(moved)}: infer it, too (--nuisance drift, "
-        "or nuisances=[..., 'drift']), state the drift of the load cell, or tare before each sweep."
+        f"The zero moved from one unloaded stretch to another, of {', '.join(moved)}: infer it, too "
+        f"({rig_entry('drift', 'default', 'unknown')}), state the drift of the load cell, or tare before each sweep."
     ]
 
 
@@ -317,7 +318,7 @@ def _dragging(posterior: xr.DataTree, axial_score: float) -> str:
     words = f" In tangential contact the force along the rod is too small by {-axial_score:.0f} standard errors, as "
     if is_inferred("friction", _inferred(posterior)):
         return f"{words}with more friction than was inferred."
-    return f"{words}with friction: infer it (--nuisance friction)."
+    return f"{words}with friction: infer it ({rig_entry('friction', 'default', 'unknown')})."
 
 
 def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
@@ -339,15 +340,16 @@ def _beyond_message(beyond: Mapping[str, str], record: xr.Dataset, posterior: xr
     if not beyond:
         return []
     draws = posterior_draws(posterior)
-    zeros = [
-        column_option(record[column], added=-float(draws[name].median()))
+    zeros = {
+        column: column_entry(record[column], added=-float(draws[name].median()))
         for name, column in _COLUMN_OF_ZERO.items()
         if name in beyond
-    ]
-    subtract = f"subtract a zero as its column is read ({' '.join(zeros)}), " if zeros and all(zeros) else ""
+    }
+    is_known = bool(zeros) and all(zeros.values())
+    subtract = f"subtract a zero as its column is read ({rig_entries(zeros)}), " if is_known else ""
     return [
         f"The record contradicts the prior: {', '.join(beyond.values())}. Check the stated rod and drive "
-        f"angle, {subtract}or give a wider prior (priors=)."
+        f"angle, {subtract}or give a wider prior (under [unknown] of rig.toml, or in the family)."
     ]
 
 
@@ -363,7 +365,7 @@ def _cut_off_message(posterior: xr.DataTree) -> list[str]:
     if is_inferred("friction", _inferred(posterior)) or posterior.attrs.get("friction", 0.0):
         advice = (
             "friction excludes states in which the contact would stick, which is not modelled. Infer it without "
-            "friction (friction=0.0, on the command line --friction 0) and compare."
+            f"friction ({rig_entry('friction', 0, 'unknown')}) and compare."
         )
     return [
         f"The posterior is CUT OFF where the model has no path of the rod, not by the record: {', '.join(ends)}. "

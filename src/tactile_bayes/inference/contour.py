@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -30,18 +30,16 @@ from tactile_bayes.inference.ensembles import (
     spawn,
 )
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.gauge import Gauge
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior
-from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig, rig_prior
+from tactile_bayes.inference.parameters.rig_prior import rig_prior
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import CONTACT_SIDES
+from tactile_bayes.rig.rig import Rig, expanded, rig_of
 
-__all__ = ["Sampled", "contours_of", "infer_contour", "infer_rig", "sampled"]
+__all__ = ["Sampled", "calibrate_rig", "contours_of", "infer_contour", "rig_posterior", "sampled"]
 
 _PRIOR_SECONDS = 3.0
 """Time limit for draws from the prior [s] if time is limited, since a rod may reach few contours."""
@@ -50,19 +48,13 @@ _PRIOR_SECONDS = 3.0
 def infer_contour(
     measured: xr.Dataset,
     *,
-    family: str = "parabola",
-    load_cell: LoadCell | None = None,
-    priors: Mapping[str, Prior] | None = None,
+    family: Family | str = "parabola",
+    rig: Rig | None = None,
     seed: Seed,
-    rod: Rod | None = None,
-    friction: float | None = None,
-    nuisances: Sequence[str] = STANDARD,
-    events: bool = True,
     settings: SamplerSettings | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
     keep: Callable[[xr.DataTree], object] | None = None,
-    rig: xr.DataTree | None = None,
 ) -> xr.DataTree:
     """Return the posterior of a contour's parameters from a whole record, by independent emcee ensembles.
 
@@ -79,47 +71,15 @@ def infer_contour(
     ----------
     measured : xr.Dataset
         A record; SI or dimensionless, channels may be missing.
-    family : str
-        Family of the contour: parabola, circle, ellipse, power-law, or one for each flank, like "parabola/power-law",
-        on the left and on the right of a common vertex; or "shape-free", any smooth contour.
-    load_cell : LoadCell, optional
-        The sensor, in the record's units; by default the data sheet in the record. Its noise is known up to the factor
-        `noise_scale`, which is inferred. If no noise is stated for any channel, `moment_noise` and `force_noise` are
-        inferred.
-    priors : mapping of str to frozen scipy.stats distribution, optional
-        Priors in place of the default ones (see Notes), in the record's units. A nuisance parameter that has a prior is
-        inferred.
+    family : str or Family
+        Family of the contour by name: parabola, circle, ellipse, power-law, or one for each flank, like
+        "parabola/power-law", on the left and on the right of a common vertex; or "shape-free", any smooth contour. As a
+        `Family`, what is said of its parameters, in the record's units: a number is known, a distribution its prior.
+    rig : Rig, optional
+        Rod, load cell, and the unknowns of the rig, which are inferred beside the contour; by default those that the
+        record states, with the unknowns of a real rig.
     seed : int or numpy.random.SeedSequence
         Seed of all random numbers; the same seed gives the same draws.
-    rod : Rod, optional
-        Rod in place of the one that the record states, in its units: straight, curved or tapered.
-    friction : float, optional
-        Coulomb's coefficient μ if it is known. By default it is among the nuisances; if other nuisances are given, the
-        default is 0.
-    nuisances : sequence of str
-        Parameters of the rig that are inferred beside the contour: "rigidity_scale" (flexural rigidity over the stated
-        one), "drive_angle_offset" (encoder offset [rad]), "bias" (of all channels, or "moment_bias", "force_x_bias",
-        "force_y_bias"), "lever" (the point of the moment's reference, from the pivot along the axes of the cell
-        [length], or "lever_x", "lever_y"), "backlash" (reading of the encoder in forward motion less that in backward
-        motion [rad]), "moment_curve" (curve of the moment's reading, as of `LoadCell`, or "moment_curve_quadratic",
-        "moment_curve_cubic"), "drift" (of all channels, or "moment_drift" and so on: linear change of a zero from first
-        to last sample; the bias is the zero in the middle), "gain" (likewise), "friction" (Coulomb's coefficient),
-        "suspension_compliance" (turn of the pivot per holding moment), "rest_curvature" (mean curvature of the unloaded
-        rod; how it varies along the rod stays as stated), "taper", "stem" (rigid piece between pivot and rod; beside
-        the lever it is refused if the base is only carried without turning), "length" (of the rod, which keeps its
-        taper and, unless it is inferred as well, its rest curvature times length). By default the first five and
-        friction, except those that are not identifiable (the lever without the moment, the backlash in a single
-        direction) and a given friction; "standard" stands for these, and an empty list takes all as stated. "base":
-        shifts of the second and further pivots of a record, as "base_2_x", "base_2_y", "base_3_x" and so on. The
-        position of the first pivot is not identifiable, since a common shift of pivots and object changes no reading:
-        results are relative to it.
-        "discrepancy": a smooth deviation of the readings in contact from those of any contour and rig, as by
-        hysteresis, stick-slip or a lean out of the plane (Kennedy and O'Hagan 2001, doi 10.1111/1467-9868.00294), with
-        "discrepancy_scale" and "discrepancy_length"; see Notes. nuisances=["standard", "discrepancy"] infers it beside
-        the default ones.
-    events : bool
-        Whether unloaded samples count, which show where contact begins and ends. Otherwise only samples count whose
-        load exceeds the noise, as in methods that use contacts alone.
     settings : SamplerSettings, optional
         Criteria of convergence, and limits of steps and time.
     checkpoint : path-like, optional
@@ -132,13 +92,6 @@ def infer_contour(
     keep : callable, optional
         Called with the posterior as soon as it is drawn, without the derived groups (predictions, events, draws from
         the prior), so that it can be stored before they can fail.
-    rig : xr.DataTree, optional
-        Result of `infer_rig` for the same rig, whose posterior is the prior of the parameters that last: stiffness,
-        encoder offset, backlash, lever, gains, curve of the moment, compliance, and the rod's curvature, taper, stem
-        and length. They are inferred without being named, with their correlations. Zeros, drifts, noise and shifts of
-        pivots belong to a record, and friction to the surfaces of rod and object: they keep their own priors. The
-        attribute `rig_density_error` of the result is the largest difference between quantiles of the rig's draws and
-        of the density fitted to them, along each parameter and principal axis, in standard deviations.
 
     Returns
     -------
@@ -155,12 +108,12 @@ def infer_contour(
     RecordError
         If `measured` is no record.
     ParameterError
-        If the family is unknown, a prior does not belong to a parameter, the seed is no whole number from 0 up, the
-        load cell has noise on some channels, and none on another, the rig has another rod, load cell or unit, or there
-        is a prior of a parameter of the rig beside it.
+        If the family is unknown, the seed is no whole number from 0 up, the load cell has noise on some channels, and
+        none on another, two unknowns have the same effect, or the calibration of the rig is of another rod, load cell
+        or unit.
     InferenceError
-        If the rig is no result of `infer_rig` or has not converged, no sample carries a load, no contour of the family
-        is found that the rod can reach, or the checkpoint is of another run, damaged or in use.
+        If no sample carries a load, no contour of the family is found that the rod can reach, or the checkpoint is of
+        another run, damaged or in use.
 
     Notes
     -----
@@ -175,18 +128,9 @@ def infer_contour(
     it changes [rad], log-normal around 0.7, standard deviation 0.4 of the logarithm, from 0.15 to 4 (Matérn's
     covariance, ν = 5/2); z_1, z_2 …, standard normal, in the directions that make 99 % of its variance at the shortest
     length scale. They are smooth: a sharper corner, or a radius that jumps, is smoothed. noise_scale: log-normal around
-    1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Of the
-    nuisances: rigidity_scale log-normal around 1 with 5 %, drive_angle_offset normal with 1°, biases and drifts
-    normal with the reading of 0.1 EI/L and EI/L² (a bias of which the load cell states a bias_uncertainty is
-    integrated out instead), lever_x and lever_y normal with 0.5 % of L, the curve of the moment normal around the
-    stated one with 0.05 L/EI and 0.02 (L/EI)², backlash normal with 0.2°, gains normal around 1 with 2 %, friction
-    half-normal with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, rest_curvature normal
-    around the stated mean with the rod's rest_curvature_deviation, or 0.05/L if it has none, taper normal around
-    the stated one with 0.05, stem normal around the stated one with 2 % of L, from 0 on, length normal around the
-    stated one with 1 % of L, pivots normal with 1 % of L;
-    discrepancy_scale log-normal around 0.005, standard deviation 1 of the logarithm, discrepancy_length log-normal
-    around 0.3 rad, standard deviation 0.5 of the logarithm. In addition, contours out of reach are excluded, those that
-    the rod would still cut after snap-off, and those that a rod curved toward the object would touch twice.
+    1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Those of
+    the rig are in the table of `tactile-bayes rig --parameters`. In addition, contours out of reach are excluded, those
+    that the rod would still cut after snap-off, and those that a rod curved toward the object would touch twice.
 
     The discrepancy is a Gaussian process over the drive angle, or over the travel in rod lengths where the drive
     carries the base, independent in each channel and each sweep segment, with Matérn's covariance, ν = 3/2. Its
@@ -200,42 +144,38 @@ def infer_contour(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, SamplerSettings, scan
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, scan
     >>> from tactile_bayes.contours import paper_profile
-    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> rig = Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02), unknown="nothing")
+    >>> measured = rig.load_cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> result = infer_contour(measured, family="parabola", load_cell=cell, nuisances=[], seed=1, settings=quick)
+    >>> result = infer_contour(measured, family="parabola", rig=rig, seed=1, settings=quick)
     >>> bool(result.attrs["converged"]), list(result["posterior"].data_vars)
     (True, ['a', 'q', 'x_c', 'noise_scale'])
     """
-    given = {} if priors is None else priors
-    joint = None if rig is None else rig_prior(rig)
-    experiment = Experiment(measured, family, load_cell, given, rod, friction, nuisances, events, joint=joint)
-    return _posterior_of(experiment, rig, seed, settings, checkpoint, progress, keep)
+    settings = settings_of(settings)
+    experiment = Experiment(measured, rig_of(rig), family, settings.events)
+    return _posterior_of(experiment, seed, settings, checkpoint, progress, keep)
 
 
-def infer_rig(
+def calibrate_rig(
     records: xr.Dataset,
     *,
     contour: Contour,
-    load_cell: LoadCell | None = None,
-    priors: Mapping[str, Prior] | None = None,
+    rig: Rig | None = None,
     seed: Seed,
-    rod: Rod | None = None,
-    friction: float | None = None,
-    nuisances: Sequence[str] = STANDARD,
-    events: bool = True,
     settings: SamplerSettings | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
     keep: Callable[[xr.DataTree], object] | None = None,
-    rig: xr.DataTree | None = None,
-) -> xr.DataTree:
-    """Return the posterior of a rig's parameters from sweeps along a gauge, whose contour is known.
+) -> Rig:
+    """Return a rig whose unknowns have the posterior from sweeps along a gauge, whose contour is known.
 
-    Likelihood, priors and sampler are those of `infer_contour`; the contour has no parameters. The result is the prior
-    of `infer_contour(rig=...)`.
+    Likelihood, priors and sampler are those of `infer_contour`; the contour has no parameters. Stiffness, encoder
+    offset, backlash, lever, gains, curve of the moment, compliance, and the rod's curvature, taper, stem and length
+    last: their posterior is their joint prior in every later use of the rig, with their correlations. Zeros, drifts,
+    noise and shifts of pivots belong to a record, and friction to the surfaces of rod and object: they stay as unknown
+    as they were.
 
     Parameters
     ----------
@@ -243,73 +183,75 @@ def infer_rig(
         A record of the gauge, with any number of sweeps, pivots and drives.
     contour : Contour
         Contour of the gauge in the coordinates and the unit of length of the record, one of a family. Its shape is
-        taken as exact, and its position unless "gauge" is among the nuisances.
-    load_cell, priors, seed, rod, friction, events, settings, checkpoint, progress, keep
+        taken as exact, and its position unless "gauge" is unknown.
+    rig : Rig, optional
+        The rig so far. If it has been calibrated by another record, of this gauge or of another one, the result rests
+        on both.
+    seed, settings, checkpoint, progress, keep
         As in `infer_contour`.
-    nuisances : sequence of str
-        As in `infer_contour`; and "gauge", the shifts "gauge_x" and "gauge_y" of the gauge from where `contour` is
-        [length], normal with 1 % of L by default.
-    rig : xr.DataTree, optional
-        Result of `infer_rig` for another record of the same rig, of this gauge or of another one: its posterior is the
-        prior, as in `infer_contour`, so that the result rests on both records. Each has its own zeros, drifts, noise,
-        shifts of pivots and friction.
 
     Returns
     -------
-    xr.DataTree
-        As from `infer_contour`, without parameters of a contour. The attribute `gauge` describes it.
+    Rig
+        The rig with a `calibration`, whose `posterior` is a tree as from `infer_contour`, without parameters of a
+        contour; its attribute `gauge` describes it. `calibration.error` is the largest difference between quantiles of
+        the draws and of the density fitted to them, along each parameter and principal axis, in standard deviations.
 
     Raises
     ------
     RecordError
         If `records` is no record.
     ParameterError
-        If the contour is none of a family or holds several, or no parameter of the rig is to be inferred; else as in
+        If the contour is none of a family or holds several, or nothing of the rig is unknown; else as in
         `infer_contour`.
     InferenceError
-        As in `infer_contour`.
+        If the posterior has not converged, or nothing that is unknown lasts; else as in `infer_contour`.
 
     Examples
     --------
     >>> from tactile_bayes import LoadCell, SamplerSettings, scan
     >>> from tactile_bayes.contours import Circle
+    >>> from tactile_bayes.rig import NOTHING
     >>> pin, cell = Circle(r=0.2, q=0.5), LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(pin, drive_step=0.1).record, seed=1)
+    >>> rig = Rig(load_cell=cell, unknown={**NOTHING, "rigidity_scale": "default"})
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> rig = infer_rig(measured, contour=pin, load_cell=cell, nuisances=["rigidity_scale"], seed=1, settings=quick)
-    >>> list(rig["posterior"].data_vars)
-    ['rigidity_scale', 'noise_scale']
+    >>> list(calibrate_rig(measured, contour=pin, rig=rig, seed=1, settings=quick).calibration.priors)
+    ['rigidity_scale']
     """
-    gauge, given = Gauge(contour), {} if priors is None else priors
-    experiment = Experiment(
-        records,
-        load_cell=load_cell,
-        priors=given,
-        rod=rod,
-        friction=friction,
-        nuisances=nuisances,
-        events=events,
-        gauge=gauge,
-        joint=None if rig is None else rig_prior(rig),
-    )
-    if not experiment.rig.names:
-        raise ParameterError("nuisances are empty: name at least one parameter of the rig, like rigidity_scale")
-    return _posterior_of(experiment, rig, seed, settings, checkpoint, progress, keep)
+    settings, rig = settings_of(settings), rig_of(rig)
+    posterior = rig_posterior(records, contour, rig, seed, settings, checkpoint, progress, keep)
+    found = rig_prior(posterior)
+    left = {name: value for name, value in expanded(rig.unknown).items() if name not in found.priors}
+    return replace(rig, unknown=left, calibration=found)
+
+
+def rig_posterior(
+    records: xr.Dataset,
+    contour: Contour,
+    rig: Rig,
+    seed: Seed,
+    settings: SamplerSettings,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: Callable[[Progress], object] | None = None,
+    keep: Callable[[xr.DataTree], object] | None = None,
+) -> xr.DataTree:
+    """Return the posterior of a rig's parameters from a record of a gauge; see `calibrate_rig`."""
+    experiment = Experiment(records, rig, events=settings.events, gauge=Gauge(contour))
+    if not experiment.nuisances.names:
+        raise ParameterError("nothing of the rig is unknown: say that one of its parameters is, like rigidity_scale")
+    return _posterior_of(experiment, seed, settings, checkpoint, progress, keep)
 
 
 def _posterior_of(
     experiment: Experiment,
-    rig: xr.DataTree | None,
     seed: Seed,
-    settings: SamplerSettings | None,
+    settings: SamplerSettings,
     checkpoint: str | os.PathLike[str] | None,
     progress: Callable[[Progress], object] | None,
     keep: Callable[[xr.DataTree], object] | None,
 ) -> xr.DataTree:
     """Return the posterior of an experiment; arguments are checked and used as in `infer_contour`."""
-    if rig is not None:
-        refuse_other_rig(rig.attrs, experiment.about)
-    settings = settings_of(settings)
     if checkpoint is not None:
         check_path("checkpoint", checkpoint, "give the path of a folder, or None")
     check_function("progress", progress)

@@ -7,13 +7,13 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 
 __all__ = ["events_of"]
 
 
 def events_of(
-    likelihood: RecordLikelihood, contours: Contour, rig: Rig | None = None, *, exact: bool = True
+    likelihood: RecordLikelihood, contours: Contour, rig: RigValues | None = None, *, exact: bool = True
 ) -> dict[str, Floats]:
     """Return drive angle and contact point of first contact and snap-off in every sweep segment.
 
@@ -22,7 +22,7 @@ def events_of(
     likelihood : RecordLikelihood
     contours : Contour
         Contours with parameters of shape (n,).
-    rig : Rig, optional
+    rig : RigValues, optional
         Deviations from the stated rig.
     exact : bool
         Whether events are exact to rounding; otherwise their errors are below 1e-6 rad and 1e-5 rod lengths, at a

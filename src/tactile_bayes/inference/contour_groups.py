@@ -9,15 +9,18 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws
+from tactile_bayes.inference.family import PartlyKnown
 from tactile_bayes.inference.result import sample_stats
 from tactile_bayes.load_cell.discrepancy import Discrepancy, joined
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels
 from tactile_bayes.record.origin import with_origin
+from tactile_bayes.rig.parameters import parameter_named
 
 __all__ = ["FEWEST_PREDICTIONS", "drawn_groups", "predicted_groups", "prior_draws", "unit_of"]
 
@@ -133,22 +136,25 @@ def prior_draws(model: ContourModel, rng: np.random.Generator, deadline: Deadlin
 
 def _labelled(model: ContourModel, samples: Floats, draw: Index) -> xr.Dataset:
     coords = {"chain": np.arange(samples.shape[0]), "draw": draw}
-    return xr.Dataset(
-        {
-            name: (("chain", "draw"), samples[..., i], {"units": unit_of(model, name)})
-            for i, name in enumerate(model.names)
-        },
-        coords=coords,
-    )
+    columns = {name: samples[..., i] for i, name in enumerate(model.names)}
+    if isinstance(model.family, PartlyKnown):
+        columns |= {name: np.full(samples.shape[:2], value) for name, value in model.family.known.items()}
+    labelled = {n: (("chain", "draw"), values, {"units": unit_of(model, n)}) for n, values in columns.items()}
+    return xr.Dataset(labelled, coords=coords)
 
 
 def unit_of(model: ContourModel, name: str) -> str:
     """Return the unit of a parameter, like "N m"."""
-    if model.measured.attrs["units"] == "dimensionless":
-        return "rad" if name in ("drive_angle_offset", "backlash", "length_scale", "discrepancy_length") else "1"
-    if name in model.nuisances.names:
-        return model.nuisances.unit(name)
-    if name in ("length_scale", "discrepancy_length"):
-        return "rad"
-    powers = {0: "1", 1: "m", -1: "1/m"}
-    return {"moment_noise": "N m", "force_noise": "N"}.get(name) or powers[model.family.length_powers.get(name, 0)]
+    row = parameter_named(name)
+    if name == "length_scale":
+        unit = "rad"
+    elif row is not None:
+        unit = row.unit
+    else:
+        unit = {0: "1", 1: "m", -1: "1/m"}[_whole(model.family).length_powers.get(name, 0)]
+    return unit if unit == "rad" or model.measured.attrs["units"] != "dimensionless" else "1"
+
+
+def _whole(family: ContourFamily) -> ContourFamily:
+    """Return the family with its known parameters."""
+    return family.whole if isinstance(family, PartlyKnown) else family

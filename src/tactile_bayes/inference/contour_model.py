@@ -11,22 +11,22 @@ import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour
-from tactile_bayes.contours.family import Family
+from tactile_bayes.contours.family import ContourFamily
+from tactile_bayes.distributions import Distribution, log_density_of, support_of
 from tactile_bayes.errors import DriftWarning, ParameterError, ReachError
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Ends, Logarithms
 from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.parameters.noise import Noise
 from tactile_bayes.inference.parameters.nuisances import Nuisances
-from tactile_bayes.inference.parameters.prior_density import log_density_of
-from tactile_bayes.inference.parameters.priors import MAY_VANISH, Prior, support_of
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig.parameters import MAY_VANISH
 
 __all__ = ["ContourModel"]
 
@@ -50,7 +50,7 @@ class ContourModel:
     ----------
     measured : xr.Dataset
         A valid record.
-    family : Family
+    family : ContourFamily
     nuisances : Nuisances
         Parameters of the rig.
     noise : Noise
@@ -83,7 +83,12 @@ class ContourModel:
     """
 
     def __init__(
-        self, measured: xr.Dataset, family: Family, nuisances: Nuisances, noise: Noise, priors: Mapping[str, Prior]
+        self,
+        measured: xr.Dataset,
+        family: ContourFamily,
+        nuisances: Nuisances,
+        noise: Noise,
+        priors: Mapping[str, Distribution],
     ) -> None:
         self.measured = measured
         self.family = family
@@ -180,7 +185,7 @@ class ContourModel:
         """Return the columns of points, shape (n, d), by name; those of the noise may be missing."""
         return dict(zip(self.names, points.T, strict=False))
 
-    def rig(self, points: Floats) -> Rig:
+    def rig(self, points: Floats) -> RigValues:
         """Return the rig of every point."""
         return self.nuisances.rig(self.values(points))
 
@@ -286,7 +291,7 @@ class ContourModel:
             yield inside[block]
 
     def prior_points(
-        self, rng: np.random.Generator, count: int, others: Mapping[str, Prior] = MappingProxyType({})
+        self, rng: np.random.Generator, count: int, others: Mapping[str, Distribution] = MappingProxyType({})
     ) -> Floats:
         """Draw from the prior of all contours, within reach or not, with other priors of some parameters; shape
         (count, d)."""
@@ -332,7 +337,7 @@ class ContourModel:
             raise ReachError(
                 f"with friction the rod has no path along any of {drawn} contours from the prior in every sweep, but "
                 f"without friction it has along {without_friction} of {count}: the contact would stick, which is not "
-                "modelled. Infer without friction (friction=0.0, on the command line --friction 0)"
+                "modelled. Infer without friction (friction = 0 under [unknown] of rig.toml)"
             )
         if not len(points):
             raise ReachError(
@@ -342,7 +347,7 @@ class ContourModel:
         return points[:count], len(points) / drawn
 
     def share_within_reach(
-        self, rng: np.random.Generator, count: int, others: Mapping[str, Prior] = MappingProxyType({})
+        self, rng: np.random.Generator, count: int, others: Mapping[str, Distribution] = MappingProxyType({})
     ) -> float:
         """Return the share of so many draws of `prior_points` that are within reach, at least 1/count."""
         return max(len(self._within_reach(self.prior_points(rng, count, others))), 1) / count

@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
 import xarray as xr
 
-from tactile_bayes.checks import check_names, check_optional, check_switch
-from tactile_bayes.contours.families import family_named
-from tactile_bayes.contours.family import Family
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.checks import check_kind, check_switch
+from tactile_bayes.contours.family import ContourFamily
+from tactile_bayes.distributions import Distribution, all_in_words, in_words
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.gauge import Gauge
 from tactile_bayes.inference.parameters.discrepancy import discrepancy_priors
 from tactile_bayes.inference.parameters.noise import Noise, noise_of
-from tactile_bayes.inference.parameters.nuisances import STANDARD, Nuisances, nuisances_of
-from tactile_bayes.inference.parameters.prior_text import priors_in_words
-from tactile_bayes.inference.parameters.priors import Prior, check_priors, refuse_unknown_priors
+from tactile_bayes.inference.parameters.nuisances import Nuisances, nuisances_of
 from tactile_bayes.inference.parameters.priors import default_priors as contour_priors
-from tactile_bayes.inference.parameters.rig_prior import RigPrior
+from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
 from tactile_bayes.inference.record_likelihood.shortening import shortened
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
 from tactile_bayes.record.attributes import rod_attributes
+from tactile_bayes.rig import Rig
 
-__all__ = ["Experiment", "default_priors", "usual_load_cell"]
+__all__ = ["Experiment", "usual_load_cell"]
 
 _WHOLE = "whole_sha256"
 """Attribute of a shortened record: the hash of the whole one."""
@@ -38,18 +36,18 @@ _WHOLE = "whole_sha256"
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """A record, the knowledge of contour and rig, and priors of all unknown parameters.
+    """A record, its rig and the family of its contour, with priors of all unknown parameters.
 
     Parameters
     ----------
     record : xr.Dataset
         Measured record, or a template.
-    family, load_cell, priors, rod, friction, nuisances, events
-        As in `infer_contour`.
+    rig : Rig
+    family : Family or str
+    events : bool
+        Whether unloaded samples count, as in `SamplerSettings`.
     gauge : Gauge, optional
         The known contour, in place of a family.
-    joint : RigPrior, optional
-        Joint prior of the rig's parameters that a calibration has found.
 
     Raises
     ------
@@ -60,33 +58,23 @@ class Experiment:
     --------
     >>> from tactile_bayes import scan
     >>> from tactile_bayes.contours import paper_profile
-    >>> experiment = Experiment(scan(paper_profile("II", q=0.5)).record, nuisances=["friction"])
-    >>> experiment.model.names
+    >>> from tactile_bayes.rig import NOTHING
+    >>> record = scan(paper_profile("II", q=0.5)).record
+    >>> Experiment(record, Rig(unknown={**NOTHING, "friction": "default"})).model.names
     ('a', 'q', 'x_c', 'friction', 'moment_noise', 'force_noise')
     """
 
     record: xr.Dataset
-    family: str = "parabola"
-    load_cell: LoadCell | None = None
-    priors: Mapping[str, Prior] = field(default_factory=dict)
-    rod: Rod | None = None
-    friction: float | None = None
-    nuisances: Sequence[str] = STANDARD
+    rig: Rig = field(default_factory=Rig)
+    family: Family | str = "parabola"
     events: bool = True
     gauge: Gauge | None = None
-    joint: RigPrior | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "record", with_rod(validate(self.record), self.rod))
-        check_optional("load_cell", self.load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
+        check_kind("rig", self.rig, Rig, "give Rig(rod=..., load_cell=...)")
+        object.__setattr__(self, "record", with_rod(validate(self.record), self.rig.rod))
+        object.__setattr__(self, "family", family_of(self.family))
         object.__setattr__(self, "events", check_switch("events", self.events))
-        check_priors("priors", self.priors)
-        object.__setattr__(self, "nuisances", tuple(check_names("nuisances", self.nuisances)))
-        both = sorted(set(self.priors) & set(self.joint.priors)) if self.joint is not None else []
-        if both:
-            raise ParameterError(f"there is a prior of {', '.join(both)} beside that of the rig: leave one of the two")
-        more = ", and of the rig moment_gain, friction and so on, which help(infer_contour) lists"
-        refuse_unknown_priors(self.priors, self.default_priors, more=more)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: the model is built again where it is needed."""
@@ -94,33 +82,47 @@ class Experiment:
 
     @cached_property
     def noise(self) -> Noise:
-        """Parameters of the noise, and of a discrepancy if it is asked for."""
-        return noise_of(self.record, self.load_cell, discrepancy_priors(self.nuisances, self.priors))
+        """Parameters of the noise, and of a discrepancy if it is unknown."""
+        return noise_of(self.record, self.rig, discrepancy_priors(self.rig))
 
     @cached_property
-    def rig(self) -> Nuisances:
-        """Nuisance parameters of the rig."""
-        given = self.record, self.nuisances, self.priors, self.noise.cell, self.friction, self.joint
-        return nuisances_of(*given, gauge=self.gauge is not None)
+    def nuisances(self) -> Nuisances:
+        """Unknown parameters of the rig."""
+        return nuisances_of(self.record, self.rig, self.noise.cell, gauge=self.gauge is not None)
 
     @property
-    def shapes(self) -> Family:
-        """Family of the contour."""
-        return family_named(self.family) if self.gauge is None else self.gauge
+    def contours(self) -> ContourFamily:
+        """Contours of the unknown parameters."""
+        return self.own_family.contours if self.gauge is None else self.gauge
+
+    @property
+    def own_family(self) -> Family:
+        """The family, and what is said of its parameters."""
+        assert isinstance(self.family, Family)
+        return self.family
 
     @cached_property
-    def default_priors(self) -> dict[str, Prior]:
-        """Default priors of all parameters: the contour's, the rig's and the noise's."""
+    def priors(self) -> dict[str, Distribution]:
+        """Priors of all unknown parameters: the contour's, the rig's and the noise's."""
         base = float(self.record.base_x.mean()), float(self.record.base_y.mean())
-        known = self.gauge is not None
-        of_contour = {} if known else contour_priors(self.shapes, base, rod_of(self.record).length)
-        return {**of_contour, **self.rig.priors, **self.noise.priors}
+        of_contour: dict[str, Distribution] = {}
+        if self.gauge is None:
+            usual = contour_priors(self.contours, base, rod_of(self.record).length)
+            of_contour = {name: self.own_family.priors.get(name, prior) for name, prior in usual.items()}
+        return {**of_contour, **self.nuisances.priors, **self.noise.priors}
 
     @cached_property
     def model(self) -> ContourModel:
-        """Prior times likelihood of all samples."""
-        priors = {**self.default_priors, **self.priors}
-        return ContourModel(self.record, self.shapes, self.rig, self.noise, priors)
+        """Prior times likelihood of all samples.
+
+        Raises
+        ------
+        ParameterError
+            If the rig was calibrated with another rod, load cell, frame or unit, or by this record.
+        """
+        if self.rig.calibration is not None:
+            refuse_other_rig(self.rig.calibration, self.about)
+        return ContourModel(self.record, self.contours, self.nuisances, self.noise, self.priors)
 
     @cached_property
     def shortened(self) -> Experiment:
@@ -131,76 +133,54 @@ class Experiment:
         noted = record.assign_attrs({_WHOLE: record_hash(self.record)})
         if cell.drift == self.noise.cell.drift:
             return replace(self, record=noted)
-        stated = self.load_cell or LoadCell.from_record(self.record) or cell
-        return replace(self, record=noted, load_cell=replace(stated, drift=cell.drift))
+        stated = self.rig.load_cell or LoadCell.from_record(self.record) or cell
+        return replace(self, record=noted, rig=replace(self.rig, load_cell=replace(stated, drift=cell.drift)))
 
     @property
     def about(self) -> dict[str, Any]:
         """Attributes of a posterior: record, assumptions and priors."""
         attrs, cell = self.record.attrs, self.noise.cell
+        known = {**self.own_family.known, **self.nuisances.known}
         return {
             "data_sha256": attrs.get(_WHOLE) or record_hash(self.record),
-            **({"family": self.family} if self.gauge is None else {"gauge": repr(self.gauge.known)}),
-            "friction": self.rig.friction,
-            "nuisances": json.dumps((*self.rig.names, *self.noise.of_discrepancy)),
+            **self._of_contour,
+            "rig": replace(self.rig, load_cell=self.rig.load_cell or LoadCell.from_record(self.record)).text,
+            "friction": self.nuisances.friction,
+            "known": json.dumps(known),
+            "nuisances": json.dumps((*self.nuisances.names, *self.noise.of_discrepancy)),
             "events": int(self.events),
-            "priors": priors_in_words({**self.default_priors, **self.priors}),
+            "priors": all_in_words(self.priors),
             "units": attrs["units"],
             "load_cell_frame": frame_of(self.record),
             **{name: attrs[name] for name in (CONTACT_SIDES, "blocks") if name in attrs},
             **rod_attributes(rod_of(self.record)),
-            **({} if self.rig.joint is None else self.rig.joint.entries),
+            **({} if self.nuisances.joint is None else self.nuisances.joint.entries),
             "approximations": "; ".join(cell.approximations),
             **{f"load_cell_{name}": v for name, v in cell.entries().items() if name not in self.noise.inferred},
         }
 
     @property
+    def _of_contour(self) -> dict[str, str]:
+        if self.gauge is not None:
+            return {"gauge": repr(self.gauge.known)}
+        return {"family": self.own_family.name, "family_parameters": self.own_family.text}
+
+    @property
     def assumptions(self) -> dict[str, str]:
         """Assumptions of simulations, as text, for the results store."""
-        cell = self.load_cell or self.noise.cell
+        cell, rod = self.rig.load_cell or self.noise.cell, self.rig.rod
+        said = {name: v if isinstance(v, float | str) else in_words(v) for name, v in self.rig.said.items()}
         return {
-            "family": self.family,
+            "family": self.own_family.name,
+            "contour": repr(self.own_family),
             "load_cell": json.dumps(cell.entries()),
             "load_cell_frame": cell.frame or "fixed",
-            "rod": "dimensionless" if self.rod is None else json.dumps(asdict(self.rod)),
-            "priors": priors_in_words(self.priors),
-            "nuisances": json.dumps(self.nuisances),
-            "friction": repr(self.friction),
+            "rod": "dimensionless" if rod is None else json.dumps(asdict(rod)),
+            "unknown": json.dumps(said),
+            "calibration": "none" if self.rig.calibration is None else json.dumps(self.rig.calibration.entries),
         }
 
 
 def usual_load_cell(rod: Rod) -> LoadCell:
     """Return a load cell with noise of 0.05 EI/L² and 0.02 EI/L, in the units of a rod."""
     return LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
-
-
-def default_priors(
-    measured: xr.Dataset,
-    family: str = "parabola",
-    load_cell: LoadCell | None = None,
-    nuisances: Sequence[str] = STANDARD,
-) -> dict[str, Prior]:
-    """Return the default priors of `infer_contour`, in the record's units; its notes describe them.
-
-    Parameters
-    ----------
-    measured, family, load_cell, nuisances
-        As in `infer_contour`.
-
-    Returns
-    -------
-    dict of str to frozen scipy.stats distribution
-
-    Raises
-    ------
-    RecordError, ParameterError
-        As in `infer_contour`.
-
-    Examples
-    --------
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> list(default_priors(scan(paper_profile("II", q=0.5)).record, nuisances=["friction"]))
-    ['a', 'q', 'x_c', 'friction', 'moment_noise', 'force_noise']
-    """
-    return Experiment(measured, family, load_cell, nuisances=nuisances).default_priors

@@ -9,7 +9,7 @@ from typing import Any
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_kind
 from tactile_bayes.contours import Circle, Contour, Parabola, Single
-from tactile_bayes.contours.family import Family, FamilyParameter
+from tactile_bayes.contours.family import ContourFamily, FamilyParameter
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import GAUGE
 
@@ -17,7 +17,7 @@ __all__ = ["Gauge"]
 
 
 @dataclass(frozen=True)
-class Gauge(Family):
+class Gauge(ContourFamily):
     """Family whose only contour is a known one.
 
     Parameters

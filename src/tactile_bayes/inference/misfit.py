@@ -64,7 +64,7 @@ def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, f
     --------
     >>> print(what_to_try(["circle"], ["friction", "drift", "lever_x", "lever_y", "backlash"]))
     It may be the family or the rig. Try another family (--family shape-free, or compare), or infer more of the rig \
-(--nuisance gain, suspension_compliance, rest_curvature, taper, stem, length).
+("default" under [unknown] of rig.toml: gain, suspension_compliance, rest_curvature, taper, stem, length).
     """
     suspects = (*_SUSPECTS, GAUGE) if GAUGE in families else _SUSPECTS
     left = [name for name in suspects if not is_inferred(name, nuisances)]
@@ -72,7 +72,7 @@ def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, f
         left.remove("friction")
     instead = " in place of rigidity_scale"  # which measures the same as all gains
     named = [f"{name}{instead}" if name == "gain" and "rigidity_scale" in nuisances else name for name in left]
-    more = f", or infer more of the rig (--nuisance {', '.join(named)})" if named else ""
+    more = f', or infer more of the rig ("default" under [unknown] of rig.toml: {", ".join(named)})' if named else ""
     if GAUGE in families:
         return f"It may be the gauge or the rig. Check the size of the gauge and its place from the pivot{more}."
     others = "another family (compare)" if _SMOOTH in families else "another family (--family shape-free, or compare)"

@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -37,13 +37,13 @@ from tactile_bayes.checks import (
     check_switch,
     refused,
 )
+from tactile_bayes.distributions import Distribution, check_distribution, support_of
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers, spawn
-from tactile_bayes.inference.parameters.priors import check_prior
 from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.mechanics.clamped_rod import base_curvature
 
-__all__ = ["Prior", "default_priors", "infer_point_load"]
+__all__ = ["default_priors", "infer_point_load"]
 
 _GEOMETRY = ("clamp_axial", "clamp_lateral", "clamp_angle", "compliance")
 _UNITS = {"clamp_axial": "mm", "clamp_lateral": "mm", "clamp_angle": "rad", "compliance": "mm"}
@@ -72,21 +72,12 @@ _SETTINGS = SamplerSettings(walkers=64)
 """Most of an evaluation does not depend on the number of points, so many walkers are cheap."""
 
 
-class Prior(Protocol):
-    """Protocol of a prior, which frozen distributions of scipy.stats satisfy."""
-
-    def logpdf(self, x: Any, /) -> Any: ...
-    def ppf(self, q: Any, /) -> Any: ...
-    def rvs(self, *, size: Any, random_state: Any) -> Any: ...
-    def support(self) -> Any: ...
-
-
 def _reach(axial: Floats, lateral: Floats) -> float:
     """Return the distance of the farthest probe point from the origin."""
     return float(np.hypot(axial, lateral).max())
 
 
-def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -> dict[str, Prior]:
+def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -> dict[str, Distribution]:
     """Return the default priors, from the probe points and the sensor's full scale.
 
     With reach R, the distance of the farthest probe point from the origin of the coordinates:
@@ -138,7 +129,7 @@ class _Model:
     unit_curvature: float
     """3/reach, the unit of the curvature in the powers of the sensor curve."""
     coefficient_sd: float
-    priors: Mapping[str, Prior]
+    priors: Mapping[str, Any]
     known: Mapping[str, float]
     small_deflection: bool
 
@@ -236,8 +227,7 @@ def _normal_approximation(model: _Model, seed: np.random.SeedSequence) -> tuple[
     centre, covariance = model.centre.copy(), np.zeros((model.centre.size, model.centre.size))
     geometry = model.geometry
     if geometry:
-        supports = [model.priors[model.names[i]].support() for i in geometry]
-        low, high = (np.array([float(ends[k]) for ends in supports]) for k in (0, 1))
+        low, high = np.array([support_of(model.priors[model.names[i]]) for i in geometry]).T
 
         def residuals(z: Floats, noise_sd: float) -> Floats:
             point = centre.copy()
@@ -258,7 +248,7 @@ def _normal_approximation(model: _Model, seed: np.random.SeedSequence) -> tuple[
     noise *= _rms(left, _POWERS + len(geometry))
     if "noise_sd" in model.names:
         i = model.names.index("noise_sd")
-        least, most = (float(end) for end in model.priors["noise_sd"].support())
+        least, most = support_of(model.priors["noise_sd"])
         centre[i] = min(max(noise, 1.01 * least), 0.99 * most)
         covariance[i, i] = centre[i] ** 2 / (2.0 * model.reading.size)
     return centre, covariance
@@ -321,8 +311,8 @@ def _checked(axial: ArrayLike, lateral: ArrayLike, reading: ArrayLike) -> tuple[
 
 
 def _split_priors(
-    priors: Mapping[str, Prior | float] | None, defaults: Mapping[str, Prior]
-) -> tuple[dict[str, Prior], dict[str, float]]:
+    priors: Mapping[str, Distribution | float] | None, defaults: Mapping[str, Distribution]
+) -> tuple[dict[str, Distribution], dict[str, float]]:
     """Return priors of unknown parameters, and values of known ones."""
     check_mapping("priors", priors, "give distributions, or numbers, by name")
     given = dict(priors or {})
@@ -330,14 +320,14 @@ def _split_priors(
     if surplus:
         raise ParameterError(f"no such parameter: {', '.join(surplus)}; there are {', '.join(defaults)}")
     known: dict[str, float] = {}
-    unknown: dict[str, Prior] = {}
+    unknown: dict[str, Distribution] = {}
     for name, default in defaults.items():
         prior: Any = given.get(name, default)
         number = as_number(prior)
         if number is not None:
             known[name] = number
         else:
-            check_prior(name, prior)
+            check_distribution(name, prior)
             unknown[name] = prior
     check_number("compliance", known.get("compliance", 0.0), "it cannot be negative", least=0.0)
     check_positive("noise_sd", known.get("noise_sd", 1.0), "give the scatter of repeated readings, or a prior")
@@ -352,7 +342,7 @@ def infer_point_load(
     reading: ArrayLike,
     *,
     seed: Seed,
-    priors: Mapping[str, Prior | float] | None = None,
+    priors: Mapping[str, Distribution | float] | None = None,
     full_scale: float | None = None,
     small_deflection: bool = False,
     settings: SamplerSettings | None = None,

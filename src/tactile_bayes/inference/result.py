@@ -19,6 +19,7 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
 from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
+from tactile_bayes.tasks.documents import read_json
 
 __all__ = [
     "STREAMED",
@@ -301,3 +302,17 @@ def to_arviz(posterior: xr.DataTree) -> Any:
     if int(arviz.__version__.split(".")[0]) >= 1:  # not by hasattr: it has names of former versions, too
         return posterior
     return arviz.from_datatree(posterior)
+
+
+def known_of(attrs: Mapping[Any, Any]) -> dict[str, float]:
+    """Return the known parameters that a posterior's attributes state: of the contour, and of the rig if not as stated.
+
+    Raises
+    ------
+    InferenceError
+        If they do not state them.
+    """
+    if "known" not in attrs:
+        raise InferenceError("the posterior does not state what was known: infer it again")
+    known: dict[str, float] = read_json(attrs["known"], "known")
+    return known

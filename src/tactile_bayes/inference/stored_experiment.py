@@ -2,39 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_mapping
-from tactile_bayes.errors import InferenceError
+from tactile_bayes.distributions import in_words
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.parameters.prior_text import is_prior_in_words, prior_in_words, prior_of_words
-from tactile_bayes.inference.parameters.priors import Prior
-from tactile_bayes.inference.parameters.rig_prior import RigPrior
+from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import contour_draws, record_of
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["experiment_of", "joint_of", "points_of", "predicted_points"]
+__all__ = ["experiment_of", "points_of", "predicted_points"]
 
 
-def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = None) -> Experiment:
+def experiment_of(posterior: xr.DataTree, family: Family | None = None, rig: Rig | None = None) -> Experiment:
     """Return the experiment of which a tree is the posterior.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contour`.
-    priors : mapping of str to frozen scipy.stats distribution, optional
-        The argument of `infer_contour`. By default priors follow from their text in the tree, which has six digits.
+    family, rig : Family and Rig, optional
+        Arguments of `infer_contour`. By default the posterior states them, unless a distribution is none of SciPy's.
 
     Raises
     ------
     InferenceError
-        If the tree is no result of `infer_contour`, or a prior does not follow from its text, or is not the stated one.
+        If the tree is no result of `infer_contour`.
+    ParameterError
+        If the posterior does not state its rig or family, or states other priors than the given ones.
 
     Examples
     --------
@@ -44,52 +44,24 @@ def experiment_of(posterior: xr.DataTree, priors: Mapping[str, Prior] | None = N
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
     >>> quick = SamplerSettings(ensembles=2, walkers=20, max_steps=20)
-    >>> tree = infer_contour(measured, nuisances=[], priors={"q": stats.uniform(0.4, 0.2)}, seed=1, settings=quick)
-    >>> prior_in_words(experiment_of(tree).priors["q"])
-    'uniform(0.4, 0.2)'
+    >>> narrow = Family("parabola", q=stats.uniform(0.4, 0.2))
+    >>> tree = infer_contour(measured, family=narrow, rig=Rig(unknown="nothing"), seed=1, settings=quick)
+    >>> experiment_of(tree).family
+    Family('parabola', q=uniform(0.4, 0.2))
     """
     contour_draws(posterior)
-    check_mapping("priors", priors, "give the argument of infer_contour, or None")
     attrs: dict[Any, Any] = posterior.attrs
-    lacking = {"priors", "nuisances", "friction"} - set(attrs)
-    if lacking:
-        raise InferenceError(f"the posterior does not state its {', '.join(sorted(lacking))}: infer it again")
-    experiment = Experiment(
+    found = Experiment(
         record_of(posterior),
-        str(attrs["family"]),
-        priors={},
-        friction=float(attrs["friction"]),
-        nuisances=read_json(attrs["nuisances"], "nuisances"),
+        Rig.of(posterior) if rig is None else rig_of(rig),
+        Family.of(posterior) if family is None else family_of(family),
         events=bool(attrs.get("events", 1)),
-        joint=joint_of(attrs),
     )
-    default, given = experiment.default_priors, {} if priors is None else dict(priors)
-    own: dict[str, Prior] = {}
-    for name, words in read_json(attrs["priors"], "priors").items():
-        if experiment.joint is not None and name in experiment.joint.priors:
-            continue
-        if name in given or name not in default or not is_prior_in_words(default[name], words):
-            own[name] = given.get(name) or prior_of_words(name, words)
-            if not is_prior_in_words(own[name], words):
-                raise InferenceError(f"the prior of {name} was {words}, not {prior_in_words(own[name])}: give that one")
-    return Experiment(
-        experiment.record,
-        experiment.family,
-        priors=own,
-        friction=experiment.friction,
-        nuisances=experiment.nuisances,
-        events=experiment.events,
-        joint=experiment.joint,
-    )
-
-
-def joint_of(attrs: Mapping[Any, Any]) -> RigPrior | None:
-    """Return the joint prior of the rig that the attributes of a posterior state; None without."""
-    if "rig_parameters" not in attrs:
-        return None
-    words = read_json(attrs["priors"], "priors")
-    own = {name: prior_of_words(name, words[name]) for name in read_json(attrs["rig_parameters"], "rig_parameters")}
-    return RigPrior.from_entries(attrs, own)
+    stated = read_json(attrs.get("priors", "{}"), "priors")
+    for name, prior in found.priors.items():
+        if stated.get(name) != (own := in_words(prior)):
+            raise ParameterError(f"the prior of {name} was {stated.get(name, 'none')}, not {own}: give that one")
+    return found
 
 
 def points_of(posterior: xr.DataTree, names: tuple[str, ...]) -> Floats:

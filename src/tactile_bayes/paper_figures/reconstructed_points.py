@@ -13,6 +13,7 @@ from tactile_bayes.plotting.legends import legend_entries, legend_entry, legend_
 from tactile_bayes.plotting.maps import draw_path, draw_pivot, outline
 from tactile_bayes.plotting.marks import BASES, PALETTE, SWEEP_MARKERS
 from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.rig.rig import Rig
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,7 +82,7 @@ def _draw_points(ax: Axes, made: Scan, distance: float, across: tuple[float, flo
     record = made.record
     if choice.load_cell is not None:
         record = choice.load_cell.measure(record, seed=choice.seed)
-    contacts = reconstruct(record, load_cell=choice.load_cell)
+    contacts = reconstruct(record, Rig(load_cell=choice.load_cell))
     ax.plot(*outline(made.contour, *across), color="0.55", linewidth=0.8, zorder=1.5, label="contour")
     last = {events.direction: events.snap_off.contact_x for events in made.sweeps}
     left, right = last.get("backward", np.inf), last.get("forward", -np.inf)

@@ -104,10 +104,10 @@ def amplification(plan: Plan) -> xr.Dataset:
     surface of possible contacts.
     """
     refined = plan if plan.drive_angles is not None else _refined(plan)
-    record, rod = refined.scan.record, plan.taken_rod
+    record, rod = refined.scan.record, plan.rod
     loaded = np.flatnonzero(record.truth_contact_phase.values != "none")
     chosen = record.isel(sample=loaded)
-    contacts, delta = _forward(refined, record, loaded), float(np.arctan(plan.taken_friction))
+    contacts, delta = _forward(refined, record, loaded), float(np.arctan(plan.friction))
     of_angle = plan.cell.drive_angle_deviation
     gains = (_raw(contacts), _constrained(contacts, delta, of_angle))
     both = [_along_and_across(contacts, gain, rod.surface) for gain in gains]
@@ -169,7 +169,7 @@ def _refined(plan: Plan) -> Plan:
 
 def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
     """Return some contacts of a record in the sweep frame."""
-    rod, cell = plan.taken_rod, plan.cell.dimensionless(plan.taken_rod)
+    rod, cell = plan.rod, plan.cell.dimensionless(plan.rod)
     units = rod.load_units
     loads = np.stack([record[name].values for name in CHANNELS], axis=-1) / units
     angle = record.drive_angle.values
@@ -185,7 +185,7 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
     slope = side * record.truth_slope_angle.values
     tip_angle = np.where(side < 0.0, np.pi - record.truth_tip_angle.values, record.truth_tip_angle.values)
     tip = record.truth_contact_phase.values == "tip"
-    delta = float(np.arctan(plan.taken_friction))
+    delta = float(np.arctan(plan.friction))
     coordinates = np.stack(
         [
             np.hypot(loads[:, 1], loads[:, 2]),

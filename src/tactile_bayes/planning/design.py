@@ -17,7 +17,6 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
     check_choice,
-    check_names,
     check_numbers,
     check_optional,
     check_probability,
@@ -28,21 +27,17 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.errors import ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour_events import events_of
-from tactile_bayes.inference.experiment import Experiment, usual_load_cell
-from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import (
     COARSE,
     Base,
     Knowledge,
-    empty_record,
     known_from_posterior,
     known_from_prior,
 )
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive, Rotation, drives_of
 from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
 
@@ -64,7 +59,8 @@ _NESTED = 400
 
 
 def design(
-    known: xr.DataTree | str = "parabola",
+    known: xr.DataTree | str | Family = "parabola",
+    rig: Rig | None = None,
     *,
     seed: int,
     bases: Sequence[tuple[float, float]] | None = None,
@@ -75,11 +71,6 @@ def design(
     draws: int = 24,
     span: tuple[float, float] | None = None,
     probability: float = 0.95,
-    load_cell: LoadCell | None = None,
-    rod: Rod | None = None,
-    friction: float | None = None,
-    nuisances: Sequence[str] = STANDARD,
-    priors: Mapping[str, Prior] | None = None,
     out: str | os.PathLike[str] | None = None,
     workers: int | None = 1,
     scheduler: str | None = None,
@@ -92,9 +83,12 @@ def design(
 
     Parameters
     ----------
-    known : xr.DataTree or str
-        Result of `infer_contour` for the records so far, for the next base or a second whisker of the same kind; or the
-        name of a family, of which only the prior is known.
+    known : xr.DataTree, str or Family
+        Result of `infer_contour` for the records so far, for the next base or a second whisker of the same kind; or a
+        family, as in `infer_contour`, of which only the prior is known.
+    rig : Rig, optional
+        As in `Plan`, if a family is given; a posterior has its own. Pivots are where they are planned: shifts of them
+        are left out, of a posterior, too.
     seed : int
         Seed of all random numbers.
     bases : sequence of (float, float), optional
@@ -117,8 +111,6 @@ def design(
         so far, or, for a prior, of sweeps from the origin; medians over the draws.
     probability : float
         Probability of the pointwise band, in (0, 1).
-    load_cell, rod, friction, nuisances, priors
-        As in `infer_contour`, if a family is given; a posterior has its own.
     out : path-like, optional
         Folder of the results store candidates.json: the same call resumes from it, or returns at once.
     workers, scheduler
@@ -174,8 +166,8 @@ def design(
     Examples
     --------
     >>> from scipy import stats
-    >>> priors = {"a": stats.lognorm(0.3, scale=0.6), "q": stats.uniform(0.4, 0.2), "x_c": stats.norm(0.0, 0.05)}
-    >>> found = design("parabola", priors=priors, bases=[(0.0, 0.0), (0.0, -0.3)], draws=4, seed=1)
+    >>> known = Family("parabola", a=stats.lognorm(0.3, scale=0.6), q=stats.uniform(0.4, 0.2), x_c=stats.norm(0, 0.05))
+    >>> found = design(known, bases=[(0.0, 0.0), (0.0, -0.3)], draws=4, seed=1)
     >>> bool(found.width[1] > found.width[0])  # farther away
     True
     """
@@ -185,17 +177,11 @@ def design(
     check_seed(seed)
     check_probability("probability", probability)
     rng = np.random.default_rng([int(seed), 1])
-    if isinstance(known, str):
-        cell, own = load_cell or usual_load_cell(rod or Rod()), {} if priors is None else priors
-        empty = empty_record([Rotation()], COARSE, rod, cell)
-        experiment = Experiment(empty, known, cell, own, rod, friction, nuisances)
-        knowledge = known_from_prior(experiment, draws=int(draws), rng=rng)
+    if isinstance(known, str | Family):
+        knowledge = known_from_prior(rig_of(rig), family_of(known), draws=int(draws), rng=rng)
+    elif rig is not None:
+        raise ParameterError("a rig and a posterior, which has its own: leave one of the two")
     else:
-        check_names("nuisances", nuisances)
-        given = {"load_cell": load_cell, "rod": rod, "friction": friction, "priors": priors}
-        taken = [name for name, value in given.items() if value is not None]
-        if taken:
-            raise ParameterError(f"{', '.join(taken)} and a posterior, which has its own: leave one of the two")
         knowledge = known_from_posterior(known, draws=int(draws), rng=rng)
     correction = "give angles in radians, from 1e-5 to 0.5"
     several = drive_steps if np.iterable(drive_steps) else [drive_steps]
@@ -295,7 +281,7 @@ def _labelled(question: Question, expected: Sequence[Expected], criterion: Crite
     return xr.Dataset(
         {**variables, "present_width": ((), _present_width(question), metres), "best": ((), best)},
         coords={"x": ("x", question.x, metres)},
-        attrs={"criterion": criterion, "probability": question.probability, "family": known.experiment.family},
+        attrs={"criterion": criterion, "probability": question.probability, "family": known.experiment.own_family.name},
     )
 
 

@@ -99,7 +99,7 @@ def _pivot(contour: Contour, plan: Plan, distance: float) -> tuple[float, float]
 def _expected(plan: Plan, probability: float) -> dict[str, float]:
     """Return the mean widths of the expected bands."""
     model, point = plan.model, plan.point
-    precision = record_information(model, point).matrix + np.diag(prior_precision(model))
+    precision = record_information(model, point).matrix + prior_precision(model)
     wide = band_factor(probability)
     widths: dict[str, list[Floats]] = {"touched": [], "gap": []}
     for stretch in stretches(plan.scan):

@@ -20,7 +20,6 @@ from tactile_bayes.checks import (
     check_names,
     check_number,
     check_numbers,
-    check_optional,
     check_probability,
     check_seed,
     check_whole_number,
@@ -28,15 +27,14 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
-from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.prior_text import priors_in_words
-from tactile_bayes.inference.parameters.priors import Prior
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.amplification import METHODS
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
+from tactile_bayes.planning.knowledge import unmeasured
 from tactile_bayes.planning.plan import Plan
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
 
 __all__ = ["CELLS", "error_map"]
@@ -57,17 +55,14 @@ _SHARES = ("posterior_touched_coverage", "posterior_gap_coverage", "posterior_fa
 
 def error_map(
     contours: Mapping[str, Contour] | Sequence[str] = ("II",),
+    rig: Rig | None = None,
     *,
     seed: int,
     distances: Sequence[float] = (0.5,),
     noise_factors: Sequence[float] = (0.1, 0.3, 1.0, 3.0),
-    load_cell: LoadCell | None = None,
-    rod: Rod | None = None,
     base_x: float = 0.0,
     drive_step: float = float(np.radians(2.0)),
-    friction: float | None = None,
-    nuisances: Sequence[str] = STANDARD,
-    priors: Mapping[str, Prior] | None = None,
+    family: Family | None = None,
     replicates: int = 20,
     posterior_cells: int = 0,
     posterior_replicates: int = 2,
@@ -84,22 +79,18 @@ def error_map(
     contours : mapping of str to Contour, or sequence of str
         Objects by name, in the unit of the rod's length; or names of the paper's profiles, for the dimensionless rod or
         scaled to the rod's length.
+    rig, family
+        As in `Plan`; a family is that of all contours.
     seed : int
         Seed of all random numbers; the results do not depend on the number of workers.
     distances : sequence of float
         Heights of the lowest point of each contour above the pivot [rod lengths].
     noise_factors : sequence of float
         Factors on the noise of the load cell.
-    load_cell : LoadCell, optional
-        By default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
-    rod, drive_step
-        As in `scan`; every cell is a forward and a backward sweep.
-    friction : float, optional
-        Coulomb's coefficient if it is known; by default the truth has none, and inference treats it as unknown.
     base_x : float
         Position of the pivot [length].
-    nuisances, priors
-        As in `infer_contour`, for expected bands and posteriors.
+    drive_step : float
+        As in `scan`; every cell is a forward and a backward sweep.
     replicates : int
         Number of records in each cell.
     posterior_cells : int
@@ -156,9 +147,9 @@ def error_map(
     >>> found.rms_across.sel(reconstruction="constrained").values.ravel().round(4) < 0.02
     array([ True,  True])
     """
-    check_optional("rod", rod, Rod)
-    rod_taken = rod or Rod()
-    objects = _objects(contours, rod_taken)
+    rig = rig_of(rig)
+    rod = rig.rod or Rod()
+    objects = _objects(contours, rod)
     distances, noise_factors = _grid("distances", distances), _grid("noise_factors", noise_factors)
     counts = {"replicates": (replicates, 1), "posterior_cells": (posterior_cells, 0)}
     counts["posterior_replicates"] = posterior_replicates, 1
@@ -167,19 +158,11 @@ def error_map(
     check_seed(seed)
     check_probability("probability", probability)
     cells = tuple(
-        MapCell(name, distance * rod_taken.length, factor)
+        MapCell(name, distance * rod.length, factor)
         for name, distance, factor in product(objects, distances, noise_factors)
     )
-    plan = Plan(
-        next(iter(objects.values())),
-        load_cell=load_cell,
-        rod=rod,
-        base=(check_number("base_x", base_x), 0.0),
-        drive_step=drive_step,
-        friction=friction,
-        nuisances=nuisances,
-        priors={} if priors is None else priors,
-    )
+    base = (check_number("base_x", base_x), 0.0)
+    plan, *_ = [Plan(each, rig, base=base, drive_step=drive_step, family=family) for each in objects.values()]
     chosen = np.unique(np.linspace(0, len(cells) - 1, min(posterior_cells, len(cells))).round().astype(int))
     task = MapTask(
         objects,
@@ -221,17 +204,12 @@ def _objects(contours: Mapping[str, Contour] | Sequence[str], rod: Rod) -> dict[
 def _identity(task: MapTask) -> dict[str, str]:
     """Return everything that determines the results, as text, for the results store."""
     plan = task.plan
-    return {
+    return unmeasured(plan.rig).assumptions | {
+        "family": repr(plan.family),
         "contours": json.dumps({name: repr(contour) for name, contour in task.contours.items()}),
         "cells": json.dumps([asdict(cell) for cell in task.cells]),
-        "load_cell": json.dumps(plan.cell.entries()),
-        "load_cell_frame": plan.cell.frame or "fixed",
-        "rod": "dimensionless" if plan.rod is None else json.dumps(asdict(plan.rod)),
         "base": repr(plan.base),
         "drive_step": repr(plan.drive_step),
-        "friction": repr(plan.friction),
-        "nuisances": json.dumps(list(plan.nuisances)),
-        "priors": priors_in_words(plan.priors),
         "replicates": repr(task.replicates),
         "posteriors": json.dumps(dict(task.posteriors)),
         "probability": repr(task.probability),
@@ -250,7 +228,7 @@ def _labelled(
     """Return the result of an error map; see `error_map`."""
     shape = len(names), len(distances), len(factors)
     dims = ("contour", "distance", "noise_factor")
-    si = not task.plan.taken_rod.is_dimensionless
+    si = not task.plan.rod.is_dimensionless
     length = {"units": "m" if si else "1"}
 
     def values(name: str) -> Any:

@@ -63,7 +63,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
     """
     model, point = plan.model, plan.point
     whole = record_information(model, point, slopes=plan.reading_slopes)
-    prior = np.diag(prior_precision(model))
+    prior = prior_precision(model)
     matrix = whole.matrix
     covariance = _inverse(matrix + prior)
     deviation = np.sqrt(np.diag(covariance))
@@ -115,7 +115,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
             "x": ("x", x, length),
         },
         attrs={
-            "family": plan.family,
+            "family": plan.experiment.own_family.name,
             "probability": probability,
             "readings": int(rows.shape[0]),
             "told": float(leverage.sum()),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,16 +14,17 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
+from tactile_bayes.inference.experiment import Experiment, usual_load_cell
+from tactile_bayes.inference.family import Family
+from tactile_bayes.inference.result import contour_draws, known_of, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import carried_sweeps, rod_of
+from tactile_bayes.record import rod_of
+from tactile_bayes.rig.rig import DEFAULT, NOTHING, Rig, Unknown
 from tactile_bayes.sweep import Drive, Rotation, record_template, recorded_drives
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["COARSE", "Base", "Knowledge", "empty_record", "known_from_posterior", "known_from_prior"]
+__all__ = ["COARSE", "Base", "Knowledge", "known_from_posterior", "known_from_prior", "unmeasured"]
 
 Base = tuple[float, float]
 
@@ -64,15 +65,11 @@ class Knowledge:
 
     def model_from(self, drives: Sequence[Drive], drive_step: float) -> ContourModel:
         """Return the model of an empty record by these drives."""
-        cell = self.experiment.noise.cell
-        return self.model(empty_record(drives, drive_step, self.experiment.rod, cell))
+        return self.model(_empty_record(drives, drive_step, self.rod, self.experiment.noise.cell))
 
     def model(self, record: xr.Dataset) -> ContourModel:
-        """Return the model of a record, empty or measured, without a backlash that it cannot determine."""
-        nuisances = self.experiment.nuisances
-        if nuisances != STANDARD and len(carried_sweeps(record)) == len(np.unique(record.sweep.values)):
-            nuisances = tuple(name for name in nuisances if name != "backlash")
-        return replace(self.experiment, record=record, nuisances=nuisances).model
+        """Return the model of a record, empty or measured, without the unknowns that it does not show."""
+        return replace(self.experiment, record=record).model
 
     def of(self, model: ContourModel) -> Knowledge:
         """Return the knowledge of the parameters of a model, some or all of these."""
@@ -84,7 +81,7 @@ class Knowledge:
         return replace(self, points=self.points[:, own], precision=np.linalg.inv(covariance))
 
 
-def empty_record(drives: Sequence[Drive], drive_step: float, rod: Rod | None, load_cell: LoadCell) -> xr.Dataset:
+def _empty_record(drives: Sequence[Drive], drive_step: float, rod: Rod, load_cell: LoadCell) -> xr.Dataset:
     """Return an empty record by these drives, rotations forward and backward.
 
     Rotations go from before any first contact to after any snap-off, where the object lies above the pivot.
@@ -93,12 +90,20 @@ def empty_record(drives: Sequence[Drive], drive_step: float, rod: Rod | None, lo
     return record_template(drives, ("forward", "backward"), angles, rod, load_cell)
 
 
-def known_from_prior(experiment: Experiment, *, draws: int, rng: np.random.Generator) -> Knowledge:
-    """Draw truths from an experiment's prior, restricted to contours within reach.
+def unmeasured(rig: Rig, family: Family | str = "parabola", drives: Sequence[Drive] = (Rotation(),)) -> Experiment:
+    """Return the experiment of an empty record by some drives, with the usual load cell if the rig states none."""
+    rod = rig.rod or Rod()
+    cell = rig.load_cell or usual_load_cell(rod)
+    return Experiment(_empty_record(drives, COARSE, rod, cell), replace(rig, load_cell=cell), family)
+
+
+def known_from_prior(rig: Rig, family: Family, *, draws: int, rng: np.random.Generator) -> Knowledge:
+    """Draw truths from the priors of a rig and a family, restricted to contours within reach.
 
     Parameters
     ----------
-    experiment : Experiment
+    rig : Rig
+    family : Family
     draws : int
         Number of draws.
     rng : np.random.Generator
@@ -110,7 +115,8 @@ def known_from_prior(experiment: Experiment, *, draws: int, rng: np.random.Gener
     ReachError
         If the rod hardly ever reaches a contour of the prior.
     """
-    _refuse_shape_free(experiment.family)
+    _refuse_shape_free(family.name)
+    experiment = unmeasured(replace(rig, unknown=_without_shifts(rig.entries)), family)
     points, _ = experiment.model.draw_prior(rng, draws)
     many, _ = experiment.model.draw_prior(rng, 1000)
     return Knowledge(experiment, points, _precision(many), ())
@@ -138,7 +144,6 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
     _refuse_shape_free(str(attrs["family"]))
     record = record_of(posterior)
     samples = posterior_draws(posterior)
-    rod = None if attrs["units"] == "dimensionless" else rod_of(record)
     cell = LoadCell.from_record(record) or LoadCell()
     unknown: dict[str, Any] = {n: float(samples[n].mean()) for n in ("force_noise", "moment_noise") if n in samples}
     cell = replace(cell, **unknown)
@@ -146,15 +151,29 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
     columns = {name: samples[name].values.ravel() for name in names}
     if unknown:
         columns["noise_scale"] = np.ones(samples[next(iter(unknown))].size)
-    nuisances = [name for name in read_json(attrs.get("nuisances", "[]"), "nuisances") if not name.startswith("base_")]
     drives = tuple(recorded_drives(record))
-    empty, friction = empty_record(drives, COARSE, rod, cell), float(attrs["friction"])
-    experiment = Experiment(empty, attrs["family"], cell, rod=rod, friction=friction, nuisances=nuisances)
+    scale: Unknown = DEFAULT if "noise_scale" in columns else 1.0
+    rig, family = _described(attrs)
+    experiment = unmeasured(
+        replace(rig.with_unknown(noise_scale=scale), rod=rod_of(record), load_cell=cell), family, drives
+    )
     every = np.stack([columns[name] for name in experiment.model.names], axis=1)
     if unknown:  # a constant scale would make the covariance singular
         every[:, experiment.model.names.index("noise_scale")] *= np.exp(0.05 * rng.standard_normal(len(every)))
     chosen = rng.choice(len(every), min(draws, len(every)), replace=False)
     return Knowledge(experiment, every[chosen], _precision(every), drives)
+
+
+def _described(attrs: Mapping[Any, Any]) -> tuple[Rig, Family]:
+    """Return the unknowns of a posterior's rig, except shifts of its pivots, and its family, under default priors."""
+    known, family = known_of(attrs), str(attrs["family"])
+    of_contour = {name: known.pop(name) for name in family_named(family).parameters if name in known}
+    inferred = dict.fromkeys(read_json(attrs.get("nuisances", "[]"), "nuisances"), DEFAULT)
+    return Rig(unknown={**NOTHING, **_without_shifts({**known, **inferred})}), Family(family, **of_contour)
+
+
+def _without_shifts(unknown: Mapping[str, Unknown]) -> dict[str, Unknown]:
+    return {name: value for name, value in unknown.items() if not name.startswith("base")}
 
 
 def _refuse_shape_free(family: str) -> None:

@@ -1,9 +1,9 @@
-"""A plan of sweeps: contour, drive, rod, load cell, and the unknowns of the rig."""
+"""A plan of sweeps: contour, rig and drive."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -13,23 +13,25 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_choice, check_names, check_optional, check_positive
+from tactile_bayes.checks import check_choice, check_optional, check_positive
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.base import check_single
 from tactile_bayes.errors import ClearanceWarning, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
-from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior, check_priors
+from tactile_bayes.inference.family import Family
+from tactile_bayes.inference.parameters.nuisances import deviating, stated_values
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import CERTAIN
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.family_parameters import family_parameters
 from tactile_bayes.planning.record_information import ReadingSlopes, reading_slopes
-from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.reconstruction import contacts_of
+from tactile_bayes.record import CHANNELS, validate, with_rod
+from tactile_bayes.rig.corrected import Corrected
+from tactile_bayes.rig.parameters import GROUPS
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive, Scan, scan
-from tactile_bayes.sweep.path import friction_angle_of
 from tactile_bayes.sweep.scanning import drives_of
 
 __all__ = ["Plan"]
@@ -37,49 +39,50 @@ __all__ = ["Plan"]
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A plan of sweeps: contour, drive, rod, load cell, and the unknowns of the rig.
+    """A plan of sweeps: contour, rig and drive.
 
     Parameters
     ----------
     contour : Contour
         A contour of a family with parameters, in the unit of the rod's length.
-    load_cell : LoadCell, optional
-        In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
-    rod : Rod, optional
-        By default the dimensionless rod.
+    rig : Rig, optional
+        As in `infer_contour`; by default with the dimensionless rod. Its load cell has by default force_noise
+        0.05 EI/L² and moment_noise 0.02 EI/L. A friction that is known acts in the sweeps; if it is unknown, they have
+        none.
     drive, base, direction, drive_step, drive_angles
         As in `scan`.
-    friction, nuisances, priors
-        As in `infer_contour`: a friction that is given is known; by default there is none, and inference treats it as
-        unknown. Priors of the contour's parameters may be given, too.
+    family : Family, optional
+        Family of the contour, with priors of its parameters; by default those of `infer_contour`.
 
     Raises
     ------
     ParameterError
-        If a channel has no noise or noise without a variance, or an argument has a wrong type.
+        If a channel has no noise or noise without a variance, a number that is known of the rig deviates from what rod
+        and load cell state, the contour is not of the given family, or an argument has a wrong type.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import paper_profile
+    >>> Plan(paper_profile("II", q=0.5), Rig(unknown="nothing")).model.names
+    ('a', 'q', 'x_c', 'noise_scale')
     """
 
     contour: Contour
-    load_cell: LoadCell | None = None
-    rod: Rod | None = None
+    rig: Rig = field(default_factory=Rig)
     drive: Drive | Sequence[Drive] | None = None
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0)
     direction: Literal["both", "forward", "backward"] = "both"
     drive_step: float | None = None
     drive_angles: ArrayLike | None = None
-    friction: float | None = None
-    nuisances: Sequence[str] = STANDARD
-    priors: Mapping[str, Prior] = field(default_factory=dict)
+    family: Family | None = None
 
     def __post_init__(self) -> None:
-        check_optional("rod", self.rod, Rod)
-        check_optional("load_cell", self.load_cell, LoadCell)
+        object.__setattr__(self, "rig", rig_of(self.rig))
         check_single("contour", self.contour)
         drives_of(self.drive, self.base)
         check_choice("direction", self.direction, ("both", "forward", "backward"))
-        friction_angle_of(0.0 if self.friction is None else self.friction)
-        check_priors("priors", self.priors)
-        object.__setattr__(self, "nuisances", tuple(check_names("nuisances", self.nuisances)))
+        self._refuse_deviations()
+        self._refuse_other_family()
         deviations = self.cell.standard_deviations
         silent = [name for name in CHANNELS if not 0.0 < deviations[name] < np.inf]
         if silent:
@@ -88,20 +91,43 @@ class Plan:
                 "unknown; give LoadCell(force_noise=..., moment_noise=...), from its data sheet, or from_zero_load"
             )
 
-    @property
-    def taken_rod(self) -> Rod:
-        """The rod, or the dimensionless one by default."""
-        return self.rod or Rod()
+    def _refuse_deviations(self) -> None:
+        """Refuse known numbers that the sweeps would not have."""
+        known = {n: v for n, v in self.rig.known.items() if n not in ("friction", *GROUPS["discrepancy"])}
+        if off := deviating(known, (), self.rod, self.cell):
+            name, value = next(iter(off.items()))
+            raise ParameterError(
+                f"{name} is known to be {value:g}, but a plan is of a rod and a load cell as stated: state it in one "
+                "of these, or leave it unknown"
+            )
+
+    def _refuse_other_family(self) -> None:
+        check_optional("family", self.family, Family, 'give Family("parabola", q=...), with priors of its parameters')
+        if self.family is None:
+            return
+        name, own = family_parameters(self.contour)
+        if self.family.name != name:
+            raise ParameterError(f"the family is {self.family.name}, but the contour is of the family {name}")
+        for parameter, value in self.family.known.items():
+            if value != own[parameter]:
+                raise ParameterError(
+                    f"{parameter} is known to be {value:g} in the family, but is {own[parameter]:g} in the contour"
+                )
 
     @property
-    def taken_friction(self) -> float:
-        """Coulomb's coefficient, 0 by default."""
-        return self.friction or 0.0
+    def rod(self) -> Rod:
+        """The rod of the rig, or the dimensionless one by default."""
+        return self.rig.rod or Rod()
+
+    @property
+    def friction(self) -> float:
+        """Coulomb's coefficient if it is known, else 0."""
+        return self.rig.known.get("friction", 0.0)
 
     @cached_property
     def cell(self) -> LoadCell:
-        """The load cell, or the usual one by default."""
-        return self.load_cell or usual_load_cell(self.taken_rod)
+        """The load cell of the rig, or the usual one by default."""
+        return self.rig.load_cell or usual_load_cell(self.rod)
 
     @cached_property
     def scan(self) -> Scan:
@@ -110,13 +136,12 @@ class Plan:
             warnings.filterwarnings("ignore", message=".* a turn ", category=ClearanceWarning)
             return scan(
                 self.contour,
+                Rig(rod=self.rod, unknown={"friction": self.friction}),
                 drive=self.drive,
                 direction=self.direction,
                 base=self.base,
                 drive_step=self.drive_step,
                 drive_angles=self.drive_angles,
-                rod=self.rod,
-                friction=self.taken_friction,
             )
 
     @cached_property
@@ -131,17 +156,14 @@ class Plan:
 
     def reconstruct(self, record: xr.Dataset, method: Literal["raw", "constrained"]) -> xr.Dataset:
         """Return the contact points of a record of this plan; see `tactile_bayes.reconstruct`."""
-        return reconstruct(record, method=method, load_cell=self.cell, rod=self.rod, friction=self.taken_friction)
-
-    @cached_property
-    def family(self) -> str:
-        """Family of the contour."""
-        return family_parameters(self.contour)[0]
+        check_choice("method", method, ("raw", "constrained"))
+        return contacts_of(Corrected(with_rod(validate(record), self.rig.rod), self.cell, self.friction), method)
 
     @cached_property
     def experiment(self) -> Experiment:
         """Inference from the record, with the contour's own family."""
-        return Experiment(self.record, self.family, self.cell, self.priors, self.rod, self.friction, self.nuisances)
+        family = self.family or Family(family_parameters(self.contour)[0])
+        return Experiment(self.record, replace(self.rig, load_cell=self.cell), family)
 
     @cached_property
     def model(self) -> ContourModel:
@@ -158,7 +180,7 @@ class Plan:
         """
         smooth = self.model.noise.of_discrepancy
         own = {**family_parameters(self.contour)[1], **dict(zip(smooth, self.model.prior_medians(smooth), strict=True))}
-        as_stated = {name: 1.0 for name in self.model.names if name.endswith(("_scale", "_gain"))}
+        as_stated = stated_values(self.rod, self.cell)
         return np.array([own.get(name, as_stated.get(name, 0.0)) for name in self.model.names])
 
     @cached_property
@@ -172,4 +194,4 @@ class Plan:
         noisier = replace(
             self.cell, force_noise=factor * self.cell.force_noise, moment_noise=factor * self.cell.moment_noise
         )
-        return replace(self, load_cell=noisier)
+        return replace(self, rig=replace(self.rig, load_cell=noisier))

@@ -158,9 +158,18 @@ def scaled_cell(cell: LoadCell, factors: Floats) -> LoadCell:
 
 
 def prior_precision(model: ContourModel) -> Floats:
-    """Return one over the variances of the priors, shape (d,); zero if the variance is infinite."""
+    """Return the precision of the priors, shape (d, d); zero for parameters whose variance is infinite.
+
+    It is that of normal distributions with the same standard deviations, and the correlations of a calibrated rig.
+    """
     variance = np.array([float(model.priors[name].std()) ** 2 for name in model.names])
-    return np.where(np.isfinite(variance) & (variance > 0.0), 1.0 / np.where(variance > 0.0, variance, 1.0), 0.0)
+    is_known = np.isfinite(variance) & (variance > 0.0)
+    precision = np.diag(np.where(is_known, 1.0 / np.where(is_known, variance, 1.0), 0.0))
+    if (joint := model.nuisances.joint) is not None:
+        own = np.array([model.names.index(name) for name in joint.priors], dtype=np.intp)
+        scale = np.sqrt(variance[own])
+        precision[np.ix_(own, own)] = np.linalg.inv(joint.correlation) / np.outer(scale, scale)
+    return precision
 
 
 def parameter_scales(model: ContourModel, point: Floats) -> Floats:

@@ -48,7 +48,7 @@ class _Band:
         model, point = plan.model, plan.point
         self._plan = plan
         self._slopes = height_slopes(model, point, x)
-        self._prior = np.diag(prior_precision(model))
+        self._prior = prior_precision(model)
         self._wide = band_factor(probability)
 
     def width(self, factor: float) -> float:
@@ -98,7 +98,7 @@ def required_noise(
     if np.any(wanted <= least):
         raise ParameterError(
             f"no noise gives a band of {wanted.min():g}: without any it would be {least:.3g} wide, by the unknowns "
-            "of the rig; give tighter priors, or leave out nuisances"
+            "of the rig; give tighter distributions, or state more of it as known"
         )
     factors = [
         math.inf
@@ -179,9 +179,9 @@ def required_rod(
     check_probability("probability", probability)
     check_positive("elastic_strain", elastic_strain)
     check_function("progress", progress)
-    if plan.rod is None or plan.rod.is_dimensionless or plan.load_cell is None:
+    if plan.rod.is_dimensionless or plan.rig.load_cell is None:
         raise ParameterError(
-            "a rod is sought for a load cell in N and N m: give a plan with a rod in SI, and a load_cell"
+            "a rod is sought for a load cell in N and N m: give a plan of a rig with a rod in SI, and a load_cell"
         )
     x = _grid_points(plan, where)
     dimensions = {
@@ -202,7 +202,8 @@ def required_rod(
         rod = Rod.circular(
             float(dimensions["length"][i]), float(dimensions["diameter"][j]), youngs_modulus, elastic_strain
         )
-        width[i, j], strain[i, j], status[i, j] = _judged(replace(plan, rod=rod), elastic_strain, x, probability)
+        other = replace(plan, rig=replace(plan.rig, rod=rod))
+        width[i, j], strain[i, j], status[i, j] = _judged(other, elastic_strain, x, probability)
         if progress is not None:
             progress(TaskProgress(done, width.size, done, time.monotonic() - began))
     usable = np.where(status == "ok", width, np.inf)

@@ -65,11 +65,11 @@ def rest_of_sweep(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, Stream, scan
+    >>> from tactile_bayes import LoadCell, Rig, Stream, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.05).record, seed=1)
-    >>> stream = Stream(load_cell=cell, nuisances=[], seed=1, particles=200)
+    >>> stream = Stream(rig=Rig(load_cell=cell, unknown="nothing"), seed=1, particles=200)
     >>> _ = stream.update(measured.isel(sample=slice(0, 30)))
     >>> more = rest_of_sweep(stream.posterior(), measured.drive_angle[30:55], [0.0, 0.1], seed=1)
     >>> bool((more.width < more.present_width).all())
@@ -94,7 +94,7 @@ def rest_of_sweep(
         )
     base = (float(last.base_x), float(last.base_y))
     cell = known.experiment.noise.cell
-    model = known.model(record_template([Rotation(base)], (direction,), angles, known.experiment.rod, cell))
+    model = known.model(record_template([Rotation(base)], (direction,), angles, known.rod, cell))
     own, factor = known.of(model), band_factor(probability)
     count = len(own.points)
     now, then = np.empty((count, at.size)), np.empty((count, at.size))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import xarray as xr
@@ -12,16 +12,13 @@ from numpy.typing import ArrayLike
 from tactile_bayes.checks import (
     check_function,
     check_names,
-    check_optional,
     check_probability,
     check_seed,
     check_whole_number,
     refused,
 )
 from tactile_bayes.contours import Contour, paper_profile
-from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.family_parameters import enlarged
@@ -30,6 +27,7 @@ from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise
 from tactile_bayes.planning.sensitivity_summary import sensitivity_summary
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive
 from tactile_bayes.tasks import TaskProgress
 
@@ -43,18 +41,15 @@ _WIDTHS = (0.0005, 0.001, 0.0025, 0.005, 0.01)
 
 def sensitivity(
     contour: Contour | None = None,
+    rig: Rig | None = None,
     *,
     seed: int,
-    load_cell: LoadCell | None = None,
-    rod: Rod | None = None,
     drive: Drive | Sequence[Drive] | None = None,
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
     direction: Literal["both", "forward", "backward"] = "both",
     drive_step: float | None = None,
     drive_angles: ArrayLike | None = None,
-    friction: float | None = None,
-    nuisances: Sequence[str] = STANDARD,
-    priors: Mapping[str, Prior] | None = None,
+    family: Family | None = None,
     band_widths: Sequence[float] | None = None,
     probability: float = 0.95,
     samples: int = 1024,
@@ -68,15 +63,12 @@ def sensitivity(
     contour : Contour, optional
         Contour of a family with parameters, in the unit of the rod's length; by default profile II of Merker et al.
         2018 (doi 10.1155/2018/1613945) at the distance 0.5 rod lengths.
+    rig, family
+        As in `Plan`.
     seed : int
         Seed of the samples by which Sobol' indices are estimated.
-    load_cell : LoadCell, optional
-        In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
-    rod, drive, base, direction, drive_step, drive_angles
+    drive, base, direction, drive_step, drive_angles
         As in `scan`.
-    friction, nuisances, priors
-        As in `infer_contour`: a friction that is given is known; by default there is none, and inference treats it as
-        unknown.
     band_widths : sequence of float, optional
         Mean widths of bands whose required noise is computed [length]; by default 0.0005 to 0.01 rod lengths.
     probability : float
@@ -122,28 +114,25 @@ def sensitivity(
     """
     if not set(check_names("parts", parts)) <= set(PARTS) or not parts:
         raise refused("parts", parts, f"give a list of some of {', '.join(PARTS)}")
-    check_optional("rod", rod, Rod)
     check_seed(seed)
     check_probability("probability", probability)
     check_whole_number("samples", samples, 1)
     check_function("progress", progress)
-    taken = rod or Rod()
+    rig = rig_of(rig)
+    rod = rig.rod or Rod()
     if contour is None:
-        contour = enlarged(paper_profile("II", q=0.5), taken.length)
+        contour = enlarged(paper_profile("II", q=0.5), rod.length)
     plan = Plan(
         contour,
-        load_cell=load_cell,
-        rod=rod,
+        rig,
         drive=drive,
         base=base,
         direction=direction,
         drive_step=drive_step,
         drive_angles=drive_angles,
-        friction=friction,
-        nuisances=nuisances,
-        priors={} if priors is None else priors,
+        family=family,
     )
-    widths = band_widths if band_widths is not None else [width * taken.length for width in _WIDTHS]
+    widths = band_widths if band_widths is not None else [width * rod.length for width in _WIDTHS]
     made_by: dict[str, Callable[[], xr.Dataset]] = {
         "amplification": lambda: amplification(plan),
         "information": lambda: information(plan, probability=probability),
@@ -161,8 +150,8 @@ def sensitivity(
     tree.attrs = {
         "contour": repr(contour),
         "units": plan.record.attrs["units"],
-        "rod_length": taken.length,
-        "rod_flexural_rigidity": taken.flexural_rigidity,
+        "rod_length": rod.length,
+        "rod_flexural_rigidity": rod.flexural_rigidity,
         "force_noise": plan.cell.force_noise,
         "moment_noise": plan.cell.moment_noise,
         "words": "\n".join(sensitivity_summary(tree, plan)),

@@ -65,11 +65,12 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from tactile_bayes import design as design_of
-    >>> from scipy import stats
-    >>> priors = {"a": stats.lognorm(0.3, scale=0.6), "q": stats.uniform(0.4, 0.2), "x_c": stats.norm(0.0, 0.05)}
     >>> from matplotlib.figure import Figure
-    >>> found = design_of("parabola", priors=priors, bases=[(0.0, 0.0), (0.2, 0.0)], draws=2, seed=1)
+    >>> from scipy import stats
+    >>> from tactile_bayes import Family
+    >>> from tactile_bayes import design as design_of
+    >>> known = Family("parabola", a=stats.lognorm(0.3, scale=0.6), q=stats.uniform(0.4, 0.2), x_c=stats.norm(0, 0.05))
+    >>> found = design_of(known, bases=[(0.0, 0.0), (0.2, 0.0)], draws=2, seed=1)
     >>> design(found, ax=Figure().subplots()).get_xlabel()
     'position of the pivot $x$ [$L$]'
     """

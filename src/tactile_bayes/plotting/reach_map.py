@@ -79,12 +79,12 @@ def prior_contours(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> prior_contours(infer_contour(measured, nuisances=[], seed=1, settings=quick)).get_ylabel()
+    >>> prior_contours(infer_contour(measured, rig=Rig(unknown="nothing"), seed=1, settings=quick)).get_ylabel()
     '$y$ [$L$]'
     """
     from tactile_bayes.inference.contour import contours_of
@@ -132,12 +132,12 @@ def posterior_contours(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> posterior_contours(infer_contour(measured, nuisances=[], seed=1, settings=quick)).get_ylabel()
+    >>> posterior_contours(infer_contour(measured, rig=Rig(unknown="nothing"), seed=1, settings=quick)).get_ylabel()
     '$y$ [$L$]'
     """
     from tactile_bayes.inference.contour import contours_of

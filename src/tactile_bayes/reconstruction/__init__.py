@@ -12,7 +12,7 @@ from tactile_bayes.reconstruction.sides import (
     sides_and_doubts,
     with_sides,
 )
-from tactile_bayes.reconstruction.step2 import reconstruct
+from tactile_bayes.reconstruction.step2 import contacts_of, reconstruct
 
 __all__ = [
     "AXIAL_ALARM",
@@ -22,6 +22,7 @@ __all__ = [
     "STATUSES",
     "Samples",
     "contact_sides",
+    "contacts_of",
     "doubtful_sweeps",
     "loaded_samples",
     "reconstruct",

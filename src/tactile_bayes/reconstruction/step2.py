@@ -10,12 +10,11 @@ import xarray as xr
 from scipy.special import chdtrc
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_choice, check_number, check_optional, refused
+from tactile_bayes.checks import check_choice, check_number, refused
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.reconstruction.axial_score import axial_score
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
@@ -25,11 +24,16 @@ from tactile_bayes.reconstruction.samples import Samples, samples_of
 from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_doubts, with_sides
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
 from tactile_bayes.record.schema import column_attributes
+from tactile_bayes.rig.corrected import Corrected, corrected
+from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["reconstruct"]
+__all__ = ["contacts_of", "reconstruct"]
 
 _METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")
+_PHYSICAL = ("m", "N", "N m", "1/m")
+"""Units of what is dimensionless in a dimensionless record."""
+
 _NO_CONTACT = 25.0
 """Bound on the misfit of a loaded sample; the value for a sample without a contact."""
 _TWENTY_TO_ONE = 6.0
@@ -42,13 +46,7 @@ _CLEAR = 3.0
 
 
 def reconstruct(
-    measured: xr.Dataset,
-    *,
-    method: Literal["raw", "constrained"] = "raw",
-    load_cell: LoadCell | None = None,
-    rod: Rod | None = None,
-    friction: float = 0.0,
-    suspension_compliance: float = 0.0,
+    measured: xr.Dataset, rig: Rig | None = None, *, method: Literal["raw", "constrained"] = "raw"
 ) -> xr.Dataset:
     """Reconstruct contact point, arc length, slope and phase from every sample of a record, with their uncertainty.
 
@@ -64,20 +62,14 @@ def reconstruct(
     ----------
     measured : xr.Dataset
         A record with all three load channels.
+    rig : Rig, optional
+        Rod and load cell, by default those that the record states, with the deviations that are known: the record is
+        first corrected for them, and for the data sheet's bias, gain and encoder offset. Friction is 0 unless it is
+        known. A sample is loaded if its squared Mahalanobis distance from zero load is one that noise alone exceeds in
+        1 of 1000 samples; without any noise level every sample whose load is not exactly zero is loaded, and there are
+        no standard deviations. A turn of a compliant suspension by the error of the moment is neglected.
     method : {"raw", "constrained"}
         How a contact is determined from four noisy numbers.
-    load_cell : LoadCell, optional
-        Load cell in the record's units; by default the data sheet in the record's attributes, if any. A sample is
-        loaded if its squared Mahalanobis distance from zero load is one that noise alone exceeds in 1 of 1000 samples.
-        Without any noise level every sample whose load is not exactly zero is loaded, and there are no standard
-        deviations. The record is first corrected for bias, gain and the encoder's offset.
-    rod : Rod, optional
-        Rod in place of the one that an SI record states.
-    friction : float
-        Coulomb's coefficient μ of the sliding rod, at most 0.84.
-    suspension_compliance : float
-        Turn of the pivot's suspension per holding moment [rad/(N m), or rad/(EI/L)]; the turn by the error of the
-        moment is neglected.
 
     Returns
     -------
@@ -161,26 +153,43 @@ def reconstruct(
     constrained 0.0033
     """
     check_choice("method", method, _METHODS)
+    rig = rig_of(rig)
+    measured = with_rod(validate(measured), rig.rod)
+    cell = rig.load_cell or LoadCell.from_record(measured) or LoadCell()
+    return contacts_of(corrected(measured, cell, rig.known), method)
+
+
+def contacts_of(found: Corrected, method: Literal["raw", "constrained"]) -> xr.Dataset:
+    """Return the contacts of a record of a valid rig; see `reconstruct`.
+
+    Raises
+    ------
+    RecordError, ParameterError
+        As in `reconstruct`.
+    """
+    measured, cell, friction = found.record, found.load_cell, found.friction
     most = float(np.tan(MAX_FRICTION_ANGLE))
     check_number("friction", friction, f"give Coulomb's coefficient, from 0 to {most:.2f}", least=0.0, most=most)
-    check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
-    measured = with_rod(validate(measured), rod)
-    check_number("suspension_compliance", suspension_compliance, "give a number from 0 up", least=0.0)
-    if suspension_compliance * float(np.abs(np.nan_to_num(measured.holding_moment.values)).max()) > 2.0 * np.pi:
+    compliance = found.suspension_compliance
+    if compliance * float(np.abs(np.nan_to_num(measured.holding_moment.values)).max()) > 2.0 * np.pi:
         correction = "with such moments the pivot would give way by more than a turn: give radians per moment"
-        raise refused("suspension_compliance", suspension_compliance, correction)
-    cell = load_cell or LoadCell.from_record(measured) or LoadCell()
-    measured, doubtful = _with_likelier_sides(measured, cell, suspension_compliance, friction)
-    samples = samples_of(measured, cell, suspension_compliance)
+        raise refused("suspension_compliance", compliance, correction)
+    measured, doubtful = _with_likelier_sides(measured, cell, compliance, friction)
+    samples = samples_of(measured, cell, compliance)
     estimate = _METHODS[method](samples, samples.friction_angles(friction))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
-    return kept.assign(_variables(estimate, samples, measured)).assign_attrs(
+    contacts = kept.assign(_variables(estimate, samples, measured)).assign_attrs(
         method=method,
         friction=friction,
-        units=measured.attrs["units"],
+        units=found.units,
         **({"doubtful_sides": json.dumps(doubtful)} if doubtful else {}),
         **_check(estimate, samples, cell, friction),
     )
+    if found.units != measured.attrs["units"]:
+        for variable in contacts.variables.values():
+            if variable.attrs.get("units") in _PHYSICAL:
+                variable.attrs["units"] = "1"
+    return contacts
 
 
 def _with_likelier_sides(

@@ -66,8 +66,8 @@ def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
     if absent:
         raise source.error(
             f"the record is {units}, but {' and '.join(absent)} of its rod {'are' if absent[1:] else 'is'} not stated: "
-            "give rod=Rod(length=..., flexural_rigidity=...), on the command line --length and --flexural-rigidity, "
-            "or state them as attributes (in a CSV file by header lines '# rod_length: 0.1 [m]' and "
+            "give rod=Rod(length=..., flexural_rigidity=...), length and flexural_rigidity under [rod] of rig.toml, or "
+            "state them as attributes (in a CSV file by header lines '# rod_length: 0.1 [m]' and "
             "'# rod_flexural_rigidity: 1.2e-05 [N m²]')"
         )
     length = _quantity("rod_length", attrs["rod_length"], source)

@@ -8,10 +8,11 @@ import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from tactile_bayes.checks import check_choice, check_kind, check_mapping, check_optional, check_path, check_switch
+from tactile_bayes.checks import check_path
 from tactile_bayes.errors import RecordError, RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.bag import is_bag, read_bag_table
@@ -19,11 +20,15 @@ from tactile_bayes.record.construction import completed_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
 from tactile_bayes.record.origin import ORIGIN, renamed
-from tactile_bayes.record.schema import FRAMES, Frame
+from tactile_bayes.record.reading import Reading
+from tactile_bayes.record.schema import Frame
 from tactile_bayes.record.sweep_segments import split_at_turns
 from tactile_bayes.record.table import Table
 from tactile_bayes.record.units import assumed_units, in_units_of_record
 from tactile_bayes.record.validation import validate
+
+if TYPE_CHECKING:
+    from tactile_bayes.rig import Rig
 
 __all__ = ["read_record", "record_in", "refuse_no_file", "write_record"]
 
@@ -33,6 +38,7 @@ _WRITERS = {".csv": write_csv, ".nc": write_netcdf_record}
 
 def read_record(
     path: str | os.PathLike[str],
+    rig: Rig | None = None,
     *,
     columns: Mapping[str, str] | None = None,
     split_sweeps: bool = False,
@@ -58,14 +64,18 @@ def read_record(
     ----------
     path : path-like
         A file with suffix .csv or .nc.
+    rig : Rig, optional
+        The rig that wrote the file: its `file` states columns, split_sweeps and missing, its rod and its load cell what
+        the file does not state. A rod without a length gives the shape of the one that the file states. What is given
+        beside it comes first.
     columns : mapping of str to str, optional
         Source of a column of a record in the file: `NAME`, or `NAME[UNIT]` if the file does not state the unit. A minus
-        before it, `-NAME[UNIT]`, reverses the sign, and a number with a sign shifts the zero, in the same unit:
-        `90-NAME[deg]` or `NAME[mN]+12.5`. For base_x, base_y, drive_angle, sweep and direction one value for all
-        samples can be given, as "12[mm]", "90[deg]", "0" or "forward"; so can a line of the header, `# drive_angle: 90
-        [deg]`, for a rod that is clamped while its base is carried. A unit in the name of a column may be left out.
-        Further columns keep their names, except for a slash, which no NetCDF file can store: "Temp / °C" becomes "Temp
-        [°C]", and another slash "|".
+        before it, `-NAME[UNIT]`, reverses the sign, a factor scales it to the unit, `1e-3*NAME[N]`, and a number with a
+        sign shifts the zero, in the same unit: `90-NAME[deg]` or `NAME[mN]+12.5`. For base_x, base_y, drive_angle,
+        sweep and direction one value for all samples can be given, as "12[mm]", "90[deg]", "0" or "forward"; so can a
+        line of the header, `# drive_angle: 90 [deg]`, for a rod that is clamped while its base is carried. A unit in
+        the name of a column may be left out. Further columns keep their names, except for a slash, which no NetCDF file
+        can store: "Temp / °C" becomes "Temp [°C]", and another slash "|".
     split_sweeps : bool
         Whether to derive the columns sweep and direction from the drive angle if the file lacks them. A sweep ends
         where the angle returns from an extreme by more than a tenth of its whole range, or where the pivot moves; its
@@ -131,20 +141,13 @@ def read_record(
     'SI'
     """
     path = check_path("path", path)
-    check_mapping("columns", columns, "give names by column of a record, like {'force_x': 'Fx[mN]'}")
-    for column, origin in (columns or {}).items():
-        check_kind(f"columns[{column!r}]", origin, str, "give what stands for it, like 'Fx[mN]'")
-    check_switch("split_sweeps", split_sweeps)
-    check_optional("the rod", rod, Rod)
-    if load_cell_frame is not None:
-        check_choice("load_cell_frame", load_cell_frame, FRAMES)
+    reading = Reading.of(rig, columns, split_sweeps, rod, missing, load_cell_frame)
     if not path.exists():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
-    columns = columns or {}
     if not is_bag(path):
         refuse_no_file(path)
-    table = (read_bag_table if is_bag(path) else _READERS[_suffix(path)])(path, columns)
-    record = record_in(table, columns, split_sweeps, rod, missing, load_cell_frame)
+    table = (read_bag_table if is_bag(path) else _READERS[_suffix(path)])(path, reading.columns)
+    record = record_in(table, reading)
     for note in record.encoding["notes"]:
         warnings.warn(f"{path}: {note}", RecordWarning, stacklevel=2)
     return record
@@ -161,27 +164,21 @@ def refuse_no_file(path: Path) -> None:
         )
 
 
-def record_in(
-    table: Table,
-    columns: Mapping[str, str],
-    split_sweeps: bool,
-    rod: Rod | None,
-    missing: Collection[str],
-    load_cell_frame: Frame | None,
-) -> xr.Dataset:
-    """Return the record in a table as it was read; arguments are those of `read_record`.
+def record_in(table: Table, reading: Reading) -> xr.Dataset:
+    """Return the record in a table as it was read.
 
     Its encoding has "notes", what was assumed or left out, and "remarks", commented lines without a meaning.
     """
+    columns, rod = reading.columns, reading.rod
     if "drive_angle" in table.attrs and "drive_angle" not in {*columns, *table.columns}:
         columns = {**columns, "drive_angle": str(table.attrs["drive_angle"])}
         attrs = {name: value for name, value in table.attrs.items() if name != "drive_angle"}
         table = replace(table, attrs=attrs)
     table = in_units_of_record(renamed(table, columns), rod)
-    if split_sweeps:
+    if reading.split_sweeps:
         stated = table.attrs.get("rod_length", 1.0) if rod is None else rod.length
         table = split_at_turns(table, float(stated) if isinstance(stated, int | float) else 1.0)
-    record = completed_record(table, rod, missing, load_cell_frame)
+    record = reading.shaped(completed_record(table, rod, reading.missing, reading.load_cell_frame))
     if rod is None and "units" not in table.attrs:
         record.attrs["units_source"] = "assumed"
     notes = [*table.source.notes]

@@ -9,7 +9,7 @@ import time
 from collections.abc import Collection, Mapping
 from itertools import pairwise
 from statistics import median
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -20,8 +20,12 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record.csv_format import read_csv_content
 from tactile_bayes.record.files import record_in, refuse_no_file
+from tactile_bayes.record.reading import Reading
 from tactile_bayes.record.schema import Frame
 from tactile_bayes.record.sweep import carried_sweeps
+
+if TYPE_CHECKING:
+    from tactile_bayes.rig import Rig
 
 __all__ = ["GrowingRecord", "Growth"]
 
@@ -69,7 +73,7 @@ class GrowingRecord:
     ----------
     path : path-like
         A file with suffix .csv.
-    columns, split_sweeps, rod, missing, load_cell_frame
+    rig, columns, split_sweeps, rod, missing, load_cell_frame
         As in `read_record`. With `split_sweeps` the sweeps of former samples may change.
 
     Raises
@@ -93,6 +97,7 @@ class GrowingRecord:
     def __init__(
         self,
         path: str | os.PathLike[str],
+        rig: Rig | None = None,
         *,
         columns: Mapping[str, str] | None = None,
         split_sweeps: bool = False,
@@ -104,8 +109,7 @@ class GrowingRecord:
         refuse_no_file(self._path)
         if self._path.suffix.lower() != ".csv":
             raise RecordError(f"{self._path}: only a .csv file can be followed while it grows")
-        self._columns = {} if columns is None else columns
-        self._split_sweeps, self._rod, self._missing, self._frame = split_sweeps, rod, missing, load_cell_frame
+        self._reading = Reading.of(rig, columns, split_sweeps, rod, missing, load_cell_frame)
         self._seen: tuple[int, int, int] | None = None
         self._content = b""
         self._left_out: set[int] = set()
@@ -162,10 +166,10 @@ class GrowingRecord:
                 return None  # not even the names of columns
             try:
                 file = io.BytesIO(b"\n".join(lines))
-                table = read_csv_content(file, str(self._path), self._columns)
+                table = read_csv_content(file, str(self._path), self._reading.columns)
                 if not table.samples:
                     return None
-                record = record_in(table, self._columns, self._split_sweeps, self._rod, self._missing, self._frame)
+                record = record_in(table, self._reading)
                 break
             except RecordError as error:
                 wrong = sorted(set(error.lines) - self._left_out)

@@ -1,11 +1,10 @@
-"""The origin of a column in a file: its name, unit, sign and zero."""
+"""The origin of a column in a file: its name, unit, factor, sign and zero."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
-import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -26,7 +25,7 @@ __all__ = [
     "ORIGIN",
     "Origin",
     "any_meant",
-    "column_option",
+    "column_entry",
     "found_column",
     "meant_kinds",
     "origins_of",
@@ -43,6 +42,7 @@ CONSTANTS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 
 _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _LEAD = re.compile(rf"(?:(?P<offset>[+-]?{_NUMBER})\s*)?(?P<sign>[+-])\s*+(?P<rest>.+)")
+_FACTOR = re.compile(rf"(?P<factor>{_NUMBER})\s*\*\s*+(?P<rest>.+)")
 _TRAIL = re.compile(rf"(?P<rest>.*?\S)\s*(?P<sign>[+-])\s*(?P<offset>{_NUMBER})")
 _BRACKETS = re.compile(r"(?P<rest>.*\S)\s*\[(?P<unit>[^\[\]]*)\]")
 _VALUE = re.compile(rf"(?P<number>[+-]?{_NUMBER})\s*(?:\[(?P<unit>[^\[\]]*)\])?")
@@ -53,20 +53,22 @@ _UNIT_IN_NAME = re.compile(
 
 @dataclass(frozen=True)
 class Origin:
-    """Origin of a column of a record: offset + sign · (a column of the file), or one value for all samples.
+    """Origin of a column of a record: offset + sign · factor · (a column of the file), or one value for all samples.
 
     Parameters
     ----------
     column : str or None
         Column of the file; None for a value.
     unit : str or None
-        Unit of column and offset, if it is given with the column or in its name.
+        Unit of column (times factor) and offset, if it is given with the column or in its name.
     sign : {1, -1}
         −1 for an opposite sign in the file.
     offset : float
         Offset that is added.
     value : str, float, int or None
         Value for all samples.
+    factor : float
+        Positive number by which the column is multiplied.
     """
 
     column: str | None
@@ -74,17 +76,23 @@ class Origin:
     sign: int = 1
     offset: float = 0.0
     value: str | float | None = None
+    factor: float = 1.0
 
     def __str__(self) -> str:
         """Return the origin in the form that `read_record` takes, without the unit."""
         if self.column is None:
             return str(self.value)
         sign = "-" if self.sign < 0 else "+" if self.offset else ""
-        return f"{f'{self.offset:.15g}' if self.offset else ''}{sign}{self.column}"
+        return f"{f'{self.offset:.15g}' if self.offset else ''}{sign}{self.scaled}"
+
+    @property
+    def scaled(self) -> str:
+        """Text of the column with its factor."""
+        return f"{self.column}" if self.factor == 1.0 else f"{self.factor:.15g}*{self.column}"
 
 
-def column_option(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, digits: int = 3) -> str:
-    """Return the option of a command that reads a column of a record as sense · (its values) + added.
+def column_entry(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, digits: int = 3) -> str:
+    """Return the source that reads a column of a record as sense · (its values) + added, as `read_record` takes it.
 
     Parameters
     ----------
@@ -99,12 +107,12 @@ def column_option(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, d
     Returns
     -------
     str
-        Quoted for a shell; "" if the origin does not have the unit of the record, as after a conversion by the rod.
+        "" if the origin does not have the unit of the record, as after a conversion by the rod.
 
     Examples
     --------
-    >>> column_option(xr.DataArray([0.0], name="force_y", attrs={"units": "N"}), added=0.01824)
-    '--column force_y=force_y+0.0182'
+    >>> column_entry(xr.DataArray([0.0], name="force_y", attrs={"units": "N"}), added=0.01824)
+    'force_y+0.0182'
     """
     name, unit = str(column.name), str(column.attrs.get("units", "1"))
     stored = column.encoding.get(ORIGIN) or column.attrs.get(ORIGIN)
@@ -116,9 +124,9 @@ def column_option(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, d
     if number:
         number = round(number, digits - 1 - math.floor(math.log10(abs(number))))
     read = replace(origin, sign=sense * origin.sign, offset=sense * origin.offset + number)
-    trailing = read.sign > 0 and read.offset
-    text = f"{read.column}{read.offset:+.12g}" if trailing else str(replace(read, offset=round(read.offset, 12)))
-    return f"--column {shlex.quote(f'{name}={text}')}"
+    if read.sign > 0 and read.offset:
+        return f"{read.scaled}{read.offset:+.12g}"
+    return str(replace(read, offset=round(read.offset, 12)))
 
 
 def with_origin(column: xr.DataArray) -> xr.DataArray:
@@ -149,7 +157,7 @@ def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source)
     Examples
     --------
     >>> origins_of({"force_x": "-Fx[mN]", "drive_angle": "90-Angle[deg]"}, ["Fx", "Angle"], Source())["drive_angle"]
-    Origin(column='Angle', unit='deg', sign=-1, offset=90.0, value=None)
+    Origin(column='Angle', unit='deg', sign=-1, offset=90.0, value=None, factor=1.0)
     """
     names = list(names)
     origins = {target: _origin(target, str(text), names, source) for target, text in columns.items()}
@@ -232,6 +240,8 @@ def _cells(target: str, origin: Origin, found: Cells, is_shared: bool, source: S
     values = parsed_column(target, values, source)
     if is_shared:
         values = values.copy()
+    if origin.factor != 1.0:
+        values *= origin.factor
     if origin.sign < 0:
         np.negative(values, out=values)
     if origin.offset:
@@ -287,13 +297,21 @@ def _readings(text: str) -> Iterator[Origin]:
     if match := _LEAD.fullmatch(text):
         starts.append((match["offset"] or "", -1 if match["sign"] == "-" else 1, match["rest"]))
     for lead, sign, rest in starts:
-        for trail, name in _with_and_without_trail(rest):
-            offset = float(lead or 0) + float(trail or 0)
-            yield Origin(name, None, sign, offset)
-            if match := _BRACKETS.fullmatch(name):
-                unit = match["unit"].strip()
-                for shift, stem in _with_and_without_trail(match["rest"]):
-                    yield Origin(stem, unit, sign, offset + float(shift or 0))
+        for factor, named in _with_and_without_factor(rest):
+            for trail, name in _with_and_without_trail(named):
+                offset = float(lead or 0) + float(trail or 0)
+                yield Origin(name, None, sign, offset, factor=factor)
+                if match := _BRACKETS.fullmatch(name):
+                    unit = match["unit"].strip()
+                    for shift, stem in _with_and_without_trail(match["rest"]):
+                        yield Origin(stem, unit, sign, offset + float(shift or 0), factor=factor)
+
+
+def _with_and_without_factor(text: str) -> Iterator[tuple[float, str]]:
+    """Yield the text as it is, and what a number with an asterisk multiplies."""
+    yield 1.0, text
+    if match := _FACTOR.fullmatch(text):
+        yield float(match["factor"]), match["rest"]
 
 
 def _with_and_without_trail(text: str) -> Iterator[tuple[str, str]]:
@@ -324,11 +342,13 @@ def _checked(target: str, column: Column, origin: Origin, is_whole: bool, text: 
     Brackets that are no unit may be part of a name that is given as a whole.
     """
     if column.kind != "number":
-        if origin.unit is not None or origin.sign < 0 or origin.offset:
+        if origin.unit is not None or origin.sign < 0 or origin.offset or origin.factor != 1.0:
             raise ParameterError(
-                f"columns: {text!r} is given for {target!r}, which has no unit, sign or zero: give a name alone"
+                f"columns: {text!r} is given for {target!r}, which has no unit, factor, sign or zero: give a name alone"
             )
         return origin
+    if not 0.0 < origin.factor < math.inf:
+        raise ParameterError(f"columns: {text!r} is given for {target!r}: give a factor above zero, like 1e-3*Fx[N]")
     assert origin.column is not None
     _, in_name = _stem_and_unit(origin.column)
     if in_name is None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Any
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.record.quantity import unit_of
+from tactile_bayes.record.rig_entry import rig_entry
 from tactile_bayes.record.schema import DIRECTIONS, LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source
 
@@ -109,9 +109,8 @@ def _counted_on(angle: Floats, sample: int, stated: str, scale: float, source: S
 
 
 def _given(origin: str) -> str:
-    """Return the origin of a drive angle as an argument and as an option."""
-    option = shlex.quote(f"drive_angle={origin}")
-    return f"columns={{'drive_angle': {origin!r}}} of read_record, on the command line --column {option}"
+    """Return the origin of a drive angle as an argument and as an entry of a rig's file."""
+    return f"columns={{'drive_angle': {origin!r}}} of read_record, or {rig_entry('drive_angle', origin)}"
 
 
 def carried_sweeps(record: xr.Dataset) -> tuple[int, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import operator
-import shlex
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -17,6 +16,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod, without_rod
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
+from tactile_bayes.record.rig_entry import rig_entry
 from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED, UNITS, column_of
 from tactile_bayes.record.table import Cells, Source, Table
 from tactile_bayes.record.validation import validate
@@ -55,7 +55,8 @@ def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
     record : xr.Dataset
         A record.
     rod : Rod, optional
-        Rod in the units of the record; by default the record is returned unchanged.
+        Rod in the units of the record; by default the record is returned unchanged. Beside an SI record one without a
+        length gives the shape of its rod.
 
     Returns
     -------
@@ -71,6 +72,9 @@ def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
         return record
     if record.attrs["units"] == "dimensionless" and not rod.is_dimensionless:
         raise ParameterError(f"the record is dimensionless, so {rod} does not fit it: leave the rod out, or use to_si")
+    if record.attrs["units"] == "SI" and rod.is_dimensionless:
+        shape = {name: value for name, value in vars(rod).items() if value != getattr(Rod(), name)}
+        rod = replace(rod_of(record), **shape)
     replaced = record.copy(deep=False)
     replaced.attrs = without_rod(record.attrs) | rod_attributes(rod)
     return replaced
@@ -231,8 +235,8 @@ def assumed_units(table: Table) -> str:
     if not taken:
         return ""
     name = next(iter(taken))
-    origin = shlex.quote(f"{name}={table.source.origins.get(name, name)}[{taken[name]}]")
-    return f"no unit is stated for {_and(taken)}: taken as {_and(taken.values())}. State them, as in --column {origin}"
+    entry = rig_entry(name, f"{table.source.origins.get(name, name)}[{taken[name]}]")
+    return f"no unit is stated for {_and(taken)}: taken as {_and(taken.values())}. State them, as in {entry}"
 
 
 def _and(words: Iterable[str]) -> str:

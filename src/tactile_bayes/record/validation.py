@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from tactile_bayes.record.attributes import checked_attributes, stated_frame
 from tactile_bayes.record.origin import ORIGIN
 from tactile_bayes.record.parsing import parsed_column
+from tactile_bayes.record.rig_entry import rig_entry
 from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, column_of, same_unit
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.record.storable import is_storable, is_storable_attribute, not_storable, storable
@@ -149,19 +149,16 @@ def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
         else:
             continue
         if is_file:
-            what += (
-                f", or say what stands for it, columns={{{name!r}: {stands!r}}}, on the command line "
-                f"--column {shlex.quote(f'{name}={stands}')}"
-            )
+            what += f", or say what stands for it, columns={{{name!r}: {stands!r}}}, or {rig_entry(name, stands)}"
         if name in CHANNELS:
             what += (
-                f", or declare the channel missing, with an empty column or missing=({name!r},), on the command line "
-                f"--missing {name}"
+                f", or declare the channel missing, with an empty column or missing=({name!r},), or "
+                f"{rig_entry('missing', [name])}"
             )
         elif name in ("sweep", "direction"):
             what += (
-                ", or have the record split where the drive turns back: split_sweeps=True, on the command line "
-                "--split-sweeps"
+                ", or have the record split where the drive turns back: split_sweeps=True, or "
+                f"{rig_entry('split_sweeps', True)}"
             )
         elif not is_required:
             what += f", or add a column {name!r} (0 for a pivot in the origin)"

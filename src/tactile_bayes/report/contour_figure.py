@@ -76,7 +76,7 @@ def contour_figure(findings: ContourFindings) -> ContourFigure:
     """Draw the inferred contour."""
     band, attrs = findings.band, findings.band["lower"].attrs
     x, lower, median, upper = (band[name].values for name in ("x", "lower", "median", "upper"))
-    bases = np.array(bases_of(found_rig(findings.record, None, findings.posterior).record))  # as contacts have them
+    bases = np.array(bases_of(found_rig(findings.record, findings.posterior).record))  # as contacts have them
     unit = shown_as("contact_x", attrs, np.concatenate([x, bases.ravel()]))
     ends = gap_ends(findings)
 

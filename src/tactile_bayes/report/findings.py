@@ -109,7 +109,7 @@ def findings_of(
     trust = _trust_in(run, posterior)
     probability = float(posterior.attrs.get("probability", _USUAL))
     progress(1)
-    contacts = contact_points(record, None, posterior)
+    contacts = contact_points(record, posterior)
     progress(2)
     try:
         check = check_record(posterior)

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.found_rig import rod_with
-from tactile_bayes.inference.parameters.nuisances import nuisances_of
+from tactile_bayes.inference.parameters.discrepancy import is_discrepancy
+from tactile_bayes.inference.parameters.nuisances import Nuisances
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.result import posterior_draws, record_of
-from tactile_bayes.inference.stored_experiment import joint_of
+from tactile_bayes.inference.result import known_of, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
-from tactile_bayes.record import rod_of, rows_of_sweeps
+from tactile_bayes.record import bases_of, rod_of, rows_of_sweeps
+from tactile_bayes.rig.rig import rod_with
 from tactile_bayes.sweep import ManyUnits, to_lab_frame
 from tactile_bayes.tasks.documents import read_json
 
@@ -96,12 +96,11 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     draw = posterior_draws(posterior).isel(best)
     contour = contours_of(draw, posterior.attrs["family"])
     cell = LoadCell.from_record(record) or LoadCell()
-    friction = float(posterior.attrs["friction"])
-    nuisances = nuisances_of(
-        record, read_json(posterior.attrs["nuisances"], "nuisances"), {}, cell, friction, joint_of(posterior.attrs)
-    )
+    names = tuple(read_json(posterior.attrs["nuisances"], "nuisances"))
+    names = tuple(name for name in names if not is_discrepancy(name))
+    nuisances = Nuisances(names, {}, rod_of(record), known_of(posterior.attrs), pivots=len(bases_of(record)))
     rig = nuisances.rig({name: np.atleast_1d(draw[name].values) for name in nuisances.names})
-    likelihood = RecordLikelihood(record, cell, friction)
+    likelihood = RecordLikelihood(record, cell, nuisances.friction)
     paths = likelihood.paths(contour, rig)
 
     numbers = record.sweep.values
@@ -116,7 +115,8 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     angle = (read - likelihood.misread(rig)[0])[samples]
     angle_in_sweep_frame = np.where(mirrored, np.pi - angle, angle)
     states = paths.states(batch_index, likelihood.travels(read, rig)[0, samples])
-    rod = rod_with(rod_of(record), {name: float(draw[name]) for name in nuisances.names})
+    found = {name: float(draw[name]) for name in nuisances.names}
+    rod = rod_with(rod_of(record), {**nuisances.known, **found})
     stiffer = float(np.ravel(rig.rigidity_scale)[0])
     units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
     in_lab_frame = to_lab_frame(paths.sweep_frame, batch_index, states, units)

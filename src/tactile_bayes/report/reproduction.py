@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Mapping
 from typing import Any
 
 import xarray as xr
 
-from tactile_bayes.inference.experiment import default_priors
-from tactile_bayes.inference.parameters.prior_text import is_prior_in_words
 from tactile_bayes.inference.result import is_streamed
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.rig.rig import UNWRITTEN
 from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["command_of", "hindrances", "python_lines"]
-
-_RIG = "rig_parameters"
-"""Attribute of a posterior whose prior is that of a calibrated rig."""
 
 
 def command_of(attrs: Mapping[Any, Any]) -> str:
@@ -31,7 +25,7 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
 
     Examples
     --------
-    >>> said = {"family": "circle", "friction": 0.0, "nuisances": "[]", "seed": "1", "settings": '{"ensembles": 2}'}
+    >>> said = {"seed": "1", "settings": '{"ensembles": 2}'}
     >>> print(python_lines(said))
     import tactile_bayes as tb
     import xarray as xr
@@ -41,9 +35,8 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
     record = xr.merge(columns).assign_attrs(stored.attrs)
     again = tb.infer_contour(
         record,
-        family="circle",
-        friction=0.0,
-        nuisances=[],
+        family=tb.Family.of(stored),
+        rig=tb.Rig.of(stored),
         seed=1,
         settings=tb.SamplerSettings(
             ensembles=2,
@@ -54,11 +47,8 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
     seed, settings = str(attrs["seed"]), read_json(attrs["settings"], "settings")
     streamed = is_streamed(attrs)
     options = [
-        f"family={json.dumps(str(attrs['family']))}",
-        f"friction={float(attrs['friction'])!r}",
-        f"nuisances={json.dumps(read_json(attrs['nuisances'], 'nuisances'))}",
-        *(["events=False"] if not attrs.get("events", 1) else []),
-        *(['rig=tb.read_result("rig.nc")'] if _RIG in attrs else []),
+        "family=tb.Family.of(stored)",
+        "rig=tb.Rig.of(stored)",
         f"seed={_seed(seed)}",
         *([] if streamed else ["settings=tb.SamplerSettings("]),
         *(f"{'' if streamed else '    '}{name}={value!r}," for name, value in settings.items()),
@@ -92,18 +82,9 @@ def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
         found.append("The run could end by the clock, after max_seconds: then the number of its steps is not repeated.")
     if "interrupted" in attrs["message"]:
         found.append("The run was interrupted: without an interrupt it makes more steps.")
-    nuisances = read_json(attrs["nuisances"], "nuisances")
-    usual = default_priors(record, attrs["family"], LoadCell.from_record(record), nuisances)
-    of_rig = read_json(attrs.get(_RIG, "[]"), _RIG)
-    own = [
-        name
-        for name, words in read_json(attrs["priors"], "priors").items()
-        if name not in of_rig and not (name in usual and is_prior_in_words(usual[name], words))
-    ]
-    if of_rig:
-        found.append("The rig is read from the file that calibrate-rig wrote, here rig.nc: give its path.")
-    if own:
-        found.append(f"Priors of your own have to be given again: priors={{…}} for {', '.join(own)}.")
+    for text, argument in (("rig", "rig"), ("family_parameters", "family")):
+        if attrs.get(text) == UNWRITTEN:
+            found.append(f"A prior of your own is none of SciPy's: give {argument}= as before.")
     if not attrs.get("events", 1):
         found.append("Unloaded samples were left out (events=False), and are not in the file: drifts may differ.")
     return found

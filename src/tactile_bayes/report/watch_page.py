@@ -57,7 +57,7 @@ def write_watch_page(
     if band is not None:
         record, contacts, edges = record_of(posterior), None, None
         with suppress(TactileBayesError):  # as long as too little is known of the rig
-            contacts = contact_points(record, None, posterior)
+            contacts = contact_points(record, posterior)
         with suppress(TactileBayesError):
             edges = gap_if_any(posterior, probability)
         contour = contour_figure(ContourFindings(posterior, record, contacts, band, edges, probability))

@@ -15,7 +15,7 @@ from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Progress
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.names import COMPARISON
 
@@ -28,7 +28,7 @@ def compare_into(
     measured: xr.Dataset,
     out: str | os.PathLike[str],
     *,
-    load_cell: LoadCell | None = None,
+    rig: Rig | None = None,
     progress: Callable[[str, Progress], object] = lambda name, progress: None,
     **options: Any,
 ) -> Run[xr.Dataset]:
@@ -41,7 +41,7 @@ def compare_into(
     out : path-like
         Folder for comparison.nc, comparison.csv and families.png; created if missing, once sampling has begun. Files
         of these names in it are replaced.
-    load_cell, progress, options
+    rig, progress, options
         Options of `compare_families`.
 
     Returns
@@ -66,9 +66,9 @@ def compare_into(
         progress(name, done)
 
     try:
-        comparison = compare_families(measured, load_cell=load_cell, progress=note, **options)
+        comparison = compare_families(measured, rig=rig, progress=note, **options)
     except InferenceError as error:
-        raise type(error)(" ".join((str(error), *check_units_and_signs(measured, load_cell)))) from error
+        raise type(error)(" ".join((str(error), *check_units_and_signs(measured, rig_of(rig).load_cell)))) from error
     return Run(comparison, write_comparison(comparison, path))
 
 

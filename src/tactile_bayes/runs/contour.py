@@ -7,7 +7,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -24,12 +24,11 @@ from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
-from tactile_bayes.inference.found_rig import contact_points, rod_with
-from tactile_bayes.inference.result import posterior_draws, record_of, write_result
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.inference.found_rig import contact_points
+from tactile_bayes.inference.result import known_of, posterior_draws, record_of, write_result
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod
+from tactile_bayes.rig.rig import Rig, rig_of, rod_with
 from tactile_bayes.runs.folder import Folder, panels
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH_PAGE
 from tactile_bayes.sweep import Scan, recorded_drives, scan
@@ -120,8 +119,7 @@ def analyse(
     measured: xr.Dataset,
     out: str | os.PathLike[str],
     *,
-    load_cell: LoadCell | None = None,
-    rod: Rod | None = None,
+    rig: Rig | None = None,
     probability: float = 0.95,
     seed: int = 1,
     truth: Contour | None = None,
@@ -143,7 +141,7 @@ def analyse(
         the figures; created if missing. The posterior replaces all files of these names in it, and report.html,
         watch.html, trust.nc and the replicates behind it, which would belong to the former posterior; the other files
         come together at the end, so that a folder without summary.txt is not complete.
-    load_cell, rod, seed, options
+    rig, seed, options
         Options of `infer_contour`.
     probability : float
         Probability of the band and of the intervals in the summary, in (0, 1).
@@ -165,7 +163,8 @@ def analyse(
         run would replace `record_file`.
     """
     check_probability("probability", probability)
-    measured = with_rod(validate(measured), rod)
+    rig = rig_of(rig)
+    measured = with_rod(validate(measured), rig.rod)
     origin = origin_of(measured, probability, command)
     if record_file is not None:
         written = (*INFERENCE, *OF_POSTERIOR, WATCH_PAGE)
@@ -179,14 +178,14 @@ def analyse(
         drawn.append(posterior)
 
     try:
-        keep(infer_contour(measured, load_cell=load_cell, seed=seed, keep=keep, **options))
+        keep(infer_contour(measured, rig=rig, seed=seed, keep=keep, **options))
     except Exception as error:
         if not drawn and isinstance(error, InferenceError):
-            raise type(error)(" ".join((str(error), *check_units_and_signs(measured, load_cell)))) from error
+            raise type(error)(" ".join((str(error), *check_units_and_signs(measured, rig.load_cell)))) from error
         if not drawn:
             raise
         folder.left_out["predictions"] = error
-    return _completed(folder, measured, load_cell, drawn[-1], probability, truth)
+    return _completed(folder, measured, rig, drawn[-1], probability, truth)
 
 
 def complete(
@@ -194,30 +193,30 @@ def complete(
     measured: xr.Dataset,
     out: str | os.PathLike[str],
     *,
-    load_cell: LoadCell | None = None,
+    rig: Rig | None = None,
     probability: float = 0.95,
 ) -> ContourRun:
     """Write a posterior, and what `analyse` writes beside it, to a folder; arguments and result are as there."""
     folder = RunFolder(out)
     folder.write_posterior(posterior)
-    return _completed(folder, measured, load_cell, posterior, probability, None)
+    return _completed(folder, measured, rig_of(rig), posterior, probability, None)
 
 
 def _completed(
     folder: RunFolder,
     measured: xr.Dataset,
-    load_cell: LoadCell | None,
+    rig: Rig,
     result: xr.DataTree,
     probability: float,
     truth: Contour | None,
 ) -> ContourRun:
     """Write what follows from the posterior in a folder, of a long record by the samples that the likelihood took."""
     if "blocks" in result.attrs:
-        measured, load_cell = record_of(result), None
+        measured, rig = record_of(result), replace(rig, load_cell=None)
     with folder:
         contacts, band, edges, found = None, None, None, tuple[str, ...]()
         with folder.attempt("contacts", "contacts.csv"):
-            contacts = contact_points(measured, load_cell, result)
+            contacts = contact_points(measured, result, rig.load_cell)
             if contacts is not None:
                 folder.write_table("contacts", "contacts.csv", contacts)
         with folder.attempt("band", "band.csv"):
@@ -309,15 +308,16 @@ class _Figures:
         """A scan of the most probable contour."""
         best = self.result["sample_stats"]["lp"].argmax(("chain", "draw"))  # the medians may be out of reach
         draw, attrs = self.draws.isel(best), self.result.attrs
-        found = {name: float(draw[name]) for name in read_json(attrs["nuisances"], "nuisances") if name in draw}
+        inferred = [name for name in read_json(attrs["nuisances"], "nuisances") if name in draw]
+        found = {**known_of(attrs), **{name: float(draw[name]) for name in inferred}}
         if self.measured.attrs["units"] == "dimensionless":
             found.pop("length", None)  # a scan would be in lengths of that rod
         contour = contours_of(draw, attrs["family"]).take(np.array(0))
-        rod, friction = rod_with(rod_of(self.measured), found), float(draw.get("friction", attrs["friction"]))
+        rig = Rig(rod_with(rod_of(self.measured), found), unknown={"friction": found.get("friction", 0.0)})
         if carried_sweeps(self.measured):
-            return scan(contour, drive=recorded_drives(self.measured), rod=rod, friction=friction)
+            return scan(contour, rig, drive=recorded_drives(self.measured))
         direction = "both" if len(self.directions) == 2 else self.directions[0]
-        return scan(contour, direction=direction, base=self.base, rod=rod, friction=friction)
+        return scan(contour, rig, direction=direction, base=self.base)
 
     def observables(self) -> Any:
         axes = _plain_panels(3, 1, 7.0, 5.4, 0.55, above=0.65, left=1.1, hspace=0.12)

@@ -13,11 +13,12 @@ from tactile_bayes.errors import ParameterError, RecordWarning, TactileBayesErro
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, MEASURED, read_record, rod_of, write_record
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR
 from tactile_bayes.sweep import scan
 from tactile_bayes.tasks import replace_together
 
-__all__ = ["CONTOUR", "LOAD_CELL", "ROD", "TRUTH", "measure_demo"]
+__all__ = ["CONTOUR", "LOAD_CELL", "RIG", "ROD", "TRUTH", "measure_demo"]
 
 ROD = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
 """Music wire, 200 mm long, 0.7 mm thick: EI = 2.43e-3 N m²."""
@@ -31,8 +32,12 @@ LOAD_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
 TRUTH = {"a": 2.5, "q": 0.1, "x_c": 0.0, "noise_scale": 1.0}
 
 
-def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> Path:
-    """Sweep forward and backward in steps of 1°, measure, and write record.csv without any column of truth.
+RIG = Rig(rod=ROD, load_cell=LOAD_CELL, unknown="nothing")
+"""The rig as it is stated."""
+
+
+def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> tuple[Path, Path]:
+    """Sweep forward and backward in steps of 1°, measure, and write record.csv, without columns of truth, and rig.toml.
 
     Parameters
     ----------
@@ -48,19 +53,21 @@ def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> Path:
 
     Returns
     -------
-    Path
-        The file of the record.
+    record, rig : Path
+        The files of the record and of the rig.
     """
-    measured = LOAD_CELL.measure(scan(CONTOUR, rod=ROD).record, seed=seed)
-    path = Path(out) / "record.csv"
+    measured = LOAD_CELL.measure(scan(CONTOUR, Rig(rod=ROD)).record, seed=seed)
+    path, rig = Path(out) / "record.csv", Path(out) / "rig.toml"
     _refuse_another_record(path)
+    _refuse_another_rig(rig)
     path.parent.mkdir(parents=True, exist_ok=True)
     measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
     with replace_together(
-        path.parent, [*INFERENCE, *OF_POSTERIOR, path.name]
+        path.parent, [*INFERENCE, *OF_POSTERIOR, path.name, rig.name]
     ) as temporary:  # the run is of another record
         write_record(measured, temporary / path.name)
-    return path
+        RIG.write(temporary / rig.name)
+    return path, rig
 
 
 def _refuse_another_record(path: Path) -> None:
@@ -82,6 +89,19 @@ def _is_of_demo(path: Path) -> bool:
             return False
     except (TactileBayesError, OSError):
         return False
-    ideal = scan(CONTOUR, rod=ROD).record
+    ideal = scan(CONTOUR, Rig(rod=ROD)).record
     fixed = [name for name in MEASURED if name not in CHANNELS]
     return found.sizes == ideal.sizes and all(np.array_equal(found[name], ideal[name]) for name in fixed)
+
+
+def _refuse_another_rig(path: Path) -> None:
+    """Refuse to replace a description of another rig than that of the demonstration."""
+    try:
+        if not os.path.lexists(path) or Rig.read(path).text == RIG.text:
+            return
+    except (TactileBayesError, OSError):
+        pass
+    raise ParameterError(
+        f"{path} is no rig of the demonstration, which would replace it: give another folder, as in "
+        "tactile-bayes demo --out results/demo"
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,6 +11,10 @@ import numpy as np
 
 from tactile_bayes import plotting
 from tactile_bayes.diagnostics.inspection import Inspection
+from tactile_bayes.diagnostics.inspection.shown_rig import shown_rig
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.rig import Rig
+from tactile_bayes.rig.rig_file import file_of_rig
 from tactile_bayes.runs.folder import Folder
 from tactile_bayes.runs.names import INSPECTION
 
@@ -17,7 +22,7 @@ __all__ = ["write_inspection"]
 
 
 def write_inspection(
-    inspection: Inspection, out: str | os.PathLike[str], *, text: Sequence[str] = ()
+    inspection: Inspection, out: str | os.PathLike[str], *, text: Sequence[str] = (), rig: Rig | None = None
 ) -> Mapping[str, Path]:
     """Write an inspection to a folder.
 
@@ -31,11 +36,19 @@ def write_inspection(
         replaced, all together.
     text : sequence of str
         Lines that follow the messages in inspection.txt.
+    rig : Rig, optional
+        The rig by which the record was read: with what the inspection shows it is written to rig.toml, and what looks
+        wrong stands there as comments. A file of this name that was edited is never replaced.
 
     Returns
     -------
     mapping of str to Path
         Files by content.
+
+    Raises
+    ------
+    ParameterError
+        If the folder has a rig.toml that was edited, or is another one.
 
     Examples
     --------
@@ -47,7 +60,13 @@ def write_inspection(
     ...     sorted(path.name for path in write_inspection(inspect_record(record), folder).values())
     ['channels.csv', 'inspection.png', 'inspection.txt', 'samples.csv', 'sweeps.csv']
     """
-    with Folder(out, INSPECTION) as folder:
+    rig_file = "" if rig is None else _rig_file(inspection, rig)
+    if rig is not None:
+        _refuse_edited(Path(out) / "rig.toml")
+    with Folder(out, INSPECTION if rig is not None else [name for name in INSPECTION if name != "rig.toml"]) as folder:
+        if rig is not None:
+            with folder.file("rig", "rig.toml") as temporary:
+                temporary.write_text(rig_file, encoding="utf-8", newline="\n")
         folder.write_lines("words", "inspection.txt", (*inspection.messages, *text))
         sweeps = inspection.sweeps
         named = {f"{event}_drive_angle": event for event in ("onset", "snap_off")}
@@ -72,3 +91,27 @@ def write_inspection(
         folder.write_table("samples", "samples.csv", kept.assign(numbers))
         folder.draw("figure", "inspection.png", plotting.inspection, inspection)
     return folder.files
+
+
+def _rig_file(inspection: Inspection, rig: Rig) -> str:
+    """Return the text of rig.toml, with a last line by which it is known again as long as nobody edits it."""
+    against = [" ".join(message.split()) for message in inspection.messages] if inspection.is_suspect else []
+    comments = "".join(f"# {message}\n" for message in ["inspect has found:", *against]) if against else ""
+    text = file_of_rig(shown_rig(inspection, rig)) + ("\n" + comments if comments else "")
+    return f"{text}\n{_last_line(text)}"
+
+
+def _last_line(text: str) -> str:
+    return f"# Written by inspect ({hashlib.sha256(text.encode()).hexdigest()[:12]}), and not edited since.\n"
+
+
+def _refuse_edited(path: Path) -> None:
+    """Refuse to replace a rig.toml that inspect has not written, or that was edited since."""
+    if not path.exists():
+        return
+    text, _, last = path.read_bytes().decode("utf-8", "replace").rstrip("\n").rpartition("\n")
+    if f"{last}\n" != _last_line(text.removesuffix("\n") + "\n"):
+        raise ParameterError(
+            f"{path} was edited, or is another one, and would be lost: give it with --rig and another folder with "
+            "--out, or remove it first"
+        )

@@ -11,6 +11,7 @@ __all__ = [
     "FIGURES",
     "INFERENCE",
     "INSPECTION",
+    "MANY",
     "OF_POSTERIOR",
     "RECONSTRUCTION",
     "RIG",
@@ -41,10 +42,11 @@ OF_POSTERIOR = ("report.html", *TRUST, "trust/replicates.json", "trust/alternati
 
 WATCH_PAGE = "watch.html"
 WATCH = ("stream.nc", WATCH_PAGE)
-INSPECTION = ("inspection.txt", "sweeps.csv", "channels.csv", "samples.csv", "inspection.png")
+INSPECTION = ("inspection.txt", "sweeps.csv", "channels.csv", "samples.csv", "inspection.png", "rig.toml")
 RECONSTRUCTION = ("contacts.csv", "contacts.png")
 COMPARISON = ("comparison.nc", "comparison.csv", "families.png")
-RIG = ("summary.txt", "rig.nc", "summary.csv")
+MANY = ("runs.csv", "runs.nc")
+RIG = ("summary.txt", "rig.toml", "rig.nc", "summary.csv")
 CALIBRATION = ("verdict.txt", "calibration.nc", "ranks.png", "coverage.png")
 DESIGN = ("words.txt", "design.nc", "candidates.csv", "design.png")
 STUDY = ("study.nc", "study.png")

@@ -17,8 +17,11 @@ from tactile_bayes.diagnostics.inspection import CellSource, known_cell
 from tactile_bayes.diagnostics.verdicts import CONTRADICTION, doubtful_sides
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
-from tactile_bayes.record import bases_of, carried_sweeps, validate
+from tactile_bayes.reconstruction import AXIAL_ALARM, contacts_of
+from tactile_bayes.record import bases_of, carried_sweeps, validate, with_rod
+from tactile_bayes.record.rig_entry import rig_entry
+from tactile_bayes.rig.corrected import corrected
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.runs.names import RECONSTRUCTION
 
@@ -53,8 +56,7 @@ def reconstruct_into(
     out: str | os.PathLike[str],
     *,
     method: Literal["raw", "constrained"] | None = None,
-    load_cell: LoadCell | None = None,
-    friction: float = 0.0,
+    rig: Rig | None = None,
 ) -> ReconstructionRun:
     """Write contact points of a record, and a map of them, to a folder.
 
@@ -67,11 +69,10 @@ def reconstruct_into(
         Files of these names in it are replaced, and an old contacts.png is removed if none is drawn.
     method : {"raw", "constrained"}, optional
         Method of `reconstruct`; by default "constrained", or "raw" if the noise of a channel is not known.
-    load_cell : LoadCell, optional
-        The sensor, in the record's units; by default the data sheet of the record, or the estimate of
-        `LoadCell.from_zero_load`.
-    friction : float
-        Coulomb's coefficient μ.
+    rig : Rig, optional
+        The rig, in the record's units. Its load cell is by default the data sheet of the record, or the estimate of
+        `LoadCell.from_zero_load`. Numbers under `unknown`, like that of friction, are taken into account; what is
+        unknown is taken as stated.
 
     Returns
     -------
@@ -92,11 +93,12 @@ def reconstruct_into(
     >>> run.result.attrs["method"], sorted(run.files)
     ('raw', ['contacts', 'map'])
     """
-    measured = validate(measured)
-    cell, source = known_cell(measured, load_cell)
+    rig = rig_of(rig)
+    measured = with_rod(validate(measured), rig.rod)
+    cell, source = known_cell(measured, rig.load_cell)
     if method is None:
         method = "constrained" if cell is not None and cell.has_variances else "raw"
-    contacts = reconstruct(measured, method=method, load_cell=cell, friction=friction)
+    contacts = contacts_of(corrected(measured, cell or LoadCell(), rig.known), method)
     with Folder(out, RECONSTRUCTION) as folder:
         folder.write_table("contacts", "contacts.csv", contacts)
         shown = contacts.contact_x.values[contacts.status.values == "ok"]
@@ -121,6 +123,7 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
     --------
     >>> from tactile_bayes import scan
     >>> from tactile_bayes.contours import paper_profile
+    >>> from tactile_bayes.reconstruction import reconstruct
     >>> reconstruction_messages(reconstruct(scan(paper_profile("II", q=0.5)).record))
     ('266 contact points by the raw method; samples: 266 ok, 64 no contact.',)
     """
@@ -148,7 +151,7 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
         if score < -AXIAL_ALARM:
             against.append(
                 f"In tangential contact the force along the rod is too small by {-score:.0f} standard errors, as "
-                "with friction: give --friction, or have infer find it."
+                f"with friction: state it (as in {rig_entry('friction', 0.2, 'unknown')}), or have infer find it."
             )
         elif score > AXIAL_ALARM:
             against.append(

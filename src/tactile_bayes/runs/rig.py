@@ -5,17 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import xarray as xr
 
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
 from tactile_bayes.diagnostics.verdicts import verdicts
-from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.contour import infer_rig
-from tactile_bayes.inference.parameters.rig_prior import rig_prior
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.contour import calibrate_rig
+from tactile_bayes.rig.rig import Rig
+from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.names import RIG
 from tactile_bayes.uncertainty.summary import summary
@@ -24,7 +23,7 @@ __all__ = ["RigRun", "calibrate_rig_into"]
 
 
 @dataclass(frozen=True)
-class RigRun(Run[xr.DataTree]):
+class RigRun(Run[Rig]):
     """Result of `calibrate_rig_into`.
 
     Attributes
@@ -32,7 +31,7 @@ class RigRun(Run[xr.DataTree]):
     summary : xr.Dataset
         From `summary`.
     messages : tuple of str
-        The verdicts on each record, and what `infer --rig` takes over.
+        The verdicts on each record, and what the rig's later records take over.
     """
 
     summary: xr.Dataset
@@ -41,60 +40,56 @@ class RigRun(Run[xr.DataTree]):
 
 def calibrate_rig_into(
     out: str | os.PathLike[str],
-    records: Sequence[tuple[xr.Dataset, LoadCell | None]],
+    records: Sequence[xr.Dataset],
     *,
     contour: Contour,
+    rig: Rig,
     probability: float = 0.95,
-    rig: xr.DataTree | None = None,
     **options: Any,
 ) -> RigRun:
-    """Infer a rig from records of one gauge, one after the other, and write the result.
+    """Calibrate a rig by records of one gauge, one after the other, and write the result.
 
     Parameters
     ----------
     out : path-like
-        Folder for rig.nc, summary.txt (which begins with the verdicts) and summary.csv; created if missing. Files of
-        these names in it are replaced.
-    records : sequence of (xr.Dataset, LoadCell or None)
-        Records of the gauge, each with the load cell that is stated beside it; at least one.
+        Folder for rig.toml, rig.nc (the posterior of the last record), summary.txt (which begins with the verdicts) and
+        summary.csv; created if missing. Files of these names in it are replaced.
+    records : sequence of xr.Dataset
+        Records of the gauge, at least one.
     contour, rig, options
-        Arguments and options of `infer_rig`.
+        Arguments and options of `calibrate_rig`.
     probability : float
         Probability of the intervals in the summary, in (0, 1).
 
     Returns
     -------
     RigRun
-        The posterior after the last record, and the files.
+        The rig after the last record, and the files.
 
     Raises
     ------
     RecordError, ParameterError, InferenceError
-        As in `infer_rig`.
+        As in `calibrate_rig`.
     """
     check_probability("probability", probability)
     messages = list[str]()
-    for number, (measured, cell) in enumerate(records, start=1):
-        found = infer_rig(measured, contour=contour, load_cell=cell, rig=rig, **options)
+    for number, measured in enumerate(records, start=1):
+        rig = calibrate_rig(measured, contour=contour, rig=rig, **options)
+        prior = cast(RigPrior, rig.calibration)
+        found = cast(xr.DataTree, prior.posterior)
         which = f"Record {number}: " if len(records) > 1 else ""
         messages += [f"{which}{verdict}" for verdict in verdicts(found)]
-        rig = found
+    assert prior is not None
     numbers = summary(found, probability)
-    messages.append(_taken_over(found))
+    messages.append(
+        f"With rig.toml, later records take over {', '.join(prior.priors)}, as a density whose quantiles are off those "
+        f"of the draws by {prior.error:.2f} standard deviations at most."
+    )
     with Folder(out, RIG) as folder:
-        folder.write_netcdf("rig", "rig.nc", found)
+        with folder.file("rig", "rig.toml") as temporary:
+            rig.write(temporary)
+        folder.write_netcdf("posterior", "rig.nc", found)
         table = numbers.to_dataframe().to_string()
         folder.write_lines("verdicts", "summary.txt", (*messages, "", table, "", found.attrs["message"]))
         folder.write_table("summary", "summary.csv", numbers)
-    return RigRun(found, folder.files, numbers, tuple(messages))
-
-
-def _taken_over(rig: xr.DataTree) -> str:
-    try:
-        prior = rig_prior(rig)
-    except InferenceError as error:
-        return f"No other record can use this rig: {error}"
-    return (
-        f"infer --rig takes over {', '.join(prior.priors)}, as a density whose quantiles are off those of the draws by "
-        f"{prior.error:.2f} standard deviations at most."
-    )
+    return RigRun(rig, folder.files, numbers, tuple(messages))

@@ -17,6 +17,7 @@ from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import PARTS, sensitivity
+from tactile_bayes.rig.rig import rig_of
 from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.runs.names import SENSITIVITY, STUDY
 from tactile_bayes.runs.outermost import outermost
@@ -109,7 +110,8 @@ def sensitivity_into(
     ...     sorted(path.name for path in run.files.values())
     ['information.png', 'sensitivity.nc', 'words.txt']
     """
-    if material is not None and (options.get("rod") is None or options.get("load_cell") is None):
+    rig = rig_of(options.get("rig"))
+    if material is not None and (rig.rod is None or rig.load_cell is None):
         raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
     report = progress or (lambda done: None)
     found = sensitivity(**options, progress=lambda part: report(part.done))
@@ -163,7 +165,7 @@ def steps_of(material: Material | None) -> int:
 
 def _rods(material: Material, options: Mapping[str, Any], progress: Callable[[TaskProgress], object]) -> xr.Dataset:
     plan = Plan(**{name: value for name, value in options.items() if name in _OF_PLAN})
-    rod = plan.taken_rod
+    rod = plan.rod
     own = (64.0 * rod.flexural_rigidity / (np.pi * material.youngs_modulus)) ** 0.25
     return required_rod(
         plan,

@@ -15,12 +15,13 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_numbers, check_positive, check_probability, check_whole_number
 from tactile_bayes.comparison.streams import StreamComparison
-from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.streams.particles import LOST_ONCE
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import record_hash
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.runs.contour import ContourRun, RunFolder, complete, file_of, origin_of
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
 from tactile_bayes.tasks import alone_in, refuse_replacing
@@ -105,14 +106,16 @@ class Watch:
         Largest number of samples that are taken into account, at least 100. Of a longer record every second sample is,
         every fourth, and so on; when this begins, all that are left are taken again. Records of a load cell that drifts
         from sample to sample are taken whole.
-    families : sequence of str
+    families : sequence of str or Family
         Families of contours; of several, the posterior is that of the most probable one, and the band is averaged.
+    rig : Rig, optional
+        As in `infer_contour`.
     record_file : path-like
         File that is followed; the posterior states it.
     command : sequence of str
         Words of the command; the posterior states them.
     **options
-        Arguments of `Stream`, without family and load cell.
+        Arguments of `Stream`, without family and rig.
 
     Raises
     ------
@@ -130,7 +133,8 @@ class Watch:
         until_width: float | None = None,
         until_probability: float | None = None,
         most_samples: int = 1000,
-        families: Sequence[str] = ("parabola",),
+        families: Sequence[Family | str] = ("parabola",),
+        rig: Rig | None = None,
         record_file: str | os.PathLike[str],
         command: Sequence[str] = (),
         **options: Any,
@@ -155,11 +159,14 @@ class Watch:
         written = (*INFERENCE, *OF_POSTERIOR, *WATCH)
         refuse_replacing((Path(out) / name for name in written), [Path(record_file)])
         self._file, self._command = record_file, command
+        self._rig = rig_of(rig)
+        self._options = {**options, "rig": self._rig}
         if len(families) == 1:
             self._kind: type[Stream | StreamComparison] = Stream
-            self._options = {**options, "family": family_named(families[0]).name}
+            self._options["family"] = families[0]
         else:
-            self._kind, self._options = StreamComparison, {**options, "families": list(families)}
+            self._kind = StreamComparison
+            self._options["families"] = list(families)
         self._kind(**self._options)  # which refuses what it can before the first sample
         self.folder = RunFolder(out)
         self._stream: Stream | StreamComparison | None = None
@@ -177,7 +184,7 @@ class Watch:
         record = None if self._stream is None else self._stream.record
         return 0 if record is None else record.sizes["sample"]
 
-    def resume(self, record: xr.Dataset, load_cell: LoadCell | None, sha256: str) -> WatchUpdate | None:
+    def resume(self, record: xr.Dataset, sha256: str) -> WatchUpdate | None:
         """Resume the stream in the folder; arguments are those of `take`. Return its answer, None if there is none.
 
         Raises
@@ -188,12 +195,11 @@ class Watch:
         began = perf_counter()
         if not self.state.is_file():
             return None
-        options = {**self._options, "load_cell": load_cell}
-        stored = self._kind.resume(self.state, **options)
+        stored = self._kind.resume(self.state, **self._options)
         strides = [1 << power for power in range(record.sizes["sample"].bit_length())]
         every = next((stride for stride in strides if _continues(stored.record, _thinned(record, stride))), None)
         if every is None:  # it is of another record, and the message states what differs
-            stored = self._kind.resume(self.state, record, **options)
+            stored = self._kind.resume(self.state, record, **self._options)
         self._stream, self._every = stored, every or 1
         return self._update(self._stream, self.samples, began, sha256)
 
@@ -201,7 +207,7 @@ class Watch:
         """Begin again with the next samples."""
         self._stream, self._every = None, 1
 
-    def take(self, record: xr.Dataset, load_cell: LoadCell | None, sha256: str) -> WatchUpdate | None:
+    def take(self, record: xr.Dataset, sha256: str) -> WatchUpdate | None:
         """Take the samples that are new into account, and write the stream and its posterior.
 
         Parameters
@@ -209,8 +215,6 @@ class Watch:
         record : xr.Dataset
             All samples so far. If they do not begin with those before, or do not continue them in order, all are
             taken again.
-        load_cell : LoadCell or None
-            As in `infer_contour`.
         sha256 : str
             Digest of the file.
 
@@ -225,7 +229,7 @@ class Watch:
             As in `Stream.update`. The stream is then as before.
         """
         began, had = perf_counter(), self.samples
-        every = self._stride(record, load_cell)
+        every = self._stride(record)
         record = _thinned(record, every)
         if self._stream is not None and every == self._every and _continues(self._stream.record, record):
             if had == record.sizes["sample"]:
@@ -234,14 +238,14 @@ class Watch:
                 self._stream.update(record.isel(sample=slice(had, None)))
                 self._stream.save(self.state)
                 return self._update(self._stream, had, began, sha256)
-        stream = self._kind(**self._options, load_cell=load_cell)
+        stream = self._kind(**self._options)
         stream.update(record)
         restarted = had > 0 and every == self._every
         self._stream, self._every = stream, every
         stream.save(self.state)
         return self._update(stream, 0, began, sha256, restarted=restarted)
 
-    def finish(self, load_cell: LoadCell | None) -> ContourRun:
+    def finish(self) -> ContourRun:
         """Write all files of a run for the last answer.
 
         Raises
@@ -252,7 +256,7 @@ class Watch:
         if self._answer is None:
             raise InferenceError("there is no answer yet: no samples have been taken into account")
         posterior, record = self._answer
-        return complete(posterior, record, self.folder.path, load_cell=load_cell, probability=self._probability)
+        return complete(posterior, record, self.folder.path, rig=self._rig, probability=self._probability)
 
     def _update(
         self, stream: Stream | StreamComparison, had: int, began: float, sha256: str, *, restarted: bool = False
@@ -290,9 +294,9 @@ class Watch:
             enough=self._enough(widths, {} if underrated else probabilities) if posterior.attrs["converged"] else "",
         )
 
-    def _stride(self, record: xr.Dataset, load_cell: LoadCell | None) -> int:
+    def _stride(self, record: xr.Dataset) -> int:
         """Return the least power of two by which a record is thinned to the largest number of samples."""
-        cell = load_cell or LoadCell.from_record(record)
+        cell = self._rig.load_cell or LoadCell.from_record(record)
         if cell is not None and cell.drift is not None:  # its steps are those from one sample to the next
             return 1
         parts = -(-record.sizes["sample"] // self._most)

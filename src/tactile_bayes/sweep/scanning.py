@@ -23,6 +23,7 @@ from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.record import make_record
 from tactile_bayes.record.schema import column_attributes
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation
 from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
@@ -98,8 +99,7 @@ def equilibria(
     *,
     base: tuple[float, float] = (0.0, 0.0),
     direction: Direction = "forward",
-    rod: Rod | None = None,
-    friction: float = 0.0,
+    rig: Rig | None = None,
 ) -> xr.Dataset:
     """States in which the rod touches a contour at given slope angles.
 
@@ -114,17 +114,16 @@ def equilibria(
     Parameters
     ----------
     contour : Contour
-        One contour; in metres if `rod` is given in SI, else in rod lengths.
+        One contour; in metres if the rig states its rod, else in rod lengths.
     slope_angles : array_like, shape (n,)
         Slope angles α of the contour at the contact [rad]; those of a backward sweep are mostly negative.
     base : (float, float)
         The pivot, in the contour's unit of length.
     direction : {"forward", "backward"}
         Sense of the drive: forward is counter-clockwise.
-    rod : Rod, optional
-        By default the dimensionless rod.
-    friction : float
-        Coulomb's coefficient μ of the sliding rod, at most 0.84. It acts as on a straight rod, which slides toward the
+    rig : Rig, optional
+        Its rod, by default the dimensionless one, with the deviations that are known; friction is 0 unless it is known,
+        and at most 0.84. Friction acts as on a straight rod, which slides toward the
         snap-off.
 
     Returns
@@ -152,7 +151,7 @@ def equilibria(
     pivots = check_pivots("base", base)
     if len(pivots) > 1:
         raise ParameterError(f"base is {base!r}: equilibria takes one pivot (x, y), only scan several")
-    rod = Rod() if rod is None else rod
+    rod, friction = rig_of(rig).known_rod, rig_of(rig).friction
     sweep_frame = to_sweep_frame(contour, pivots[0], direction, rod)
     index = np.zeros(alpha.size, dtype=np.intp)
     side = -1.0 if sweep_frame.mirrored[0] else 1.0
@@ -197,14 +196,13 @@ def _wrench(locus: Locus, rod: Rod, friction: float, side: float) -> Wrench:
 
 def scan(
     contour: Contour,
+    rig: Rig | None = None,
     *,
     drive: Drive | Sequence[Drive] | None = None,
     direction: Literal["both", "forward", "backward"] = "both",
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
     drive_step: float | None = None,
     drive_angles: ArrayLike | None = None,
-    rod: Rod | None = None,
-    friction: float = 0.0,
 ) -> Scan:
     """Sweep the rod along a contour, and record the loads at its base from before first contact to after snap-off.
 
@@ -214,7 +212,12 @@ def scan(
     Parameters
     ----------
     contour : Contour
-        One contour; in metres if `rod` is given in SI, else in rod lengths.
+        One contour; in metres if the rig states its rod, else in rod lengths.
+    rig : Rig, optional
+        Its rod, by default the dimensionless one, with the deviations that are known; a rod with a diameter touches
+        with its surface. Friction is 0 unless it is known, and at most 0.84. With friction, a rod that turns about a
+        pivot and is curved toward the object sticks at first, which is not modelled: these samples are left out
+        (`SweepEvents.slides_from`).
     drive : Rotation, Translation or Motion, or a sequence of them, optional
         Path of the base; by default a rotation about `base`. One that carries the base makes one sweep, from its
         beginning to its end. It is called forward if the rod touches the object with its left side, as in a
@@ -233,12 +236,6 @@ def scan(
     drive_angles : array_like, shape (n,), optional
         Drive angles of rotations in place of this grid [rad], used in increasing order forward and in decreasing order
         backward, without duplicates, and without those at which the rod is in the same contact a turn before or later.
-    rod : Rod, optional
-        By default the dimensionless rod, which is straight. A rod with a diameter touches with its surface.
-    friction : float
-        Coulomb's coefficient μ of the sliding rod, at most 0.84. With friction, a rod that turns about a pivot and is
-        curved toward the object sticks at first, which is not modelled: these samples are left out
-        (`SweepEvents.slides_from`).
 
     Returns
     -------
@@ -273,7 +270,7 @@ def scan(
     >>> round(result.events["forward"].snap_off.drive_angle, 6)
     3.154275
     """
-    rod = Rod() if rod is None else rod
+    rod, friction = rig_of(rig).known_rod, rig_of(rig).friction
     check_choice("direction", direction, ("both", "forward", "backward"), "choose 'forward' or 'backward', or 'both'")
     drives = drives_of(drive, base)
     step = _checked_step(drive_step, drives, rod)

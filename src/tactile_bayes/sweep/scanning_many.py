@@ -8,15 +8,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.checks import check_array, check_choice, check_numbers, check_optional
+from tactile_bayes.checks import check_array, check_choice, check_numbers
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import Reachability
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.schema import column_attributes
+from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep.columns import ManyUnits, phases_of, sweep_events, sweep_samples
 from tactile_bayes.sweep.path import friction_angle_of
 
@@ -29,8 +29,7 @@ def scan_many(
     *,
     direction: Literal["forward", "backward"] = "forward",
     base: tuple[ArrayLike, ArrayLike] = (0.0, 0.0),
-    rod: Rod | None = None,
-    friction: float = 0.0,
+    rig: Rig | None = None,
 ) -> xr.Dataset:
     """Sweep the rod along many contours at once: some 8000 sweeps of 180 samples in a second.
 
@@ -40,17 +39,15 @@ def scan_many(
     Parameters
     ----------
     contours : Contour
-        Contours with parameters of shape (n,); in metres if `rod` is given in SI, else in rod lengths.
+        Contours with parameters of shape (n,); in metres if the rig states its rod, else in rod lengths.
     drive_angles : array_like, shape (k,) or (n, k)
         Drive angles, for all contours or for each [rad].
     direction : {"forward", "backward"}
         Sense of the drive.
     base : (array_like, array_like), each of shape () or (n,)
         Pivots, in the contours' unit of length.
-    rod : Rod, optional
-        By default the dimensionless rod.
-    friction : float
-        Coulomb's coefficient μ of the sliding rod, at most 0.84.
+    rig : Rig, optional
+        As in `scan`.
 
     Returns
     -------
@@ -74,7 +71,6 @@ def scan_many(
     (1000, array([3.1218, 3.2172]))
     """
     check_choice("direction", direction, ("forward", "backward"))
-    check_optional("rod", rod, Rod)
     if not isinstance(contours, Contour):
         raise ParameterError(
             f"contours is a {type(contours).__name__}: give one contour whose parameters are arrays, as in "
@@ -85,7 +81,7 @@ def scan_many(
             f"contours with parameters of shape (n,) are wanted, not of shape {contours.shape}: for one contour, use "
             "scan"
         )
-    rod, (count,) = rod or Rod(), contours.shape
+    rod, friction, (count,) = rig_of(rig).known_rod, rig_of(rig).friction, contours.shape
     try:
         x, y = (np.broadcast_to(check_numbers("base", b), (count,)) for b in base)
         angles = check_array("drive_angles", drive_angles)

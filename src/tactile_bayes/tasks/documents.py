@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["LARGEST", "read_json", "read_toml"]
+__all__ = ["LARGEST", "read_json", "read_toml", "toml_value"]
 
 _DEEPEST = 64
 """Largest depth of lists and tables in one another, and largest number of parts of a dotted key."""
@@ -18,6 +21,7 @@ _DEEPEST = 64
 LARGEST = 1 << 23
 """Largest number of characters of a TOML text, which takes seconds to parse."""
 
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _BRACKET = re.compile(r"[\[\]{}]")
 _JSON_STRING = re.compile(r'"(?:[^"\\]++|\\.)*+"?', re.DOTALL)
 _TOML_STRING = re.compile(
@@ -93,3 +97,31 @@ def _refuse_deep(text: str, strings: re.Pattern[str], name: str) -> None:
         depth += 1 if bracket[0] in "[{" else -1
         if depth > _DEEPEST:
             raise ParameterError(f"{name} is nested deeper than {_DEEPEST} levels: write it as this package does")
+
+
+def toml_value(value: Any) -> str:
+    """Return a number, a text, a list or a mapping of these as an inline value of TOML.
+
+    Raises
+    ------
+    ParameterError
+        If it is none of these.
+    """
+    if isinstance(value, bool | str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, int | np.integer):
+        return str(int(value))
+    if isinstance(value, float | np.floating):
+        return repr(float(value))
+    if isinstance(value, Mapping):
+        return (
+            f"{{ {', '.join(f'{toml_key(str(k))} = {toml_value(v)}' for k, v in value.items())} }}" if value else "{}"
+        )
+    if isinstance(value, list | tuple | np.ndarray):
+        return "[" + ", ".join(toml_value(v) for v in value) + "]"
+    raise ParameterError(f"TOML holds numbers, words, lists and tables, and no {type(value).__name__}")
+
+
+def toml_key(key: str) -> str:
+    """Return a key of TOML, in quotation marks if it needs them."""
+    return key if _BARE.fullmatch(key) else json.dumps(key, ensure_ascii=False)

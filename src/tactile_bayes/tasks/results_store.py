@@ -27,6 +27,9 @@ _FORMAT = 1
 _WRITING_SHARE = 0.05
 """Share of the time that is spent on writing outcomes."""
 
+_LONGEST = 60
+"""Largest number of characters of a text in a message."""
+
 
 class Kind(NamedTuple):
     """Kind of the outcomes in a results store."""
@@ -159,9 +162,8 @@ def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]
         raise kind.error(f"{file} holds no {kind.what} that can be read ({error}): {correction}") from error
     differ = [name for name in {**there, **identity} if there.get(name) != identity.get(name)]
     if outcomes and differ:
-        named = ", ".join(
-            f"{name} is {_short(there.get(name))} there and {_short(identity.get(name))} here" for name in differ[:3]
-        )
+        parts = ((name, *_differing(there.get(name), identity.get(name))) for name in differ[:3])
+        named = ", ".join(f"{name} is {had} there and {has} here" for name, had, has in parts)
         more = f" and {len(differ) - 3} more" if len(differ) > 3 else ""
         raise kind.error(f"{file.parent} holds {kind.what} of another experiment: {named}{more}; {correction}")
     return outcomes
@@ -176,6 +178,14 @@ def _storable(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _short(value: Any) -> str:
-    text = "left out" if value is None else str(value)
-    return text if len(text) <= 60 else f"{text[:57]}…"
+def _differing(there: Any, here: Any) -> tuple[str, ...]:
+    """Return two values as text, long ones from the entry on in which they differ."""
+    texts = ["left out" if value is None else str(value) for value in (there, here)]
+    is_long = max(map(len, texts)) > _LONGEST
+    same = next((i for i, (one, other) in enumerate(zip(*texts, strict=False)) if one != other), 0) if is_long else 0
+    begin = texts[0].rfind(", ", 0, same) + 2 if ", " in texts[0][:same] else 0
+    return tuple(("…" if begin else "") + _short(text[begin:]) for text in texts)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}…"

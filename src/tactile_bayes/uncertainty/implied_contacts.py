@@ -16,8 +16,8 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.parameters.nuisances import Nuisances
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig import Rig
-from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
+from tactile_bayes.inference.record_likelihood.rig_values import RigValues
+from tactile_bayes.inference.result import contour_draws, known_of, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
@@ -154,13 +154,12 @@ def _checked_record(posterior: xr.DataTree) -> xr.Dataset:
 
 def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> dict[str, Floats]:
     """Return the variables of the contacts by name, each of shape (chains, draws, samples)."""
-    friction, rod = posterior.attrs["friction"], rod_of(record)
     inferred = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
-    nuisances = Nuisances(tuple(inferred), {}, rod, friction)
+    nuisances = Nuisances(tuple(inferred), {}, rod_of(record), known_of(posterior.attrs))
     # `infer_contour` gives a cell whose noise it infers a noise of 1.
     unknown: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in picked}
     cell = replace(LoadCell.from_record(record) or LoadCell(), **unknown)
-    likelihood = RecordLikelihood(record, cell, friction)
+    likelihood = RecordLikelihood(record, cell, nuisances.friction)
     angle = record["drive_angle"].values - cell.misread(record["direction"].values)
     contours = contours_of(picked, posterior.attrs["family"])
     values = {name: picked[name].values.ravel() for name in inferred}
@@ -177,7 +176,7 @@ def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> 
 
 
 def contacts_of(
-    likelihood: RecordLikelihood, contours: Contour, rig: Rig, angle: Floats, *, exact: bool = True
+    likelihood: RecordLikelihood, contours: Contour, rig: RigValues, angle: Floats, *, exact: bool = True
 ) -> dict[str, Floats]:
     """Return contacts of contours, shape (contours, samples), in the laboratory frame and the record's units.
 

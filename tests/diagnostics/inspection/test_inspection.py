@@ -13,11 +13,12 @@ from tactile_bayes.diagnostics.inspection.stretches import autocorrelation, unlo
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.record import rows_of_sweeps
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 
 COARSE = np.radians(12.0)
-OTHER_FORCE_X = "force_x had the other sign (--column force_x=-force_x)."
-OTHER_MOMENT = "holding_moment had the other sign (--column holding_moment=-holding_moment)"
+OTHER_FORCE_X = 'force_x had the other sign (force_x = "-force_x" under [file] of rig.toml).'
+OTHER_MOMENT = 'holding_moment had the other sign (holding_moment = "-holding_moment" under [file] of rig.toml)'
 NOTHING = ("Nothing looks wrong.",)
 FAINT = ((0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2))
 """Gain beside which the noise of loads is five times that of readings."""
@@ -25,7 +26,7 @@ FAINT = ((0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2))
 
 @pytest.fixture(scope="module")
 def ideal():
-    return tb.scan(CONTOUR, rod=ROD).record
+    return tb.scan(CONTOUR, rig=Rig(rod=ROD)).record
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def record(ideal):
 @pytest.fixture(scope="module")
 def coarse():
     """In steps of 12°, where few samples will do."""
-    return bare(LOAD_CELL.measure(tb.scan(CONTOUR, rod=ROD, drive_step=COARSE).record, seed=1))
+    return bare(LOAD_CELL.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=COARSE).record, seed=1))
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +76,8 @@ def put(record, name, where, value):
     return changed(record, **{name: values})
 
 
-def words(record, **options):
-    return tb.inspect_record(record, **options).messages
+def words(record, load_cell=None, friction=0.0):
+    return tb.inspect_record(record, Rig(load_cell=load_cell, unknown={"friction": friction})).messages
 
 
 # --- A good record --------------------------------------------------------------------------------------------------
@@ -92,7 +93,7 @@ def test_nothing_is_said_of_a_good_record(record):
     assert found.sweeps.direction.values.tolist() == ["forward", "backward"]
     assert np.degrees(found.sweeps.drive_step.values) == pytest.approx([1.0, 1.0])
     snap_offs = np.degrees(found.sweeps.snap_off_drive_angle.values)
-    events = tb.scan(CONTOUR, rod=ROD).events
+    events = tb.scan(CONTOUR, rig=Rig(rod=ROD)).events
     for between, direction in zip(snap_offs, ("forward", "backward"), strict=True):
         assert between.min() <= np.degrees(events[direction].snap_off.drive_angle) <= between.max()
     assert sum(found.statuses.values()) == record.sizes["sample"]
@@ -165,7 +166,7 @@ def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
         force_range=0.12,
         drive_angle_offset=0.02,
     )
-    measured = cell.measure(tb.scan(CONTOUR, rod=ROD, drive_step=0.5 * COARSE).record, seed=1)
+    measured = cell.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.5 * COARSE).record, seed=1)
     assert (np.abs(measured.force_y.values) == 0.12).any()
     stated = measured.assign_attrs(load_cell_gain_force_x_force_x=0.2, load_cell_gain_force_x_force_y=-0.01)
     assert correction(stated) == OTHER_FORCE_X
@@ -176,7 +177,7 @@ def test_a_wrong_frame_an_exchange_and_a_sign_that_is_suspected_are_named(record
     exchanged = changed(record, force_x=record.force_y, force_y=record.force_x)
     assert correction(exchanged) == "force_x and force_y were exchanged."
     as_fixed = tb.in_frame(record, "turning").assign_attrs(load_cell_frame="fixed")
-    assert correction(as_fixed) == "the load cell turned with the drive (--load-cell-frame turning)."
+    assert 'the load cell turned with the drive (frame = "turning" under [load_cell]' in correction(as_fixed)
     upside_down = changed(record, force_y=-record.force_y)
     assert correction(upside_down) == "force_y had the other sign."
     assert words(upside_down)[0].startswith("force_y is negative in contact")
@@ -198,19 +199,20 @@ def counted_otherwise(record, sense, turns, moment=1):
 @pytest.mark.parametrize(
     ("sense", "turns", "moment", "named"),
     [
-        (-1, 1, -1, f"1.57079632679-drive_angle), and {OTHER_MOMENT}."),
-        pytest.param(-1, 1, 1, "1.57079632679-drive_angle).", marks=pytest.mark.slow),
-        pytest.param(-1, 0, -1, f"-drive_angle), and {OTHER_MOMENT}.", marks=pytest.mark.slow),
-        pytest.param(-1, 2, 1, "3.14159265359-drive_angle).", marks=pytest.mark.slow),
-        pytest.param(1, -1, 1, "drive_angle+1.57079632679).", marks=pytest.mark.slow),
-        pytest.param(1, 1, 1, "drive_angle-1.57079632679).", marks=pytest.mark.slow),
-        pytest.param(1, 2, 1, "drive_angle+3.14159265359).", marks=pytest.mark.slow),
+        (-1, 1, -1, "1.57079632679-drive_angle"),
+        pytest.param(-1, 1, 1, "1.57079632679-drive_angle", marks=pytest.mark.slow),
+        pytest.param(-1, 0, -1, "-drive_angle", marks=pytest.mark.slow),
+        pytest.param(-1, 2, 1, "3.14159265359-drive_angle", marks=pytest.mark.slow),
+        pytest.param(1, -1, 1, "drive_angle+1.57079632679", marks=pytest.mark.slow),
+        pytest.param(1, 1, 1, "drive_angle-1.57079632679", marks=pytest.mark.slow),
+        pytest.param(1, 2, 1, "drive_angle+3.14159265359", marks=pytest.mark.slow),
     ],
 )
 def test_a_drive_angle_that_is_counted_otherwise_is_named_first(coarse, sense, turns, moment, named):
     first, *_ = words(counted_otherwise(coarse, sense, turns, moment))
+    beside = f", and {OTHER_MOMENT}" if moment < 0 else ""
     assert first.split("nearly all would if ")[1] == (
-        f"the drive angle were counted otherwise (--column drive_angle={named}"
+        f'the drive angle were counted otherwise (drive_angle = "{named}" under [file] of rig.toml){beside}.'
     )
 
 
@@ -224,7 +226,7 @@ def test_a_world_in_which_all_fits_but_lies_below_the_pivot_is_told(coarse):
 
 
 def test_friction_is_named():
-    dragged = tb.scan(CONTOUR, rod=ROD, friction=0.3, drive_step=COARSE).record
+    dragged = tb.scan(CONTOUR, rig=Rig(rod=ROD, unknown={"friction": 0.3}), drive_step=COARSE).record
     measured = LOAD_CELL.measure(dragged, seed=1)
     assert correction(measured).startswith("there were friction of about 0.3")
     assert words(measured, friction=0.3) == NOTHING
@@ -279,8 +281,8 @@ def test_readings_that_are_cut_off(ideal, stated):
 
 def test_a_channel_that_never_changes(record):
     assert words(put(record, "force_x", slice(None), 0.013)) == (
-        "force_x never changes: is it connected? If it is not measured, empty its column, or remove it and give "
-        "--missing force_x.",
+        "force_x never changes: is it connected? If it is not measured, empty its column, or remove it and state "
+        'missing = ["force_x"] under [file] of rig.toml.',
     )
 
 
@@ -310,7 +312,7 @@ def test_a_zero_farther_off_than_infer_expects_is_to_be_taken_off(record):
     for load_cell in (None, LOAD_CELL):
         (sentence,) = words(changed(record, force_y=record.force_y.values - 0.03), load_cell=load_cell)
         assert sentence.startswith("Without load the cell reads -29.9 mN of force_y, more than infer expects.")
-        assert sentence.endswith("--column force_y=force_y+0.0299.")
+        assert sentence.endswith('force_y = "force_y+0.0299" under [file] of rig.toml.')
 
 
 def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
@@ -330,14 +332,14 @@ def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
         return tb.read_record(tmp_path / "lab.csv", columns=columns | own, split_sweeps=True, rod=ROD)
 
     (sentence,) = words(read())
-    (zero,) = re.findall(r"--column 'force_y=(.*?)'", sentence)
+    (zero,) = re.findall(r'force_y = "(.*?)"', sentence)
     assert re.fullmatch(r"3[12]\.\d*-Fy\[mN\]", zero)
     assert words(read(force_y=zero)) == NOTHING
     assert words(read(force_y=zero, force_x="-Fx[mN]"))[0].endswith(
-        "force_x had the other sign (--column 'force_x=Fx[mN]')."
+        'force_x had the other sign (force_x = "Fx[mN]" under [file] of rig.toml).'
     )
-    *_, angle = words(read(force_y=zero, drive_angle="Motor[deg]"))[0].partition("--column ")
-    assert angle.startswith("'drive_angle=90-Motor[deg]'")
+    *_, angle = words(read(force_y=zero, drive_angle="Motor[deg]"))[0].partition("(drive_angle = ")
+    assert angle.startswith('"90-Motor[deg]"')
 
 
 def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal):
@@ -353,7 +355,7 @@ def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal):
 
 def test_noise_without_a_standard_deviation_is_not_compared(record):
     found = tb.inspect_record(
-        record, load_cell=tb.LoadCell(force_noise=3e-3, moment_noise=2.5e-4, degrees_of_freedom=2.0)
+        record, rig=Rig(load_cell=tb.LoadCell(force_noise=3e-3, moment_noise=2.5e-4, degrees_of_freedom=2.0))
     )
     assert np.isnan(found.channels.stated_noise.values).all()
     assert found.messages == NOTHING

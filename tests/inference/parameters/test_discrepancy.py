@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from scipy import stats
 
-from helpers.contour_posteriors import BRIEF, CELL, MODEST, TRUTH, swept
+from helpers.contour_posteriors import BRIEF, CELL, MODEST, TRUTH, infer_as_stated, only, swept
 from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import calibrate, experiment_of
 from tactile_bayes.calibration.simulation import simulate
@@ -17,11 +17,12 @@ from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.parameters.discrepancy import PARAMETERS, load_in_contact
-from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.load_cell.discrepancy import Course
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.sweep import Translation, scan
 from tactile_bayes.uncertainty.band import contour_band
 
@@ -44,8 +45,8 @@ def disturbed(size, seed=1, cell=CELL):
     return cell.measure(ideal, seed=seed)
 
 
-def model_of(record, nuisances=SMOOTH, cell=CELL):
-    return Experiment(record, load_cell=cell, nuisances=nuisances).model
+def model_of(record, nuisances=SMOOTH, cell=CELL, family="parabola"):
+    return Experiment(record, Rig(load_cell=cell, unknown=only(*nuisances)), family).model
 
 
 def points_of(model, **values):
@@ -56,24 +57,27 @@ def points_of(model, **values):
 def test_it_is_asked_for_by_name_or_by_a_prior():
     record = measured()
     for asked in (["discrepancy"], ["discrepancy_scale"], list(PARAMETERS)):
-        assert Experiment(record, load_cell=CELL, nuisances=asked).model.names[-2:] == PARAMETERS
-    priors = {"discrepancy_scale": stats.halfnorm(scale=0.02)}
-    assert Experiment(record, load_cell=CELL, priors=priors).model.names[-2:] == PARAMETERS
-    assert not set(PARAMETERS) & set(Experiment(record, load_cell=CELL).model.names)
-    unknown = Experiment(swept(CONTOUR), nuisances=SMOOTH).model
+        assert model_of(record, asked).names[-2:] == PARAMETERS
+    own = {"discrepancy_scale": stats.halfnorm(scale=0.02)}
+    model = Experiment(record, Rig(load_cell=CELL, unknown=own)).model
+    assert model.names[-2:] == PARAMETERS
+    assert model.priors["discrepancy_scale"] is own["discrepancy_scale"]
+    assert not set(PARAMETERS) & set(Experiment(record, rig=Rig(load_cell=CELL)).model.names)
+    unknown = model_of(swept(CONTOUR), cell=None)
     assert unknown.names[-4:] == ("moment_noise", "force_noise", *PARAMETERS)
 
 
 def test_standard_stands_for_the_default():
     record = measured()
-    usual = Experiment(record, load_cell=CELL).model.names
-    assert Experiment(record, load_cell=CELL, nuisances=["standard"]).model.names == usual
-    more = Experiment(record, load_cell=CELL, nuisances=["standard", "drift", "discrepancy"]).model.names
+    usual = Experiment(record, rig=Rig(load_cell=CELL)).model.names
+    more = Experiment(
+        record, rig=Rig(load_cell=CELL, unknown={"drift": "default", "discrepancy": "default"})
+    ).model.names
     drifts = ("moment_drift", "force_x_drift", "force_y_drift")
     assert more == (*usual[:-1], *drifts, usual[-1], *PARAMETERS)
-    beside = Experiment(record, load_cell=CELL, nuisances=[*STANDARD, "discrepancy"]).model.names
+    beside = Experiment(record, rig=Rig(load_cell=CELL, unknown={"discrepancy": "default"})).model.names
     assert beside == (*usual, *PARAMETERS)
-    known = Experiment(record, load_cell=CELL, friction=0.1, nuisances=["standard", "discrepancy"])
+    known = Experiment(record, rig=Rig(load_cell=CELL, unknown={"discrepancy": "default", "friction": 0.1}))
     assert "friction" not in known.model.names
     assert json.loads(known.about["nuisances"])[-2:] == list(PARAMETERS)
 
@@ -133,7 +137,7 @@ def test_repeated_sweeps_have_it_in_common():
 def test_its_coordinate_is_the_travel_where_the_base_is_carried():
     drive = Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
     record = CELL.measure(scan(Circle(0.5, 0.5), drive=drive, drive_step=0.04).record, seed=1)
-    model = Experiment(record, "circle", CELL, nuisances=SMOOTH).model
+    model = model_of(record, family="circle")
     course = model.likelihood.segments.course
     assert course.is_measured_order
     ways = np.hypot(np.diff(record.base_x.values), np.diff(record.base_y.values))
@@ -147,9 +151,12 @@ def test_what_has_no_closed_form_is_refused():
         model_of(record, cell=replace(CELL, drive_angle_noise=0.01))
     for flaw, reason in (({"degrees_of_freedom": 4.0}, "outliers"), ({"correlation": (0.5, 0.0, 0.0)}, "correlated")):
         with refused(ParameterError, reason):
-            infer_contour(record, load_cell=replace(CELL, **flaw), nuisances=SMOOTH, seed=1, settings=BRIEF)
-    with refused(ParameterError, "choose from standard, bias"):
-        model_of(record, ["hysteresis"])
+            infer_contour(
+                record, rig=Rig(load_cell=replace(CELL, **flaw), unknown=only(*SMOOTH)), seed=1, settings=BRIEF
+            )
+    for known in ({"discrepancy_scale": 0.01}, {"discrepancy": 0.01}):
+        with refused(ParameterError, "discrepancy_scale", "distribution"):
+            Experiment(record, Rig(load_cell=CELL, unknown=known)).noise  # noqa: B018
 
 
 @pytest.mark.slow
@@ -158,10 +165,10 @@ def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
     record = disturbed(0.02, cell=LoadCell(force_noise=0.01, moment_noise=0.004))
     x = np.linspace(-0.2, 0.2, 5)
     draw = {"seed": 1, "settings": MODEST}
-    blind, smooth = (infer_contour(record, nuisances=asked, **draw) for asked in ((), SMOOTH))
+    blind, smooth = (infer_as_stated(record, unknown=only(*asked), **draw) for asked in ((), SMOOTH))
     before, after = check_record(blind), check_record(smooth)
     assert not before.passed
-    assert "--discrepancy" in before.attrs["suggestion"]
+    assert 'discrepancy = "default"' in before.attrs["suggestion"]
     assert after.passed
     assert after.attrs["suggestion"] == ""
     assert json.loads(smooth.attrs["nuisances"]) == list(PARAMETERS)
@@ -178,21 +185,24 @@ def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
 
 @pytest.mark.slow
 def test_a_good_record_suggests_nothing():
-    assert check_record(infer_contour(measured(), nuisances=(), seed=1, settings=MODEST)).attrs["suggestion"] == ""
+    assert (
+        check_record(infer_contour(measured(), rig=Rig(unknown="nothing"), seed=1, settings=MODEST)).attrs["suggestion"]
+        == ""
+    )
 
 
 @pytest.mark.slow
 def test_simulated_readings_have_the_density_of_the_likelihood():
     """The mean of minus twice the quadratic form is the number of readings: 5 standard errors of 40 records."""
-    priors = {name: stats.norm(value, 1e-12) for name, value in (("a", 0.5), ("q", 0.5), ("x_c", 0.0))}
-    priors |= {
+    family = Family("parabola", a=0.5, q=0.5, x_c=stats.norm(0.0, 1e-12))
+    unknown = {
+        **NOTHING,
         "noise_scale": stats.lognorm(s=1e-9),
         "discrepancy_scale": stats.lognorm(s=1e-9, scale=0.03),
         "discrepancy_length": stats.lognorm(s=1e-9, scale=0.3),
     }
-    experiment = experiment_of(
-        seed=1, load_cell=CELL, nuisances=SMOOTH, priors=priors, drive_angles=np.radians(np.arange(-30.0, 211.0, 4.0))
-    )
+    rig = Rig(load_cell=CELL, unknown=unknown)
+    experiment = experiment_of(family, rig, seed=1, drive_angles=np.radians(np.arange(-30.0, 211.0, 4.0)))
     squares = []
     for seed in range(40):
         made = simulate(experiment, np.random.default_rng(seed))
@@ -210,7 +220,8 @@ def test_simulated_readings_have_the_density_of_the_likelihood():
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["parabola", "circle"])
 def test_posteriors_with_it_are_calibrated(family):
-    found = calibrate(seed=1, family=family, replicates=50, nuisances=SMOOTH, workers=1)
+    rig = Rig(unknown={**NOTHING, "discrepancy": "default"})
+    found = calibrate(family, rig, seed=1, replicates=50, workers=1)
     assert found.attrs["calibrated"] == 1, found.attrs["verdict"]
 
 
@@ -219,9 +230,7 @@ def test_it_is_in_the_unit_of_the_readings():
     record, gain = swept(Parabola(0.5, 0.5), step=0.1), 900.0 * np.eye(3)
     counting = LoadCell(force_noise=45.0, moment_noise=18.0, gain=tuple(map(tuple, gain)))
     counted = record.assign({name: record[name] * 900.0 for name in CHANNELS})
-    models = [
-        Experiment(one, load_cell=cell, nuisances=SMOOTH).model for one, cell in ((record, CELL), (counted, counting))
-    ]
+    models = [model_of(one, cell=cell) for one, cell in ((record, CELL), (counted, counting))]
     values = []
     for model in models:
         points = points_of(model, noise_scale=1.0, discrepancy_scale=0.03, discrepancy_length=0.3)

@@ -17,13 +17,14 @@ from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLE
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
 from tactile_bayes.record.units import with_rod
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Motion, Translation, scan
 
 SHARE = {False: 3e-4, True: 1e-6}
@@ -45,7 +46,11 @@ def exact_loads(record, contour, friction=0.0):
         base = float(record.base_x[rows[0]]), float(record.base_y[rows[0]])
         angles = record.drive_angle.values[rows]
         other = scan(
-            contour, direction=direction, base=base, drive_angles=angles, rod=rod_of(record), friction=friction
+            contour,
+            direction=direction,
+            base=base,
+            drive_angles=angles,
+            rig=Rig(rod=rod_of(record), unknown={"friction": friction}),
         ).record
         given = np.isin(angles, other.drive_angle.values)
         assert given.all() or (friction and rod_of(record).rest_curvature and np.mean(given) > 0.9)
@@ -148,9 +153,9 @@ def test_the_rest_curvature_of_a_rig_is_that_of_the_rod_in_addition():
     measured, contours = measured_by("arc"), stack([true, other])
     stated = RecordLikelihood(measured, cell, friction).log_likelihood(contours)
     taken_for_straight = RecordLikelihood(with_rod(measured, Rod()), cell)
-    rig = Rig(rest_curvature=rod.rest_curvature, friction=friction)
+    rig = RigValues(rest_curvature=rod.rest_curvature, friction=friction)
     np.testing.assert_array_equal(taken_for_straight.log_likelihood(contours, rig=rig), stated)
-    assert taken_for_straight.log_likelihood(contours, rig=Rig(friction=friction)).max() < stated.max() - 100.0
+    assert taken_for_straight.log_likelihood(contours, rig=RigValues(friction=friction)).max() < stated.max() - 100.0
 
 
 @pytest.mark.parametrize("rod", ["arc", "curved by a function"])
@@ -159,7 +164,7 @@ def test_the_taper_of_a_rig_is_that_of_the_rod_in_addition(rod):
     true, other, stated, cell, _, friction = RIGS[rod]
     contours, tapered = stack([true, other]), replace(stated, taper=stated.taper + 0.1)
     record = cell.measure(swept(true, rod=tapered, friction=friction, step=np.radians(5.0)), seed=3)
-    rig = Rig(taper=np.array([0.1, 0.1]), friction=friction)
+    rig = RigValues(taper=np.array([0.1, 0.1]), friction=friction)
     for exact in (True, False):
         known = RecordLikelihood(record, cell, friction, exact)
         with_rig = RecordLikelihood(with_rod(record, stated), cell, friction, exact)
@@ -175,7 +180,7 @@ def test_rods_that_vary_cost_no_accuracy_where_all_of_the_rig_is_inferred():
     measured, rng = measured_by("curved by a function"), np.random.default_rng(1)
     count = 40
     contours = stack([Parabola(*place) for place in rng.normal([0.5, 0.5, 0.0], 0.01, (count, 3))])
-    rig = Rig(
+    rig = RigValues(
         taper=rng.normal(0.0, 0.1, count),
         rest_curvature=rng.normal(0.0, 0.1, count),
         friction=np.abs(rng.normal(0.0, 0.4, count)),
@@ -196,9 +201,11 @@ def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
     rod = Rod(rest_curvature=lambda s: -3.4 / (1.0 + np.exp(-(s - 0.55) / 0.08)), stem=0.03)
     rng, count, senses = np.random.default_rng(5), 40, []
     bend, friction = rng.uniform(-0.1, 0.1, count), np.abs(rng.normal(0.2, 0.1, count))
-    rig = Rig(rest_curvature=bend, friction=friction, stem=rng.uniform(-0.02, 0.02, count))
+    rig = RigValues(rest_curvature=bend, friction=friction, stem=rng.uniform(-0.02, 0.02, count))
     for drive in (Translation((0.11, 0.0), np.pi, 1.13, 1.1), Translation((0.3, -1.2), 2.05, 1.13, 1.1)):
-        measured = CELL.measure(scan(Circle(0.29, 0.21), rod=rod, drive=drive, friction=0.2).record, seed=1)
+        measured = CELL.measure(
+            scan(Circle(0.29, 0.21), rig=Rig(rod=rod, unknown={"friction": 0.2}), drive=drive).record, seed=1
+        )
         places = 0.003 * rng.normal(size=(3, count)) + np.array([[0.29], [0.21], [0.0]])
         likelihood, exactly = (RecordLikelihood(measured, CELL, exact=exact) for exact in (False, True))
         loads, usable = likelihood.predict(Circle(*places), rig)
@@ -404,7 +411,7 @@ def exact_sensed(model, point):
 def off_at_the_truth(noise, family, numbers):
     """By how much log-likelihoods of records from the default prior differ from exact ones."""
     cell = LoadCell(force_noise=0.05 * noise, moment_noise=0.02 * noise)
-    experiment = experiment_of(seed=1, family=family, load_cell=cell, friction=0.0)
+    experiment = experiment_of(family, Rig(load_cell=cell, unknown={"friction": 0.0}), seed=1)
     off = []
     for number in numbers:
         simulation = simulate(experiment, np.random.default_rng([9, number]))
@@ -458,10 +465,10 @@ def test_loads_of_rods_that_vary_are_within_1e_5_of_the_largest(name):
     rng, count, turn = np.random.default_rng(7), 150, 1e-7
     record = with_rod(swept(Parabola(0.5, 0.6), step=np.radians(1.0)), rod)
     drawn = Parabola(*rng.uniform([0.2, 0.3, -0.15], [1.0, 0.8, 0.15], (count, 3)).T)
-    rig = Rig(friction=friction)
+    rig = RigValues(friction=friction)
     if inferred:
         taper, bend = rng.uniform(-0.14, 0.14, count), rng.uniform(-0.19, 0.19, count)
-        rig = Rig(friction=np.abs(rng.normal(0.0, 0.2, count)), taper=taper, rest_curvature=bend)
+        rig = RigValues(friction=np.abs(rng.normal(0.0, 0.2, count)), taper=taper, rest_curvature=bend)
     by_table, exactly = (RecordLikelihood(record, CELL, friction, exact) for exact in (False, True))
     loads, usable = by_table.predict(drawn, rig)
     exact, usable_exactly = exactly.predict(drawn, rig)
@@ -499,7 +506,7 @@ def test_a_drive_that_repeats_itself_is_followed_once_and_has_one_discrepancy():
 def test_contours_that_release_a_rod_are_usable_in_a_likelihood_as_well(rod, friction):
     """Where contact ends without force, only small errors decide whether the rod at rest still touches."""
     at, rng = Parabola(1.0, 0.8315 if rod.profile is None else 0.81, 0.1), np.random.default_rng(1)
-    found = scan(at, rod=rod, friction=friction, drive_step=0.01)
+    found = scan(at, rig=Rig(rod=rod, unknown={"friction": friction}), drive_step=0.01)
     assert "release" in {sweep.snap_off.kind for sweep in found.events.values()}
     measured = CELL.measure(found.record, seed=1)
     contours = Parabola(*(rng.normal(0.0, 1e-4, (3, 60)) + np.array([[at.a], [at.q], [at.x_c]])))
@@ -520,7 +527,7 @@ def test_the_length_of_a_rig_is_that_of_a_rod_of_the_same_proportions(rig):
     np.testing.assert_allclose(longer.mean_rest_curvature * longer.length, stated.mean_rest_curvature * stated.length)
     drive = Motion([0.08, 0.0, -0.08], [0.0, 0.002, 0.0], [0.9, 1.1, 1.1]) if rig == "carried" else None
     true = Circle(0.03, 0.045)
-    record = scan(true, rod=longer, drive=drive, friction=0.2).record
+    record = scan(true, rig=Rig(rod=longer, unknown={"friction": 0.2}), drive=drive).record
     cell = LoadCell(force_noise=1e-4, moment_noise=1e-5)
     contours = stack([true, Circle(0.0303, 0.0452)])
     off = {
@@ -533,15 +540,17 @@ def test_the_length_of_a_rig_is_that_of_a_rod_of_the_same_proportions(rig):
         known = RecordLikelihood(with_rod(record, longer), cell, exact=exact)
         found = RecordLikelihood(with_rod(record, stated), cell, exact=exact)
         # The compliance is in rad per EI/L of the stated rod.
-        expected, usable = known.predict(contours, Rig(**off | {"suspension_compliance": np.full(2, 0.01 / 1.02)}))
-        loads, usable_too = found.predict(contours, Rig(**off, length=1.02))
+        expected, usable = known.predict(
+            contours, RigValues(**off | {"suspension_compliance": np.full(2, 0.01 / 1.02)})
+        )
+        loads, usable_too = found.predict(contours, RigValues(**off, length=1.02))
         assert usable.all()
         np.testing.assert_array_equal(usable_too, usable)
         expected, loads = expected * longer.load_units, loads * stated.load_units
         error = SHARE[exact] * np.abs(expected).max(axis=(0, 1))
         assert np.all(np.abs(loads - expected) <= error)
     events = [
-        events_of(likelihood, contours, Rig(**off | more))
+        events_of(likelihood, contours, RigValues(**off | more))
         for likelihood, more in (
             (known, {"suspension_compliance": np.full(2, 0.01 / 1.02)}),
             (found, {"length": np.full(2, 1.02)}),

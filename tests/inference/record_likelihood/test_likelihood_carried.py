@@ -7,9 +7,9 @@ import pytest
 
 import tactile_bayes as tb
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.parameters.nuisances import STANDARD
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.inference.record_likelihood.rig_values import RigValues
+from tactile_bayes.rig import Rig
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 CIRCLE = tb.contours.Circle(0.3, 0.8)
@@ -22,9 +22,9 @@ CURVED = tb.Motion(0.9 - 1.8 * WAY, 0.1 * np.sin(3.0 * WAY), 0.7 + 1.2 * WAY)
 TURNS = [tb.Motion([0.8, -0.8], 0.0, [1.2, 1.9]), tb.Rotation()]
 
 
-def model(drive, family="circle", nuisances=STANDARD):
+def model(drive, family="circle"):
     measured = CELL.measure(tb.scan(CIRCLE, drive=drive).record, seed=1)
-    return Experiment(measured, family, CELL, {}, None, None, nuisances).model
+    return Experiment(measured, Rig(load_cell=CELL), family).model
 
 
 @pytest.mark.parametrize("drive", [SHIFTS, TURNS, CURVED])
@@ -57,7 +57,9 @@ def test_an_encoder_offset_is_that_of_the_clamp():
     offset = 0.02
     stated, true = tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6), tb.Translation((0.8, 0.0), np.pi, 1.1 - offset, 1.6)
     likelihood = RecordLikelihood(tb.scan(CIRCLE, drive=stated).record, CELL, exact=True)
-    loads, _ = likelihood.predict(tb.contours.Circle(np.array([0.3]), np.array([0.8])), Rig(drive_angle_offset=offset))
+    loads, _ = likelihood.predict(
+        tb.contours.Circle(np.array([0.3]), np.array([0.8])), RigValues(drive_angle_offset=offset)
+    )
     other = tb.scan(CIRCLE, drive=true).record
     np.testing.assert_allclose(loads[0, :, 0], other.holding_moment, atol=1e-7)
     np.testing.assert_allclose(loads[0, :, 2], other.force_y, atol=1e-7)
@@ -75,9 +77,7 @@ def test_a_posterior_of_a_carried_rod_finds_the_circle():
     posterior = tb.infer_contour(
         measured,
         family="circle",
-        load_cell=CELL,
-        nuisances=[],
-        friction=0.0,
+        rig=Rig(load_cell=CELL, unknown={"friction": 0.0}),
         seed=1,
         settings=tb.SamplerSettings(ensembles=2, walkers=32, min_ess=400, max_r_hat=1.05),
     )

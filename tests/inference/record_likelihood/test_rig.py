@@ -9,25 +9,29 @@ import pytest
 import xarray as xr
 from scipy import stats
 
-from helpers.contour_posteriors import CELL, QUICK, SOUND, assert_near, swept
+from helpers.contour_posteriors import CELL, QUICK, SOUND, assert_near, only, swept
 from helpers.refusals import refused
 from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.contours import Circle, Parabola, from_function
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.contour import infer_contour, infer_rig
+from tactile_bayes.inference.contour import calibrate_rig, infer_contour
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.gauge import Gauge
 from tactile_bayes.inference.parameters.nuisances import CURVE
-from tactile_bayes.inference.parameters.rig_prior import RigPrior, rig_prior
+from tactile_bayes.inference.parameters.rig_prior import rig_prior
 from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import with_rod
+from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.parameters import GROUPS
+from tactile_bayes.rig.rig import expanded
+from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.uncertainty.band import contour_band
 
 PIN, OBJECT = Circle(r=0.2, q=0.5), Parabola(0.7, 0.45)
-UNKNOWN = ("rigidity_scale", "drive_angle_offset", "lever")
+UNKNOWN = only("rigidity_scale", "drive_angle_offset", "lever")
 TRUE = {"rigidity_scale": 1.04, "drive_angle_offset": 0.01, "lever_x": 0.004, "lever_y": -0.003}
 NAMES = tuple(TRUE)
 
@@ -50,7 +54,13 @@ def read_from(*pivots):
 
 @cache
 def rig_from(*pivots):
-    return infer_rig(read_from(*pivots), contour=PIN, load_cell=CELL, nuisances=UNKNOWN, seed=1, settings=SOUND)
+    return calibrate_rig(
+        read_from(*pivots),
+        contour=PIN,
+        rig=Rig(load_cell=CELL, unknown=UNKNOWN),
+        seed=1,
+        settings=SOUND,
+    )
 
 
 def rig():
@@ -60,22 +70,21 @@ def rig():
 @cache
 def rig_of_two():
     """The rig from two records, one after the other."""
-    known = {"load_cell": CELL, "nuisances": UNKNOWN, "seed": 1, "settings": SOUND}
-    return infer_rig(read_from(1), contour=PIN, rig=rig(), **known)
+    return calibrate_rig(read_from(1), contour=PIN, rig=rig(), seed=1, settings=SOUND)
 
 
 @cache
 def found(which):
-    known = {
-        "rig": {"nuisances": (), "rig": rig()},
-        "default": {"nuisances": UNKNOWN},
-        "truth": {"nuisances": (), "priors": {name: stats.norm(value, 1e-7) for name, value in TRUE.items()}},
-    }[which]
-    return infer_contour(read(OBJECT, 2), load_cell=CELL, seed=1, settings=SOUND, **known)
+    given = {
+        "rig": rig,
+        "default": lambda: Rig(load_cell=CELL, unknown=UNKNOWN),
+        "truth": lambda: Rig(load_cell=CELL, unknown=only(**TRUE)),
+    }[which]()
+    return infer_contour(read(OBJECT, 2), rig=given, seed=1, settings=SOUND)
 
 
 def drawn(priors=("rigidity_scale", "lever_x"), **attrs):
-    """A posterior of a rig, as of `infer_rig`, with correlated draws."""
+    """A posterior of a rig, as of `calibrate_rig`, with correlated draws."""
     rng = np.random.default_rng(1)
     scores = rng.standard_normal((20_000, len(priors)))
     folded = np.abs(0.03 * rng.standard_normal(len(scores)))
@@ -90,10 +99,26 @@ def drawn(priors=("rigidity_scale", "lever_x"), **attrs):
     return tree
 
 
+def calibrated(prior, **said):
+    """A rig with a calibration, of which nothing else is unknown."""
+    left = {name: value for name, value in expanded(only(**said)).items() if name not in prior.priors}
+    return Rig(load_cell=CELL, unknown=left, calibration=prior)
+
+
 def test_the_rig_is_found_with_its_gauge():
-    assert_near(rig(), TRUE)
-    assert rig().attrs["gauge"] == repr(PIN)
-    assert list(rig()["posterior"].data_vars) == [*NAMES, "noise_scale"]
+    tree = rig().calibration.posterior
+    assert_near(tree, TRUE)
+    assert tree.attrs["gauge"] == repr(PIN)
+    assert list(tree["posterior"].data_vars) == [*NAMES, "noise_scale"]
+
+
+def test_what_was_unknown_and_lasts_is_calibrated_and_the_rest_stays_as_it_was():
+    found = rig()
+    assert set(found.calibration.priors) == set(NAMES)
+    assert found.known == {
+        name: value for name, value in only().items() if name in ("backlash", "friction")
+    } | dict.fromkeys(GROUPS["bias"], 0.0)
+    assert Experiment(read(OBJECT, 2), found).model.names == ("a", "q", "x_c", *NAMES, "noise_scale")
 
 
 @pytest.mark.slow
@@ -102,12 +127,17 @@ def test_a_stem_is_found_and_lasts():
     true = Rod(stem=0.04)
     record = CELL.measure(swept(PIN, step=0.05, rod=true), seed=1)
     record = with_rod(record, Rod())
-    found = infer_rig(record, contour=PIN, load_cell=CELL, nuisances=["stem", "rigidity_scale"], seed=1, settings=SOUND)
-    assert_near(found, {"stem": 0.04, "rigidity_scale": 1.0})
-    assert float(found["posterior"].stem.std()) < 0.01
-    prior = rig_prior(found)
-    assert set(prior.priors) == {"stem", "rigidity_scale"}
-    model = Experiment(record, load_cell=CELL, nuisances=(), joint=prior).model
+    found = calibrate_rig(
+        record,
+        contour=PIN,
+        rig=Rig(load_cell=CELL, unknown={**NOTHING, "stem": "default", "rigidity_scale": "default"}),
+        seed=1,
+        settings=SOUND,
+    )
+    assert_near(found.calibration.posterior, {"stem": 0.04, "rigidity_scale": 1.0})
+    assert float(found.calibration.posterior["posterior"].stem.std()) < 0.01
+    assert set(found.calibration.priors) == {"stem", "rigidity_scale"}
+    model = Experiment(record, found).model
     assert model.may_vanish[model.names.index("stem")]
 
 
@@ -119,30 +149,31 @@ def test_two_records_tell_as_much_as_one_of_both():
     posteriors, which leaves room for the error of the density.
     """
     for name in NAMES:
-        both, one = rig_of_two()["posterior"][name], rig_from(0, 1)["posterior"][name]
+        both, one, first = (r.calibration.posterior["posterior"][name] for r in (rig_of_two(), rig_from(0, 1), rig()))
         assert abs(float(both.mean() - one.mean())) < 0.42 * float(one.std())
         assert float(both.std()) == pytest.approx(float(one.std()), rel=0.25)
-        assert float(both.std()) < 0.9 * float(rig()["posterior"][name].std())
-    assert_near(rig_of_two(), TRUE)
+        assert float(both.std()) < 0.9 * float(first.std())
+    assert_near(rig_of_two().calibration.posterior, TRUE)
 
 
 def test_a_record_counts_once():
     first, second = rig_of_two(), read_from(1)
-    assert rig_prior(first).source.split() == [rig().attrs["data_sha256"], first.attrs["data_sha256"]]
-    assert rig_prior(first).error >= rig_prior(rig()).error
-    known = {"load_cell": CELL, "nuisances": UNKNOWN, "seed": 1, "settings": QUICK}
+    hashes = [each.calibration.posterior.attrs["data_sha256"] for each in (rig(), first)]
+    assert first.calibration.source.split() == hashes
+    assert first.calibration.error >= rig().calibration.error
     for record in (read_from(0), second):
         with refused(ParameterError, "twice"):
-            infer_rig(record, contour=PIN, rig=first, **known)
+            calibrate_rig(record, contour=PIN, rig=first, seed=1, settings=QUICK)
     with refused(ParameterError, "twice"):
-        infer_contour(second, rig=first, **known)
+        infer_contour(second, rig=first, seed=1, settings=QUICK)
 
 
 def test_the_gauge_predicts_as_its_family():
     """The same density as a family's at the gauge's parameters, up to the prior of these."""
     record = read(PIN, 1)
-    known = Experiment(record, load_cell=CELL, nuisances=UNKNOWN, gauge=Gauge(PIN)).model
-    free = Experiment(record, "circle", CELL, nuisances=UNKNOWN).model
+    stated = Rig(load_cell=CELL, unknown=UNKNOWN)
+    known = Experiment(record, stated, gauge=Gauge(PIN)).model
+    free = Experiment(record, stated, "circle").model
     points = np.array([[*TRUE.values(), 1.0], [1.0, 0.0, 0.0, 0.0, 1.2]])
     contour = np.tile([0.2, 0.5, 0.0], (2, 1))
     expected = free.log_likelihood(np.hstack([contour, points]))
@@ -188,15 +219,15 @@ def test_independent_parameters_are_as_priors_given_by_hand():
     prior = rig_prior(drawn())
     alone = RigPrior(prior.priors, np.eye(2), 0.0, "0")
     record = read(OBJECT, 2)
-    joint = Experiment(record, load_cell=CELL, nuisances=(), joint=alone).model
-    by_hand = Experiment(record, load_cell=CELL, nuisances=(), priors=prior.priors).model
+    joint = Experiment(record, calibrated(alone)).model
+    by_hand = Experiment(record, Rig(load_cell=CELL, unknown=only(**prior.priors))).model
     assert joint.names == by_hand.names
     points = by_hand.draw_prior(np.random.default_rng(1), 50)[0]
     np.testing.assert_allclose(joint.log_prior(points), by_hand.log_prior(points), rtol=1e-12)
 
 
 def test_draws_from_the_prior_have_the_correlations():
-    model = Experiment(read(OBJECT, 2), load_cell=CELL, nuisances=(), joint=rig_prior(drawn())).model
+    model = Experiment(read(OBJECT, 2), calibrated(rig_prior(drawn()))).model
     points = model.draw_prior(np.random.default_rng(1), 2000)[0]
     i, j = model.names.index("rigidity_scale"), model.names.index("lever_x")
     assert np.corrcoef(points[:, i], points[:, j])[0, 1] == pytest.approx(0.8, abs=0.05)
@@ -204,26 +235,26 @@ def test_draws_from_the_prior_have_the_correlations():
 
 @pytest.mark.slow
 def test_a_stored_posterior_has_the_same_prior():
-    tree = infer_contour(read(OBJECT, 2), load_cell=CELL, nuisances=(), rig=rig(), seed=1, settings=QUICK)
+    tree = infer_contour(read(OBJECT, 2), rig=rig(), seed=1, settings=QUICK)
     model = experiment_of(tree).model
     points = np.array([[0.7, 0.45, 0.0, *TRUE.values(), 1.0]])
-    given = Experiment(read(OBJECT, 2), load_cell=CELL, nuisances=(), joint=rig_prior(rig())).model
-    np.testing.assert_allclose(model.log_prior(points), given.log_prior(points), atol=0.02)  # six digits of priors
+    given = Experiment(read(OBJECT, 2), rig()).model
+    np.testing.assert_allclose(model.log_prior(points), given.log_prior(points), rtol=1e-12)
 
 
 @pytest.mark.slow
 def test_families_are_compared_with_the_rig():
     """One parameter has no correlations: its prior given by hand has the same evidence, up to the error of bridges."""
-    record, alone = read(OBJECT, 2), drawn(("rigidity_scale",))
-    priors = dict.fromkeys(("parabola", "circle"), rig_prior(alone).priors)
-    known = {"families": list(priors), "load_cell": CELL, "nuisances": (), "leave_one_out": False, "seed": 1}
-    with_rig = compare_families(record, rig=alone, settings=SOUND, **known)
-    by_hand = compare_families(record, priors=priors, settings=SOUND, **known)
+    record, alone = read(OBJECT, 2), rig_prior(drawn(("rigidity_scale",)))
+    known = {"families": ["parabola", "circle"], "leave_one_out": False, "seed": 1}
+    stated = Rig(load_cell=CELL, unknown=only(**alone.priors))
+    with_rig = compare_families(record, rig=calibrated(alone), settings=SOUND, **known)
+    by_hand = compare_families(record, rig=stated, settings=SOUND, **known)
     assert with_rig.attrs["most_probable"] == "parabola"
     evidences = (one["log_evidence"].sel(family="parabola") for one in (with_rig, by_hand))
     assert abs(float(next(evidences) - next(evidences))) < 0.2
     with refused(ParameterError, "rod_length"):
-        compare_families(record, rig=drawn(rod_length=0.1), settings=QUICK, **known)
+        compare_families(record, rig=calibrated(rig_prior(drawn(rod_length=0.1))), settings=QUICK, **known)
 
 
 @pytest.mark.slow
@@ -246,40 +277,35 @@ def test_its_dependence_counts_as_the_prior_of_the_rig(monkeypatch):
 def test_what_a_record_does_not_show_is_left_out_and_what_it_cannot_tell_is_kept():
     record = read(OBJECT, 2)
     record["holding_moment"] = record.holding_moment * np.nan
-    model = Experiment(record, load_cell=CELL, nuisances=(), joint=rig_prior(drawn())).model
+    model = Experiment(record, calibrated(rig_prior(drawn()))).model
     assert "rigidity_scale" in model.names
     assert "lever_x" not in model.names
     forward = read(OBJECT, 2).isel(sample=read(OBJECT, 2).direction.values == "forward")
     backlash = RigPrior({"backlash": stats.norm(0.0, 0.002)}, np.eye(1), 0.0, "0")
-    assert "backlash" in Experiment(forward, load_cell=CELL, nuisances=(), joint=backlash).model.names
+    assert "backlash" in Experiment(forward, calibrated(backlash)).model.names
 
 
 def test_others_are_refused():
-    record = read(OBJECT, 2)
-    infer = {"load_cell": CELL, "nuisances": (), "seed": 1, "settings": QUICK}
-    with refused(InferenceError, "infer_rig"):
-        infer_contour(record, rig=found_nothing(), **infer)
+    with refused(InferenceError, "calibrate_rig"):
+        rig_prior(found_nothing())
     with refused(InferenceError, "converged"):
-        infer_contour(record, rig=drawn(converged=0), **infer)
+        rig_prior(drawn(converged=0))
     with refused(InferenceError, "lasts"):
-        infer_contour(record, rig=drawn(nuisances='["friction"]'), **infer)
-    with refused(ParameterError, "units"):
-        infer_contour(record, rig=drawn(units="SI"), **infer)
+        rig_prior(drawn(nuisances='["friction"]'))
     with refused(ParameterError, "lever_x"):
-        infer_contour(record, rig=drawn(), priors={"lever_x": stats.norm(0.0, 0.1)}, **infer)
-    with refused(ParameterError, "rod_length"):
-        infer_contour(record, rig=drawn(rod_length=0.1), **infer)
-    with refused(ParameterError, "load_cell_drive_angle_offset"):
-        infer_contour(record, rig=drawn(load_cell_drive_angle_offset=0.1), **infer)
+        Rig(unknown={"lever_x": stats.norm(0.0, 0.1)}, calibration=rig_prior(drawn()))
+    for what, other in {"units": "SI", "rod_length": 0.1, "load_cell_drive_angle_offset": 0.1}.items():
+        with refused(ParameterError, what):
+            infer_contour(read(OBJECT, 2), rig=calibrated(rig_prior(drawn(**{what: other}))), seed=1, settings=QUICK)
 
 
 def test_other_gauges_are_refused():
     record = read(PIN, 1)
     for contour in ("circle", Circle(r=[0.2, 0.3], q=0.5), from_function(lambda x: 0.5 + x * x, (-1.0, 1.0))):
         with refused(ParameterError, "contour"):
-            infer_rig(record, contour=contour, seed=1)
-    with refused(ParameterError, "nuisances"):
-        infer_rig(record, contour=PIN, nuisances=(), seed=1)
+            calibrate_rig(record, contour=contour, seed=1)
+    with refused(ParameterError, "nothing of the rig is unknown"):
+        calibrate_rig(record, contour=PIN, rig=Rig(unknown="nothing"), seed=1)
 
 
 def found_nothing():
@@ -301,18 +327,16 @@ def test_a_sensor_in_counts_is_calibrated_on_a_gauge_whose_place_is_uncertain():
         record.attrs = {name: v for name, v in record.attrs.items() if not name.startswith("load_cell_")}
         return record.assign({name: np.nan * record[name] for name in ("force_x", "force_y")})
 
-    known = {"load_cell": stated, "seed": 1, "settings": SOUND}
-    wide = {"moment_gain": stats.lognorm(s=0.3)}
+    known = {"seed": 1, "settings": SOUND}
+    unknown = only("gauge", "moment_curve", "moment_bias", moment_gain=stats.lognorm(s=0.3))
     place = Circle(r=0.2, q=0.5 - 0.006, x_c=0.01)
-    calibrated = infer_rig(
-        read_by(real, place, 1), contour=PIN, nuisances=("gauge", "moment_curve", "moment_bias"), priors=wide, **known
-    )
-    assert_near(calibrated, true)
-    assert set(rig_prior(calibrated).priors) == {"moment_gain", *CURVE}
-    posterior = infer_contour(read_by(real, OBJECT, 2), nuisances=("moment_bias",), rig=calibrated, **known)
+    whole = Rig(load_cell=stated, unknown=unknown)
+    found = calibrate_rig(read_by(real, place, 1), contour=PIN, rig=whole, **known)
+    assert_near(found.calibration.posterior, true)
+    assert set(found.calibration.priors) == {"moment_gain", *CURVE}
+    posterior = infer_contour(read_by(real, OBJECT, 2), rig=found, **known)
     assert_near(posterior, {"a": 0.7, "q": 0.45, **{name: true[name] for name in ("moment_gain", *CURVE)}})
-    with refused(ParameterError, "gauge"):
-        infer_contour(read_by(real, OBJECT, 2), nuisances=("gauge_x",), **known)
+    assert not {"gauge_x", "gauge_y"} & set(posterior["posterior"].data_vars)
 
 
 def counts(gain):
@@ -322,7 +346,7 @@ def counts(gain):
 @pytest.mark.slow
 def test_a_stream_takes_it_as_prior(tmp_path):
     """Its posterior is that of the whole record, within their Monte-Carlo errors: a quarter of a deviation."""
-    record, known = read(OBJECT, 2), {"load_cell": CELL, "nuisances": [], "seed": 1, "rig": rig()}
+    record, known = read(OBJECT, 2), {"seed": 1, "rig": rig()}
     stream = Stream(**known, particles=500)
     for block in np.array_split(np.arange(record.sizes["sample"]), 3):
         stream.update(record.isel(sample=block))
@@ -335,6 +359,6 @@ def test_a_stream_takes_it_as_prior(tmp_path):
     stream.save(tmp_path / "stream.nc")
     Stream.resume(tmp_path / "stream.nc", **known, particles=500)
     with refused(InferenceError, "rig_parameters"):
-        Stream.resume(tmp_path / "stream.nc", **{**known, "rig": None}, particles=500)
+        Stream.resume(tmp_path / "stream.nc", **{**known, "rig": Rig(load_cell=CELL, unknown="nothing")}, particles=500)
     with refused(ParameterError, "inferred from this very record"):
         Stream(**known).update(read_from(0))

@@ -18,6 +18,7 @@ from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.drift import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.load_cell.likelihood import log_likelihood
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import NOTHING, Rig
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 CONTOUR = paper_profile("II", q=0.5)
@@ -99,7 +100,7 @@ def test_readings_at_one_angle_are_one_block():
 def test_the_likelihood_of_blocks_is_that_of_the_readings(flaw, sweeps):
     """Differences from the best point agree to 0.1, and to 2 % where they are larger."""
     record = long_record(3_000, sweeps, replace(CELL, **flaw))
-    given = Experiment(record, nuisances=["friction", "drive_angle_offset"])
+    given = Experiment(record, rig=Rig(unknown={**NOTHING, "friction": "default", "drive_angle_offset": "default"}))
     short = given.shortened
     assert short.record.sizes["sample"] < record.sizes["sample"]
     named = {"a": (0.5, 2e-4), "q": (0.5, 5e-5), "noise_scale": (1.0, 0.01), "friction": (0.0, 1e-2)}
@@ -204,7 +205,7 @@ def test_a_posterior_of_a_long_record_is_of_its_blocks(monkeypatch):
 
     monkeypatch.setattr("tactile_bayes.load_cell.cell.log_likelihood", counted)
     record = long_record()
-    result = infer_contour(record, nuisances=[], seed=1, settings=BRIEF)
+    result = infer_contour(record, rig=Rig(unknown="nothing"), seed=1, settings=BRIEF)
     samples = result["observed_data"].sizes["sample"]
     assert set(taken) == {samples}
     assert samples <= MOST_SAMPLES
@@ -243,7 +244,7 @@ def test_a_posterior_of_blocks_is_that_of_the_readings(monkeypatch):
     """Means within five Monte-Carlo errors, standard deviations within five: false alarm below 1 in 10,000."""
     record = long_record(3_000)
     settings = SamplerSettings(min_ess=2000)
-    options = {"nuisances": ["friction"], "seed": 1, "settings": settings}
+    options = {"rig": Rig(unknown={**NOTHING, "friction": "default"}), "seed": 1, "settings": settings}
     blocks = infer_contour(record, **options)["posterior"].to_dataset()
     monkeypatch.setattr(shortening, "MOST_SAMPLES", 10**9)
     readings = infer_contour(record, **options)["posterior"].to_dataset()

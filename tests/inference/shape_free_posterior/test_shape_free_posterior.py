@@ -6,25 +6,27 @@ import xarray as xr
 from scipy import stats
 from scipy.special import gamma, kv
 
+from helpers.contour_posteriors import only
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
-from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.experiment import default_priors
-from tactile_bayes.inference.parameters.noise import noise_of
-from tactile_bayes.inference.parameters.nuisances import STANDARD, nuisances_of
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.starts.contour_optimum import contact_fit
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.band import contour_band
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+ALL: dict[str, float] = {}
+"""All that is unknown of a real rig."""
+SMOOTH = {"friction": 0.0}
 RADIUS = RandomRadius(shortest=0.4, longest=4.0, tolerance=0.01)
 
 
@@ -63,19 +65,16 @@ def test_the_radius_is_a_geometric_mean():
     np.testing.assert_allclose(np.log(radii).mean(axis=0), np.log(0.4), atol=2e-3)
 
 
-def model_of(nuisances=STANDARD, profile="II", rod=None, cell=CELL):
+def model_of(unknown=SMOOTH, profile="II", rod=None, cell=CELL):
     contour = paper_profile(profile, q=0.5)
     if rod is not None:
         contour = Parabola(0.5 / rod.length, 0.5 * rod.length)
-    measured = cell.measure(scan(contour, rod=rod, drive_step=np.radians(5.0)).record, seed=1)
-    return model_of_record(measured, nuisances, cell)
+    measured = cell.measure(scan(contour, rig=Rig(rod=rod), drive_step=np.radians(5.0)).record, seed=1)
+    return model_of_record(measured, unknown, cell)
 
 
-def model_of_record(measured, nuisances=STANDARD, cell=CELL):
-    noise = noise_of(measured, cell)
-    rig = nuisances_of(measured, nuisances, {}, noise.cell, 0.0)
-    priors = default_priors(measured, "shape-free", cell, nuisances)
-    return ContourModel(measured, family_named("shape-free"), rig, noise, priors)
+def model_of_record(measured, unknown=SMOOTH, cell=CELL):
+    return Experiment(measured, Rig(load_cell=cell, unknown=unknown), "shape-free").model
 
 
 def whitened(model):
@@ -85,7 +84,7 @@ def whitened(model):
 
 
 SI = Rod(length=0.1, flexural_rigidity=2e-4)
-RUBBING = ("friction", "bias", "suspension_compliance", "rigidity_scale")
+RUBBING = only("friction", "bias", "suspension_compliance", "rigidity_scale")
 """With those that may vanish, between others."""
 
 
@@ -110,7 +109,7 @@ def test_a_volume_grows_as_the_whitening_says(rod):
 
 def test_scales_that_lie_far_apart_leave_the_approximation_a_distribution():
     """As a corner asks for them: readings then tell 1e16 times as much of one direction as the prior of another."""
-    approximation = whitened(model_of([])).approximation
+    approximation = whitened(model_of("nothing")).approximation
     scales = np.array([[amplitude, 0.3, noise] for amplitude in (1.0, 1e4, 1e8) for noise in (1.0, 1e-4, 1e-8)])
     pulled, root = approximation.conditional(scales)
     assert np.all(np.isfinite(pulled))
@@ -120,7 +119,7 @@ def test_scales_that_lie_far_apart_leave_the_approximation_a_distribution():
 @pytest.mark.slow
 def test_a_start_out_of_reach_leads_somewhere():
     """Where the rod touches nothing there is no snap-off to be made linear."""
-    model = model_of([])
+    model = model_of("nothing")
     point = np.concatenate([contact_fit(model), [1.0]])
     point[model.names.index("q")] = 1.5
     centre = whitening_at(model, point, np.random.default_rng(1)).centre
@@ -144,10 +143,10 @@ def test_in_its_coordinates_the_posterior_is_nearly_standard_normal(noise, sprea
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("profile", "nuisances", "evaluations"),
-    [("I", STANDARD, 50_000), ("II", STANDARD, 50_000), ("II", [], 40_000), ("III", STANDARD, 50_000)],
+    ("profile", "unknown", "evaluations"),
+    [("I", ALL, 50_000), ("II", ALL, 50_000), ("II", "nothing", 40_000), ("III", ALL, 50_000)],
 )
-def test_a_smooth_contour_is_within_its_band(profile, nuisances, evaluations):
+def test_a_smooth_contour_is_within_its_band(profile, unknown, evaluations):
     """Converged in some 100 steps; 95 % band, of nine places at most one is outside.
 
     With the nuisances there are 43 parameters in place of 34, and as a step moves two walkers for each parameter in
@@ -155,7 +154,7 @@ def test_a_smooth_contour_is_within_its_band(profile, nuisances, evaluations):
     """
     truth = paper_profile(profile, q=0.5)
     measured = CELL.measure(scan(truth, drive_step=np.radians(1.0)).record, seed=1)
-    result = infer_contour(measured, family="shape-free", load_cell=CELL, nuisances=nuisances, seed=1)
+    result = infer_contour(measured, family="shape-free", rig=Rig(load_cell=CELL, unknown=unknown), seed=1)
     assert result.attrs["converged"], result.attrs["message"]
     assert result["sample_stats"].attrs["evaluations"] < evaluations
     x = np.linspace(-0.6, 0.6, 9)
@@ -170,7 +169,7 @@ def test_a_smooth_contour_is_within_its_band(profile, nuisances, evaluations):
 def test_a_run_is_made_again_from_its_seed_and_has_units():
     settings = SamplerSettings(ensembles=2, max_steps=20)
     cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
-    measured = cell.measure(scan(Parabola(5.0, 0.05), rod=SI, drive_step=0.05).record, seed=1)
+    measured = cell.measure(scan(Parabola(5.0, 0.05), rig=Rig(rod=SI), drive_step=0.05).record, seed=1)
     one, other = (infer_contour(measured, family="shape-free", seed=1, settings=settings) for _ in range(2))
     for name, draws in one["posterior"].data_vars.items():
         np.testing.assert_array_equal(draws, other["posterior"][name])
@@ -185,7 +184,12 @@ def test_what_goes_on_from_a_checkpoint_is_the_same(tmp_path):
     def run(steps, **options):
         settings = SamplerSettings(ensembles=2, block_steps=10, max_steps=steps)
         return infer_contour(
-            measured, family="shape-free", load_cell=CELL, nuisances=[], seed=1, settings=settings, **options
+            measured,
+            family="shape-free",
+            rig=Rig(load_cell=CELL, unknown="nothing"),
+            seed=1,
+            settings=settings,
+            **options,
         )
 
     run(10, checkpoint=tmp_path / "run")
@@ -218,9 +222,8 @@ def test_time_that_ends_before_anything_possible_is_found_gives_what_the_prior_a
     """Of a vertex far above where the rod was: no approximation by normal distributions leads there."""
     kept = infer_contour(
         CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, seed=1),
-        family="shape-free",
-        load_cell=CELL,
-        priors={"q": stats.uniform(0.9, 0.05)},
+        family=Family("shape-free", q=stats.uniform(0.9, 0.05)),
+        rig=Rig(load_cell=CELL),
         seed=1,
         settings=SamplerSettings(ensembles=2, max_seconds=1e-3),
     )
@@ -252,33 +255,34 @@ def test_a_zero_that_is_not_known_hides_no_snap_off(bias):
 @pytest.mark.parametrize("what", ["moment alone", "friction", "drift", "two pivots", "without events", "SI"])
 def test_other_rigs(what):
     """The truth within the band of 95 % at eight of nine places."""
-    truth, cell, options = paper_profile("II", q=0.5), CELL, {}
+    truth, cell, options, unknown = paper_profile("II", q=0.5), CELL, {}, ALL
     record = scan(truth, drive_step=np.radians(2.0)).record
     if what == "friction":
         truth = Parabola(0.5, 0.5)
-        record = scan(truth, drive_step=np.radians(2.0), friction=0.2).record
-        options = {"nuisances": ["friction"], "settings": SamplerSettings(max_steps=150)}
+        record = scan(truth, drive_step=np.radians(2.0), rig=Rig(unknown={"friction": 0.2})).record
+        options, unknown = {"settings": SamplerSettings(max_steps=150)}, only("friction")
     if what == "drift":
-        options = {"nuisances": ["bias", "drift"]}
+        unknown = only("bias", "drift")
     if what == "two pivots":
         other = scan(truth, drive_step=np.radians(2.0), base=(0.25, 0.0)).record
         other["sweep"] = other.sweep + 2
         record = xr.concat([record, other], "sample", combine_attrs="override")
-        options = {"nuisances": ["base"]}
+        unknown = only("base")
     measured_with = 2 if what == "without events" else 1
     if what == "without events":
-        options = {"events": False}
+        options = {"settings": SamplerSettings(events=False)}
     scale = 1.0
     if what == "SI":
         truth, scale = Parabola(0.5 / SI.length, 0.5 * SI.length), SI.length
-        record = scan(truth, rod=SI, drive_step=np.radians(2.0)).record
+        record = scan(truth, rig=Rig(rod=SI), drive_step=np.radians(2.0)).record
         cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
     measured = cell.measure(record, seed=measured_with)
     if what == "moment alone":
         for name in ("force_x", "force_y"):
             measured[name] = measured[name] * np.nan
-        options = {"nuisances": []}
-    result = infer_contour(measured, family="shape-free", load_cell=cell, seed=1, **options)
+        unknown = "nothing"
+    rig = Rig(load_cell=cell, unknown=unknown)
+    result = infer_contour(measured, family="shape-free", rig=rig, seed=1, **options)
     x = scale * np.linspace(-0.6, 0.6, 9)
     band = contour_band(result, x)
     inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)

@@ -7,6 +7,7 @@ from tactile_bayes import LoadCell, scan
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.axial_rig import axial_rig
+from tactile_bayes.rig import Rig
 
 RIG = {"rigidity_scale": 1.06, "drive_angle_offset": 0.01, "lever_x": 0.006, "lever_y": -0.004, "backlash": 0.003}
 TRUE = LoadCell(
@@ -19,11 +20,13 @@ TRUE = LoadCell(
     bias=(0.05, -0.1, 0.08),
 )
 STATED = LoadCell(force_noise=1e-3, moment_noise=4e-4)
+ALL: dict[str, float] = {}
+"""All that is unknown of a real rig."""
 
 
-def model_of(contour, **options):
-    record = scan(contour, drive_step=np.radians(1.0), friction=0.2).record
-    model = Experiment(TRUE.measure(record, seed=1), "parabola", STATED, **options).model
+def model_of(contour, unknown=ALL):
+    record = scan(contour, drive_step=np.radians(1.0), rig=Rig(unknown={"friction": 0.2})).record
+    model = Experiment(TRUE.measure(record, seed=1), Rig(load_cell=STATED, unknown=unknown)).model
     return model, (record.holding_moment != 0.0).values
 
 
@@ -43,5 +46,5 @@ def test_it_is_not_asked_where_it_does_not_follow():
     model, loaded = model_of(contour)
     assert axial_rig(model, loaded) is not None
     assert axial_rig(model, loaded & (np.cumsum(loaded) < 10)) is None
-    assert axial_rig(model_of(contour, nuisances=[])[0], loaded) is None
-    assert axial_rig(model_of(contour, nuisances=["standard", "rest_curvature"])[0], loaded) is None
+    assert axial_rig(model_of(contour, "nothing")[0], loaded) is None
+    assert axial_rig(model_of(contour, {"rest_curvature": "default"})[0], loaded) is None

@@ -10,6 +10,7 @@ from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.contour_optimum import contact_fit, event_brackets, optima_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -21,10 +22,10 @@ def brief():
     """Exact sweeps in which contact lasts for two samples each, and the model of a record of them."""
     angles = np.radians(np.arange(-30.0, 211.0, 2.0))
     contour = Parabola(TRUTH["a"], TRUTH["q"], TRUTH["x_c"])
-    scanned = scan(contour, drive_angles=angles, friction=TRUTH["friction"])
+    scanned = scan(contour, drive_angles=angles, rig=Rig(unknown={"friction": TRUTH["friction"]}))
     touched = (scanned.record.holding_moment != 0.0).groupby(scanned.record.sweep).sum()
     assert touched.values.tolist() == [2, 2]
-    return scanned, contour_problem(Experiment(CELL.measure(scanned.record, seed=3), "parabola", CELL)).model
+    return scanned, contour_problem(Experiment(CELL.measure(scanned.record, seed=3), Rig(load_cell=CELL))).model
 
 
 def test_contact_of_a_few_samples_brackets_its_events(brief):

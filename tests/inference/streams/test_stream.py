@@ -17,8 +17,10 @@ from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.streams import particles
 from tactile_bayes.inference.streams.stream import surprise_after
+from tactile_bayes.rig import Rig
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+STATED = Rig(load_cell=CELL, unknown="nothing")
 X = [-0.2, 0.0, 0.2]
 
 
@@ -29,7 +31,7 @@ def measured():
 
 
 def stream_of(**changes):
-    return tb.Stream(**({"load_cell": CELL, "nuisances": [], "seed": 1, "particles": 500, "x": X} | changes))
+    return tb.Stream(**({"rig": STATED, "seed": 1, "particles": 500, "x": X} | changes))
 
 
 def fed(stream, measured, blocks):
@@ -45,7 +47,7 @@ def streamed(measured):
 
 @pytest.fixture(scope="module")
 def whole(measured):
-    problem = contour_problem(Experiment(measured, "parabola", CELL, nuisances=[]))
+    problem = contour_problem(Experiment(measured, STATED))
     return problem, sampled(problem, seed=2, settings=tb.SamplerSettings(min_ess=1000))
 
 
@@ -122,7 +124,9 @@ def test_particles_that_have_lost_the_posterior_find_it_again_or_tell(
 @pytest.mark.slow
 def test_a_wrong_model_shows_early_and_a_right_one_never(streamed):
     assert all(float(now.e_value) < 2.0 for now in streamed[1])
-    sliding = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.05, friction=0.2).record
+    sliding = tb.scan(
+        tb.contours.paper_profile("II", q=0.5), drive_step=0.05, rig=Rig(unknown={"friction": 0.2})
+    ).record
     stream = stream_of(particles=200)
     first, *_, last = fed(stream, CELL.measure(sliding, seed=1).isel(sample=slice(0, 60)), 4)
     assert float(first.e_value) < 2.0
@@ -197,7 +201,7 @@ def test_arguments_are_checked():
 
 @pytest.mark.slow
 def test_the_backlash_enters_with_the_second_direction(measured):
-    stream = stream_of(nuisances=["standard"], particles=100)
+    stream = stream_of(rig=Rig(load_cell=CELL), particles=100)
     turns = int((measured.direction.values == "forward").sum())
     before = stream.update(measured.isel(sample=slice(0, turns)))
     now = stream.update(measured.isel(sample=slice(turns, turns + 20)))
@@ -207,7 +211,7 @@ def test_the_backlash_enters_with_the_second_direction(measured):
 
 # --- The file of a stream -------------------------------------------------------------------------------------------
 
-SAVED = {"load_cell": CELL, "nuisances": [], "seed": 1, "particles": 100}
+SAVED = {"rig": STATED, "seed": 1, "particles": 100}
 
 
 @pytest.fixture(scope="module")
@@ -236,9 +240,9 @@ def test_a_stream_that_goes_on_has_the_numbers_of_one_that_was_not_stopped(measu
         ({"seed": 2}, "seed (was '1, pool of 4', now '2, pool of 4')"),
         ({"family": "circle"}, "family (was 'parabola', now 'circle')"),
         ({"particles": 200}, "particles (was '100', now '200')"),
-        ({"nuisances": ["friction"]}, "nuisances"),
-        ({"load_cell": tb.LoadCell(force_noise=0.06, moment_noise=0.02)}, "load_cell_force_noise"),
-        ({"priors": {"q": stats.norm(0.5, 0.1)}}, "priors"),
+        ({"rig": STATED.with_unknown(friction="default")}, "nuisances"),
+        ({"rig": replace(STATED, load_cell=replace(CELL, force_noise=0.06))}, "load_cell_force_noise"),
+        ({"family": tb.Family("parabola", q=stats.norm(0.5, 0.1))}, "priors"),
         ({"record": "shorter"}, "samples (was '30', now '20')"),
         ({"record": "another"}, "record (its SHA-256)"),
     ],
@@ -250,13 +254,26 @@ def test_the_file_of_another_stream_is_refused_with_what_differs(measured, saved
         tb.Stream.resume(saved[0], **(SAVED | change))
 
 
-def test_a_prior_that_differs_in_no_printed_digit_is_refused(measured, tmp_path):
-    priors = [{"q": stats.norm(centre, 0.05)} for centre in (0.5, 0.5000004)]
-    stream = tb.Stream(**SAVED, priors=priors[0])
+class Mine:
+    """A prior that does not state its numbers."""
+
+    def __init__(self, centre):
+        self.logpdf, self.rvs = stats.norm(centre, 0.05).logpdf, stats.norm(centre, 0.05).rvs
+
+    def std(self):
+        return 0.05
+
+    def __repr__(self):
+        return "mine"
+
+
+def test_a_prior_that_differs_in_nothing_that_is_written_is_refused(measured, tmp_path):
+    one, other = (tb.Family("parabola", q=Mine(centre)) for centre in (0.5, 0.5000004))
+    stream = tb.Stream(**SAVED, family=one)
     stream.update(measured.isel(sample=slice(0, 20)))
     stream.save(tmp_path / "stream.nc")
     with refused(InferenceError, "log-density of the particles"):
-        tb.Stream.resume(tmp_path / "stream.nc", **SAVED, priors=priors[1])
+        tb.Stream.resume(tmp_path / "stream.nc", **SAVED, family=other)
 
 
 def test_a_file_that_is_damaged_or_no_state_is_refused(measured, saved, tmp_path):

@@ -16,7 +16,7 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.inference.parameters.priors import default_priors
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics import compiler
 from tactile_bayes.mechanics.branches import sweeps
@@ -24,6 +24,7 @@ from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import in_frame
+from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
 SWEEPS = "tactile_bayes.mechanics.branches.sweeps"
@@ -37,7 +38,7 @@ def likelihood_of(rod, **options):
     """A record in both directions from two pivots, one of them to the side."""
     length = rod.length
     bases = [(0.0, 0.0), (0.15 * length, -0.1 * length)]
-    record = scan(Parabola(0.5 / length, 0.5 * length), rod=rod, base=bases).record
+    record = scan(Parabola(0.5 / length, 0.5 * length), rig=Rig(rod=rod), base=bases).record
     unit = LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
     return RecordLikelihood(record, unit, **options)
 
@@ -95,7 +96,7 @@ def test_loads_and_usable_contours_are_the_exact_ones(name, rod, friction):
 def test_events_are_the_exact_ones(friction):
     """To the tolerance of a snap-off, as read: with an offset, and with the backlash of each direction."""
     contours = drawn("ellipse", THIN, 200)
-    rig = Rig(drive_angle_offset=0.02, drive_angle_backlash=0.01, friction=friction)
+    rig = RigValues(drive_angle_offset=0.02, drive_angle_backlash=0.01, friction=friction)
     likelihood = likelihood_of(THIN, is_always_clear=False)
     *_, usable, events = likelihood.predict_with_events(contours, rig)
     *_, expected = likelihood_of(THIN, is_always_clear=False, exact=True).predict_with_events(contours, rig)

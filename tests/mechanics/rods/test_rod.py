@@ -12,6 +12,7 @@ from tactile_bayes.errors import ContourError, ParameterError
 from tactile_bayes.record import read_record, record_hash, rod_of, to_dimensionless, to_si, write_record
 from tactile_bayes.record.attributes import same_rod
 from tactile_bayes.record.units import with_rod
+from tactile_bayes.rig import Rig
 
 ARC = tb.Rod(0.2, 2.4e-3, 7e-4, rest_curvature=2.5)
 CIRCLE = tb.contours.Circle(0.06, 0.1)
@@ -36,7 +37,7 @@ def test_a_rod_says_how_it_is_curved_only_if_it_is():
 
 @pytest.mark.parametrize("ending", ["csv", "nc"])
 def test_a_file_states_the_rest_curvature(tmp_path, ending):
-    record = tb.scan(CIRCLE, rod=ARC, drive_step=0.1).record
+    record = tb.scan(CIRCLE, rig=Rig(rod=ARC), drive_step=0.1).record
     assert record.attrs["rod_rest_curvature"] == 2.5
     write_record(record, tmp_path / f"arc.{ending}")
     read = read_record(tmp_path / f"arc.{ending}")
@@ -48,7 +49,7 @@ def test_a_file_states_the_rest_curvature(tmp_path, ending):
 
 
 def test_a_rest_curvature_given_completes_a_record_that_does_not_state_it(tmp_path):
-    record = tb.scan(CIRCLE, rod=ARC, drive_step=0.1).record
+    record = tb.scan(CIRCLE, rig=Rig(rod=ARC), drive_step=0.1).record
     del record.attrs["rod_rest_curvature"]
     write_record(record, tmp_path / "arc.csv")
     assert rod_of(read_record(tmp_path / "arc.csv", rod=ARC)) == ARC
@@ -58,8 +59,8 @@ def test_a_rest_curvature_given_completes_a_record_that_does_not_state_it(tmp_pa
 def test_units_do_not_matter(length):
     """A sweep in SI is that in rod lengths, for arcs too."""
     own, rod = tb.Rod(rest_curvature=0.5), tb.Rod(length, 3e-3, rest_curvature=0.5 / length)
-    one = tb.scan(tb.contours.Circle(0.3, 0.5), rod=own).record
-    other = tb.scan(tb.contours.Circle(0.3 * length, 0.5 * length), rod=rod).record
+    one = tb.scan(tb.contours.Circle(0.3, 0.5), rig=Rig(rod=own)).record
+    other = tb.scan(tb.contours.Circle(0.3 * length, 0.5 * length), rig=Rig(rod=rod)).record
     for name, unit in zip(("holding_moment", "force_x", "force_y"), rod.load_units, strict=True):
         np.testing.assert_allclose(other[name], unit * one[name], atol=1e-9 * unit)
 
@@ -67,17 +68,19 @@ def test_units_do_not_matter(length):
 def test_forward_and_backward_sweeps_of_an_arc_differ():
     """The object is symmetric, the rod is not: the backward sweep sees its mirror image."""
     forward, backward = (
-        tb.scan(tb.contours.Circle(0.3, 0.5), rod=tb.Rod(rest_curvature=curvature), direction=direction).sweeps[0]
+        tb.scan(
+            tb.contours.Circle(0.3, 0.5), rig=Rig(rod=tb.Rod(rest_curvature=curvature)), direction=direction
+        ).sweeps[0]
         for curvature, direction in ((0.5, "forward"), (-0.5, "backward"))
     )
     assert backward.snap_off.drive_angle == pytest.approx(math.pi - forward.snap_off.drive_angle, abs=1e-12)
-    both = tb.scan(tb.contours.Circle(0.3, 0.5), rod=tb.Rod(rest_curvature=0.5)).events
+    both = tb.scan(tb.contours.Circle(0.3, 0.5), rig=Rig(rod=tb.Rod(rest_curvature=0.5))).events
     assert abs(math.pi - both["backward"].snap_off.drive_angle - both["forward"].snap_off.drive_angle) > 0.01
 
 
 def test_where_a_rod_would_touch_twice_a_scan_says_so():
     with refused(ContourError, "touch the contour twice", "in contact at ("):
-        tb.scan(tb.contours.Parabola(0.5, 0.5), rod=tb.Rod(rest_curvature=0.9), direction="forward")
+        tb.scan(tb.contours.Parabola(0.5, 0.5), rig=Rig(rod=tb.Rod(rest_curvature=0.9)), direction="forward")
 
 
 WHISKERS = {
@@ -92,7 +95,7 @@ WHISKERS = {
 @pytest.mark.parametrize("name", WHISKERS)
 def test_a_file_states_any_rod(tmp_path, name, ending):
     rod = WHISKERS[name]
-    record = tb.scan(CIRCLE, rod=rod, drive_step=0.1, direction="forward").record
+    record = tb.scan(CIRCLE, rig=Rig(rod=rod), drive_step=0.1, direction="forward").record
     write_record(record, tmp_path / f"rod.{ending}")
     read = read_record(tmp_path / f"rod.{ending}")
     assert rod_of(read) == rod
@@ -103,8 +106,10 @@ def test_a_file_states_any_rod(tmp_path, name, ending):
 @pytest.mark.parametrize("name", WHISKERS)
 def test_rods_in_their_own_units_are_swept_alike(name):
     rod = WHISKERS[name]
-    si = tb.scan(CIRCLE, rod=rod, drive_step=0.1, direction="forward").record
-    own = tb.scan(tb.contours.Circle(0.3, 0.5), rod=rod.in_lengths(), drive_step=0.1, direction="forward").record
+    si = tb.scan(CIRCLE, rig=Rig(rod=rod), drive_step=0.1, direction="forward").record
+    own = tb.scan(
+        tb.contours.Circle(0.3, 0.5), rig=Rig(rod=rod.in_lengths()), drive_step=0.1, direction="forward"
+    ).record
     np.testing.assert_allclose(si["force_x"], rod.force_unit * own["force_x"], atol=1e-8 * rod.force_unit)
 
 
@@ -157,6 +162,8 @@ def test_a_rod_that_slips_off_at_once_is_refused_as_such():
     """Its tip is turned beyond the normal of the contour where it first touches: a right angle to the tangent."""
     contour, rod = tb.contours.Circle(0.7992, 0.7331, -0.7511), tb.Rod(rest_curvature=1.5)
     with refused(tb.errors.ReachError, "slips off", "forward sweep", "beyond the normal"):
-        tb.scan(contour, rod=rod, direction="forward", friction=0.4)
-    many = tb.scan_many(contour.broadcast_to((2,)), [1.5], rod=rod, direction="forward", friction=0.4)
+        tb.scan(contour, rig=Rig(rod=rod, unknown={"friction": 0.4}), direction="forward")
+    many = tb.scan_many(
+        contour.broadcast_to((2,)), [1.5], rig=Rig(rod=rod, unknown={"friction": 0.4}), direction="forward"
+    )
     assert many.status.values.tolist() == ["slips off at once"] * 2

@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.record import CHANNELS, frame_of
-from tactile_bayes.record.origin import column_option
+from tactile_bayes.record.origin import column_entry
+from tactile_bayes.record.rig_entry import rig_entries, rig_entry
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 
 __all__ = ["OTHER_ANGLE", "Correction", "as_it_is", "corrections_for"]
@@ -23,8 +24,8 @@ OTHER_ANGLE = "the drive angle were counted otherwise"
 _FRICTIONS = (0.1, 0.2, 0.3, 0.5)
 
 _FRAME_TEXTS = {
-    "turning": "the load cell turned with the drive (--load-cell-frame turning)",
-    "fixed": "the load cell did not turn with the drive (--load-cell-frame fixed)",
+    "turning": f"the load cell turned with the drive ({rig_entry('frame', 'turning', 'load_cell')})",
+    "fixed": f"the load cell did not turn with the drive ({rig_entry('frame', 'fixed', 'load_cell')})",
 }
 
 
@@ -45,24 +46,24 @@ def corrections_for(record: xr.Dataset, friction: float) -> list[Correction]:
     """Return all corrections to try, simple ones first, for a record with this assumed friction."""
     other: Literal["fixed", "turning"] = "turning" if frame_of(record) == "fixed" else "fixed"
     simple: list[tuple[str, Transform]] = [
-        (f"force_x had the other sign{_options(record, 'force_x')}", _with_sign("force_x")),
-        (f"force_y had the other sign{_options(record, 'force_y')}", _with_sign("force_y")),
-        (f"both forces had the other sign{_options(record, 'force_x', 'force_y')}", _with_sign("force_x", "force_y")),
-        (f"holding_moment had the other sign{_options(record, 'holding_moment')}", _with_sign("holding_moment")),
+        (f"force_x had the other sign{_entries(record, 'force_x')}", _with_sign("force_x")),
+        (f"force_y had the other sign{_entries(record, 'force_y')}", _with_sign("force_y")),
+        (f"both forces had the other sign{_entries(record, 'force_x', 'force_y')}", _with_sign("force_x", "force_y")),
+        (f"holding_moment had the other sign{_entries(record, 'holding_moment')}", _with_sign("holding_moment")),
         ("force_x and force_y were exchanged", _exchanged),
         (_FRAME_TEXTS[other], lambda record: record.assign_attrs(load_cell_frame=other)),
     ]
     found = [Correction(text, apply, friction) for text, apply in simple]
     for coefficient in _FRICTIONS:
-        text = f"there were friction of about {coefficient:g} (have infer find it: --nuisance friction)"
+        text = f"there were friction of about {coefficient:g} (have infer find it, which is the default)"
         found.append(Correction(text, as_it_is, coefficient))
     return [*found, *(Correction(text, apply, friction, changes) for text, apply, changes in _angles(record))]
 
 
-def _options(record: xr.Dataset, *names: str, sense: int = -1, added: float = 0.0) -> str:
-    """Return the options that read columns so, in brackets; "" if the record does not know them."""
-    options = [column_option(record[name], sense=sense, added=added, digits=12) for name in names]
-    return f" ({' '.join(options)})" if all(options) else ""
+def _entries(record: xr.Dataset, *names: str, sense: int = -1, added: float = 0.0) -> str:
+    """Return the entries that read columns so, in brackets; "" if the record does not know them."""
+    entries = {name: column_entry(record[name], sense=sense, added=added, digits=12) for name in names}
+    return f" ({rig_entries(entries)})" if all(entries.values()) else ""
 
 
 def as_it_is(record: xr.Dataset) -> xr.Dataset:
@@ -104,9 +105,9 @@ def _counted(sense: int, turns: float) -> Transform:
 
 def _angles(record: xr.Dataset) -> Iterator[tuple[str, Transform, int]]:
     other_moment = _with_sign("holding_moment")
-    moment = f"holding_moment had the other sign{_options(record, 'holding_moment')}"
+    moment = f"holding_moment had the other sign{_entries(record, 'holding_moment')}"
     for sense, turns in ((-1, 1), (-1, 0), (-1, 2), (1, 1), (1, -1), (1, 2)):
-        option = _options(record, "drive_angle", sense=sense, added=0.5 * np.pi * turns)
+        option = _entries(record, "drive_angle", sense=sense, added=0.5 * np.pi * turns)
         text, counted = f"{OTHER_ANGLE}{option}", _counted(sense, turns)
         yield text, counted, 1
         if sense < 0:

@@ -12,8 +12,9 @@ import xarray as xr
 from tactile_bayes.diagnostics.inspection.corrections import Correction, as_it_is, corrections_for
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
-from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig.corrected import Corrected
 
 __all__ = ["Fit", "fit_of"]
 
@@ -93,7 +94,7 @@ def fit_of(
 
 
 def _contacts(record: xr.Dataset, cell: LoadCell, friction: float) -> xr.Dataset:
-    return reconstruct(record, method="constrained", load_cell=cell, friction=friction)
+    return contacts_of(Corrected(record, cell, friction), "constrained")
 
 
 def _shares(contacts: xr.Dataset) -> tuple[float, float, int]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_function, check_optional, check_probability
+from tactile_bayes.checks import check_function, check_probability
 from tactile_bayes.diagnostics.inspection.fit import Fit, fit_of
 from tactile_bayes.diagnostics.inspection.known_cell import known_cell
 from tactile_bayes.diagnostics.inspection.messages import UNFIT, inspection_messages
@@ -20,8 +20,10 @@ from tactile_bayes.diagnostics.inspection.tables import channel_table, sample_ta
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning
 from tactile_bayes.load_cell import LoadCell, zero_load
-from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, present_channels, rows_of_sweeps, validate
+from tactile_bayes.reconstruction import contacts_of
+from tactile_bayes.record import CHANNELS, present_channels, rows_of_sweeps, validate, with_rod
+from tactile_bayes.rig.corrected import Corrected
+from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["Inspection", "inspect_record"]
 
@@ -80,9 +82,8 @@ class Inspection:
 
 def inspect_record(
     record: xr.Dataset,
+    rig: Rig | None = None,
     *,
-    load_cell: LoadCell | None = None,
-    friction: float = 0.0,
     false_alarm: float = 1e-3,
     progress: Callable[[int, int], object] | None = None,
 ) -> Inspection:
@@ -94,11 +95,9 @@ def inspect_record(
     ----------
     record : xr.Dataset
         A record.
-    load_cell : LoadCell, optional
-        The sensor, in the record's units; by default the record's data sheet, or bias and noise estimated from its
-        unloaded samples.
-    friction : float
-        Coulomb's coefficient μ, for Step 2.
+    rig : Rig, optional
+        Rod and load cell, by default those that the record states, bias and noise estimated from its unloaded samples
+        where nobody states a load cell; and friction for Step 2, 0 unless it is known.
     false_alarm : float
         Level of every test, in (0, 0.5): the probability of a false alarm for a record in white normal noise with
         nothing wrong, for each sweep in `zero_load`, and for all channels and samples together in the others.
@@ -115,7 +114,7 @@ def inspect_record(
     RecordError
         If `record` is not a valid record.
     ParameterError
-        If `load_cell` is not a load cell, or `false_alarm` is not a probability below a half.
+        If `rig` is no rig, or `false_alarm` is not a probability below a half.
 
     Notes
     -----
@@ -144,15 +143,15 @@ def inspect_record(
     ...     print(message)
     1 reading of holding_moment stands out from its neighbours (sample 5): a knock? If there are more, ...
     """
-    check_optional("load_cell", load_cell, LoadCell)
+    rig = rig_of(rig)
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 0.5, such as 1e-3", below=0.5)
     check_function("progress", progress)
-    record = validate(record)
+    record = with_rod(validate(record), rig.rod)
     report = progress or (lambda done, count: None)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DriftWarning)  # a message reports it
         found = zero_load(record, false_alarm=false_alarm)
-        cell, source = known_cell(record, load_cell)
+        cell, source = known_cell(record, rig.load_cell)
     sweeps = rows_of_sweeps(record["sweep"].values)
     stretches = unloaded_stretches(sweeps, found["unloaded"].values)
     channels = channel_table(record, found, stretches, cell if source in ("given", "data sheet") else None)
@@ -161,7 +160,7 @@ def inspect_record(
     statuses: dict[str, int] = {}
     fit = Fit(math.nan, math.nan, 0, "")
     if len(present_channels(record)) == len(CHANNELS):
-        status = reconstruct(record, method="raw", load_cell=cell, friction=friction).status.values
+        status = contacts_of(Corrected(record, cell or LoadCell(), rig.friction), "raw").status.values
         samples["status"] = ("sample", status, {"long_name": "status in raw Step 2"})
         statuses = dict(Counter(status.tolist()).most_common())
         report(2, _STEPS)
@@ -171,7 +170,7 @@ def inspect_record(
                 record,
                 _with_zero(cell, found),
                 most=UNFIT,
-                friction=friction,
+                friction=rig.friction,
                 progress=lambda done, count: report(_STEPS + done, _STEPS + count),
             )
     else:

@@ -14,12 +14,13 @@ from tactile_bayes.diagnostics.inspection.fit import Fit
 from tactile_bayes.diagnostics.units_and_signs import CHECK_UNITS
 from tactile_bayes.diagnostics.verdicts import NOISE_FACTOR, OFF_ZERO
 from tactile_bayes.inference.misfit import CHECK_RIG
-from tactile_bayes.inference.parameters.nuisances import BIAS
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
-from tactile_bayes.record.origin import column_option
+from tactile_bayes.record.origin import column_entry
+from tactile_bayes.record.rig_entry import rig_entries, rig_entry
+from tactile_bayes.rig.parameters import PARAMETERS
 
-__all__ = ["UNFIT", "inspection_messages", "prefix_of", "quantity"]
+__all__ = ["UNFIT", "far_off", "inspection_messages", "prefix_of", "quantity"]
 
 UNFIT = 0.25
 """Share of loaded samples without a fitting contact above which it is reported: a rod 10 % stiffer than stated stays
@@ -35,6 +36,8 @@ _FEWEST_IN_CONTACT = 10
 
 _SHOWN = 5
 """Largest number of samples that a message lists."""
+
+_DRIFT = rig_entry("drift", "default", "unknown")
 
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
@@ -117,8 +120,8 @@ def _dead(record: xr.Dataset, sweeps: xr.Dataset) -> list[str]:
         return []
     names = [name for name in present_channels(record) if np.ptp(record[name].values) == 0.0]
     return [
-        f"{name} never changes: is it connected? If it is not measured, empty its column, or remove it and give "
-        f"--missing {name}."
+        f"{name} never changes: is it connected? If it is not measured, empty its column, or remove it and state "
+        f"{rig_entry('missing', [name])}."
         for name in names
     ]
 
@@ -201,14 +204,14 @@ def _zeros(
     if moved and not _drifts(cell):
         messages.append(
             f"The zero of {_and(moved)} moved between one unloaded stretch and another: tare before each sweep, or "
-            "have infer find a drift (--nuisance drift)."
+            f"have infer find a drift ({_DRIFT})."
         )
     is_stated = source in ("given", "data sheet")
-    far = _far_off(record, channels, cell if is_stated else None)
+    far = far_off(record, channels, cell if is_stated else None)
     if far:
         zeros = {str(row.channel.values): float(row.bias) for row in _rows(channels)}
-        options = [column_option(record[name], added=-zeros[name]) for name in far]
-        how = f"as the column is read: {' '.join(options)}" if all(options) else "from the readings"
+        entries = {name: column_entry(record[name], added=-zeros[name]) for name in far}
+        how = f"as the column is read: {rig_entries(entries)}" if all(entries.values()) else "from the readings"
         messages.append(
             f"Without load the cell reads {_and(list(far.values()))}, more than infer expects. Subtract it {how}."
         )
@@ -229,19 +232,19 @@ def _zeros(
     if off:
         messages.append(
             f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? "
-            "infer finds it as it is (--nuisance bias, one of the defaults), but not with --as-stated."
+            "infer finds it as it is (bias, one of the defaults), unless the rig says that it is known."
         )
     return messages
 
 
-def _far_off(record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None) -> dict[str, str]:
-    """Return, by channel and as text, zeros that the prior of a bias hardly allows and that are not stated."""
+def far_off(record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None) -> dict[str, str]:
+    """Return, by channel and as text, zeros that the prior of a bias hardly allows and that no cell states."""
     rod, found = rod_of(record), {}
     for row in _rows(channels):
         name, bias = str(row.channel.values), float(row.bias)
         index = CHANNELS.index(name)
         stated, uncertain = (0.0, 0.0) if cell is None else (cell.bias[index], cell.bias_uncertainty[index])
-        expected = BIAS * (rod.moment_unit if name == CHANNELS[0] else rod.force_unit)
+        expected = PARAMETERS["moment_bias"].width * (rod.moment_unit if name == CHANNELS[0] else rod.force_unit)
         if abs(bias - stated) > _FAR * max(expected, uncertain):
             found[name] = f"{quantity(bias, str(row.unit.values))} of {name}"
     return found
@@ -260,7 +263,7 @@ def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm
         messages.append(
             "The noise is not white: the means of unloaded positions scatter more than single readings explain, in "
             f"{_and(list(apart.values()))}. Give the mean of each position as one sample, or have infer find a drift "
-            "(--nuisance drift), else bands come out too narrow."
+            f"({_DRIFT}), else bands come out too narrow."
         )
     like = [
         f"{row.channel.values} ({float(row.neighbour_correlation):+.2f})"
@@ -272,7 +275,7 @@ def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm
     if like and not _drifts(cell):
         messages.append(
             f"The noise is not white: unloaded neighbours are correlated in {_and(like)}. Filter less or sample less "
-            "often, or have infer find a drift (--nuisance drift), else bands come out too narrow."
+            f"often, or have infer find a drift ({_DRIFT}), else bands come out too narrow."
         )
     if source in ("given", "data sheet") and not _drifts(cell):
         for row in _rows(channels):

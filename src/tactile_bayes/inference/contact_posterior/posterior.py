@@ -13,7 +13,7 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.checks import check_choice, check_function, check_number, check_optional, check_whole_number, refused
+from tactile_bayes.checks import check_choice, check_function, check_optional, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
 from tactile_bayes.inference.contact_posterior.draws import (
@@ -32,11 +32,11 @@ from tactile_bayes.inference.record_likelihood.shortening import thinned
 from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
-from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
-from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.reconstruction import reconstruct, samples_of
+from tactile_bayes.reconstruction import contacts_of, samples_of
 from tactile_bayes.record import CHANNELS, frame_of, record_hash, validate, with_rod
 from tactile_bayes.record.schema import column_attributes
+from tactile_bayes.rig.corrected import Corrected, corrected
+from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["infer_contacts"]
 
@@ -51,12 +51,10 @@ _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 
 def infer_contacts(
     measured: xr.Dataset,
+    rig: Rig | None = None,
     *,
-    load_cell: LoadCell | None = None,
     prior: ContactPrior = "flat",
     seed: Seed,
-    rod: Rod | None = None,
-    friction: float = 0.0,
     draws: int = 1000,
     method: Method = "auto",
     settings: SamplerSettings | None = None,
@@ -75,11 +73,11 @@ def infer_contacts(
     ----------
     measured : xr.Dataset
         A record with all three load channels.
-    load_cell : LoadCell, optional
-        The sensor, in the record's units; by default the data sheet of the record. Its full likelihood is used,
-        including outliers and resolution. Unknown bias and drift, which samples share, count as noise of each sample
-        (and cannot be combined with outliers). A sample with a reading at the end of its range is left out: one sample
-        does not determine by how much the load was larger.
+    rig : Rig, optional
+        Rod and load cell, by default those that the record states, with the deviations that are known, as in
+        `reconstruct`. The full likelihood of the load cell is used, including outliers and resolution. Unknown bias and
+        drift, which samples share, count as noise of each sample (and cannot be combined with outliers). A sample with
+        a reading at the end of its range is left out: one sample does not determine by how much the load was larger.
     prior : {"flat", "polar"} or callable
         Prior over contact point and slope angle, within the rod's reach and |slope_angle| < π/2; see Notes. A function
         takes arrays contact_x, contact_y (on the object's surface, in the laboratory frame and the record's unit) and
@@ -88,10 +86,6 @@ def infer_contacts(
     seed : int or numpy.random.SeedSequence
         Seed of all random numbers; the same seed gives the same draws of the same samples. One sample more, or less,
         changes the draws of others, too.
-    rod : Rod, optional
-        Rod that replaces the rod of an SI record.
-    friction : float
-        Coulomb's coefficient μ, assumed to be known.
     draws : int
         Number of draws for each sample; a multiple of 4, since there are four independent chains.
     method : {"auto", "importance", "emcee"}
@@ -152,19 +146,19 @@ def infer_contacts(
     >>> contacts["posterior"].sizes["draw"], int(contacts["sample_stats"].converged.sum())
     (250, 46)
     """
-    measured = with_rod(validate(measured), rod)
+    rig = rig_of(rig)
+    measured = with_rod(validate(measured), rig.rod)
     _refuse_options(draws, method, settings)
-    check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
     check_function("progress", progress)
-    most = float(np.tan(MAX_FRICTION_ANGLE))
-    correction = f"the friction angle is that of no sliding rod, give Coulomb's coefficient from 0 to {most:.2f}"
-    check_number("friction", friction, correction, least=0.0, most=most)
-    cell = load_cell or LoadCell.from_record(measured)
-    if cell is None:
+    stated = rig.load_cell or LoadCell.from_record(measured)
+    if stated is None:
         raise ParameterError(
-            "the record carries no data sheet of its load cell: give load_cell=LoadCell(force_noise=..., "
-            "moment_noise=...), or LoadCell.from_zero_load(record), which finds the noise in the unloaded samples"
+            "the record carries no data sheet of its load cell: give a Rig(load_cell=LoadCell(force_noise=..., "
+            "moment_noise=...)), or LoadCell.from_zero_load(record), which finds the noise in the unloaded samples"
         )
+    measured, cell, friction, compliance, _ = corrected(measured, stated, rig.known)
+    if compliance:
+        raise ParameterError("infer_contacts knows no compliant suspension: say that suspension_compliance is 0")
     measured, cell = thinned(measured, cell)
     density, loaded = _density(measured, cell, float(np.arctan(friction)), prior)
     if not loaded.size:
@@ -182,9 +176,7 @@ def _misfit_probability(measured: xr.Dataset, cell: LoadCell, friction: float) -
     """Return the probability of a larger misfit of all samples, from `reconstruct`; NaN without variances."""
     if cell.degrees_of_freedom <= 2.0:
         return float("nan")
-    return float(
-        reconstruct(measured, method="constrained", load_cell=cell, friction=friction).attrs["misfit_probability"]
-    )
+    return float(contacts_of(Corrected(measured, cell, friction), "constrained").attrs["misfit_probability"])
 
 
 def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tactile_bayes.checks import check_number, check_optional, check_positive, check_whole_number, refused
+from tactile_bayes.checks import check_number, check_optional, check_positive, check_switch, check_whole_number, refused
 from tactile_bayes.errors import ParameterError
 
 __all__ = ["SamplerSettings", "refuse_few_walkers", "settings_of"]
@@ -46,6 +46,9 @@ class SamplerSettings:
         Predictions from the draws, files and figures come after it. A run that ends by it is not reproducible from its
         seed. A run that resumes from a checkpoint has the whole time again; its search for a start, which must have the
         same result each time, is counted, but not cut short.
+    events : bool
+        Whether unloaded samples count, which show where contact begins and ends. Otherwise only samples count whose
+        load exceeds the noise, as in methods that use contacts alone.
 
     Raises
     ------
@@ -65,8 +68,10 @@ class SamplerSettings:
     min_ess: float = 1000.0
     max_steps: int = 20_000
     max_seconds: float | None = None
+    events: bool = True
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "events", check_switch("events", self.events))
         for name in ("block_steps", "max_steps"):
             check_whole_number(
                 name, getattr(self, name), 1, f"give a whole number, at least 1 and at most {_MOST}", most=_MOST

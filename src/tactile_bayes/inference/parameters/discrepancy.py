@@ -2,42 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.parameters.priors import Prior
+from tactile_bayes.distributions import Distribution
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.discrepancy import Course
+from tactile_bayes.rig.parameters import GROUPS
+from tactile_bayes.rig.parameters import PARAMETERS as RIG_PARAMETERS
 
-__all__ = ["DISCREPANCY", "PARAMETERS", "discrepancy_priors", "is_discrepancy", "load_in_contact"]
+if TYPE_CHECKING:
+    from tactile_bayes.rig.rig import Rig
 
-DISCREPANCY = "discrepancy"
-"""Name that stands for both parameters among the nuisances."""
+__all__ = ["PARAMETERS", "discrepancy_priors", "is_discrepancy", "load_in_contact"]
 
-PARAMETERS = ("discrepancy_scale", "discrepancy_length")
-
-_SCALE, _SCALE_SPREAD = 0.005, 1.0
-"""Median of the prior of the scale, and standard deviation of its logarithm."""
-
-_LENGTH, _LENGTH_SPREAD = 0.3, 0.5
-"""Median of the prior of the length [rad], and standard deviation of its logarithm."""
+PARAMETERS = GROUPS["discrepancy"]
 
 
 def is_discrepancy(name: str) -> bool:
-    """Return True for a name by which a discrepancy is asked for."""
-    return name == DISCREPANCY or name in PARAMETERS
+    """Return True for the name of a parameter of the discrepancy, or of both."""
+    return name == "discrepancy" or name in PARAMETERS
 
 
-def discrepancy_priors(nuisances: Collection[str], priors: Mapping[str, Prior]) -> dict[str, Prior]:
-    """Return default priors of the discrepancy, if a nuisance or a prior asks for it; else none."""
-    if not any(map(is_discrepancy, (*nuisances, *priors))):
+def discrepancy_priors(rig: Rig) -> dict[str, Distribution]:
+    """Return the priors of the discrepancy, if it is unknown; none if nothing or zero is said of it.
+
+    Raises
+    ------
+    ParameterError
+        If it is said to have a known size.
+    """
+    said = {name: value for name, value in rig.said.items() if name in PARAMETERS}
+    if known := [name for name, value in said.items() if isinstance(value, float) and value]:
+        raise ParameterError(
+            f"{known[0]} is a number: a discrepancy has no known size, so give a distribution, or 0 for none"
+        )
+    if not any(not isinstance(value, float) for value in said.values()):
         return {}
-    return {
-        "discrepancy_scale": stats.lognorm(s=_SCALE_SPREAD, scale=_SCALE),
-        "discrepancy_length": stats.lognorm(s=_LENGTH_SPREAD, scale=_LENGTH),
-    }
+    priors: dict[str, Distribution] = {}
+    for name in PARAMETERS:
+        value, row = said.get(name, "default"), RIG_PARAMETERS[name]
+        default = stats.lognorm(s=row.width, scale=row.neutral or 1.0)
+        priors[name] = default if isinstance(value, float | str) else value
+    return priors
 
 
 def load_in_contact(loads: Floats, course: Course) -> Floats:

@@ -12,8 +12,9 @@ from scipy.optimize import brentq
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named, sides_of
-from tactile_bayes.contours.family import Family
-from tactile_bayes.inference.parameters.priors import Prior, numbers_of, own_priors
+from tactile_bayes.contours.family import ContourFamily
+from tactile_bayes.distributions import Distribution, numbers_of
+from tactile_bayes.inference.parameters.priors import own_priors
 
 __all__ = ["matched_priors", "mean_log_radius", "widened"]
 
@@ -31,7 +32,7 @@ _NARROWEST, _WIDEST = 0.05, 3.0
 """Range of factors on standard deviations in which the matching one is sought."""
 
 
-def matched_priors(family: str, length: float) -> dict[str, Prior]:
+def matched_priors(family: str, length: float) -> dict[str, Distribution]:
     """Return priors of a family's own parameters under which a flank is as curved as in all other families.
 
     The default priors are the same for all parameters of a kind, so that an ellipse, which has two sizes, is expected
@@ -72,12 +73,12 @@ def mean_log_radius(contours: Contour) -> Floats:
     return np.mean([np.log(contours.radius_of_curvature(np.full(contours.shape, a))) for a in _SLOPES], axis=0)
 
 
-def widened(priors: Mapping[str, Prior], factor: float) -> dict[str, Prior]:
+def widened(priors: Mapping[str, Distribution], factor: float) -> dict[str, Distribution]:
     """Return priors whose log-normal ones have the same median and a standard deviation multiplied by a factor."""
     return {name: _log_normal(prior, factor) if _is_log_normal(prior) else prior for name, prior in priors.items()}
 
 
-def _of_flank(name: str, length: float) -> dict[str, Prior]:
+def _of_flank(name: str, length: float) -> dict[str, Distribution]:
     family = family_named(name)
     priors = own_priors(family, length)
     stretch, width = _matching(name)
@@ -109,17 +110,17 @@ def _matching(name: str) -> tuple[float, float]:
     return float(_MEDIAN / np.exp(np.median(drawn(width)))), width
 
 
-def _built(family: Family, values: Mapping[str, Floats]) -> Contour:
+def _built(family: ContourFamily, values: Mapping[str, Floats]) -> Contour:
     """Return contours with the vertex at the origin; parameters out of bounds are moved to the nearest bound."""
     zeros = np.zeros(_DRAWS)
     inside = {name: np.clip(value, *family.bounds[name]) for name, value in values.items()}
     return family.build(*(inside.get(name, zeros) for name in family.parameters))
 
 
-def _is_log_normal(prior: Prior) -> bool:
+def _is_log_normal(prior: Distribution) -> bool:
     return getattr(getattr(prior, "dist", None), "name", "") == "lognorm"
 
 
-def _log_normal(prior: Prior, width: float, stretch: float = 1.0) -> Prior:
+def _log_normal(prior: Distribution, width: float, stretch: float = 1.0) -> Distribution:
     known = numbers_of(prior)
     return stats.lognorm(s=width * known["s"], loc=known["loc"], scale=stretch * known["scale"])

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import xarray as xr
 from scipy import stats
 
+from tactile_bayes.distributions import Distribution
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.parameters.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
+from tactile_bayes.rig.parameters import PARAMETERS
+
+if TYPE_CHECKING:
+    from tactile_bayes.rig.rig import Rig
 
 __all__ = ["Noise", "noise_of"]
+
+
+_LOUDEST = 10.0
+"""Largest noise in the default prior of an unknown one [EI/L, EI/L²]."""
 
 
 class Noise(NamedTuple):
@@ -26,7 +34,7 @@ class Noise(NamedTuple):
     """Names of the parameters: of the white noise, and then of the discrepancy, if it is inferred."""
     channels: tuple[tuple[str, ...], ...]
     """Channels that each parameter of the white noise scales."""
-    priors: dict[str, Prior]
+    priors: dict[str, Distribution]
     """Default priors by name, in the record's units."""
 
     @property
@@ -41,8 +49,8 @@ class Noise(NamedTuple):
 
     @property
     def stated_cell(self) -> LoadCell | None:
-        """The cell, if its noise is stated up to a factor; otherwise None."""
-        return self.cell if self.of_white == ("noise_scale",) else None
+        """The cell, if its noise is known up to a factor, or altogether; otherwise None."""
+        return self.cell if self.of_white in (("noise_scale",), ()) else None
 
     @property
     def inferred(self) -> tuple[str, ...]:
@@ -50,37 +58,51 @@ class Noise(NamedTuple):
         return ("frame", *self.names)
 
 
-def noise_of(measured: xr.Dataset, load_cell: LoadCell | None, discrepancy: Mapping[str, Prior] | None = None) -> Noise:
+def noise_of(measured: xr.Dataset, rig: Rig, discrepancy: Mapping[str, Distribution]) -> Noise:
     """Return the noise parameters of a record: a factor on the stated noise, or the scales if none is stated.
 
     Parameters
     ----------
     measured : xr.Dataset
         A valid record.
-    load_cell : LoadCell, optional
-        In the record's units; by default the data sheet in the record.
-    discrepancy : mapping of str to frozen scipy.stats distribution, optional
-        Default priors of the parameters of a discrepancy, if it is inferred.
+    rig : Rig
+        Its load cell is in the record's units; by default the data sheet in the record.
+    discrepancy : mapping of str to frozen scipy.stats distribution
+        Priors of the parameters of a discrepancy; empty without.
 
     Raises
     ------
     ParameterError
         If the load cell states only noise in proportion to the load.
     """
-    smooth = dict(discrepancy or {})
-    cell = load_cell or LoadCell.from_record(measured)
+    cell = rig.load_cell or LoadCell.from_record(measured)
+    said = rig.said
     present = present_channels(measured)
     if cell is not None and any(cell.standard_deviations[name] > 0.0 for name in present):
-        return Noise(cell, ("noise_scale", *smooth), (CHANNELS,), {"noise_scale": stats.lognorm(s=0.5), **smooth})
+        factor = said.get("noise_scale", "default")
+        if isinstance(factor, float):
+            scaled = ("force_noise", "moment_noise", "relative_noise")
+            louder = replace(cell, **{name: factor * getattr(cell, name) for name in scaled})
+            return Noise(louder, tuple(discrepancy), (), dict(discrepancy))
+        prior = stats.lognorm(s=PARAMETERS["noise_scale"].width) if isinstance(factor, str) else factor
+        return Noise(cell, ("noise_scale", *discrepancy), (CHANNELS,), {"noise_scale": prior, **discrepancy})
     if cell is not None and cell.relative_noise:
         raise ParameterError("the load cell states only relative_noise: state its force_noise and moment_noise as well")
     gains = (cell or LoadCell()).own_gains
     moment, force = gains[:2] * rod_of(measured).load_units[:2]
     sources = {"moment_noise": (("holding_moment",), moment), "force_noise": (CHANNELS[1:], force)}
     sources = {name: source for name, source in sources.items() if set(source[0]) & set(present)}
+    for name in sources:
+        if isinstance(said.get(name), float):
+            raise ParameterError(f"{name} is known: state it in LoadCell({name}=...), and noise_scale = 1")
+    priors: dict[str, Distribution] = {}
+    for name, (_, unit) in sources.items():
+        value = said.get(name, "default")
+        default = stats.loguniform(PARAMETERS[name].width * unit, _LOUDEST * unit)
+        priors[name] = default if isinstance(value, float | str) else value
     return Noise(
         replace(cell or LoadCell(), force_noise=1.0, moment_noise=1.0),
-        (*sources, *smooth),
+        (*sources, *discrepancy),
         tuple(channels for channels, _ in sources.values()),
-        {name: stats.loguniform(1e-6 * unit, 10.0 * unit) for name, (_, unit) in sources.items()} | smooth,
+        {**priors, **discrepancy},
     )

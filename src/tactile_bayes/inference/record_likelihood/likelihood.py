@@ -16,7 +16,7 @@ from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.record_likelihood.encoder import EncoderErrors
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
-from tactile_bayes.inference.record_likelihood.rig import Rig
+from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.inference.record_likelihood.rod_tables import RodTables
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.averaged_cell import AveragedCell
@@ -122,7 +122,7 @@ class RecordLikelihood:
         self._tolerated_share = float((self._tolerance / largest).min())
 
     def paths(
-        self, contours: Contour, rig: Rig | None = None, *, exact: bool = True, drive_angles: Floats | None = None
+        self, contours: Contour, rig: RigValues | None = None, *, exact: bool = True, drive_angles: Floats | None = None
     ) -> Paths:
         """Return the paths of every contour in every segment; batch index k·n + i is contour i in segment k.
 
@@ -130,7 +130,7 @@ class RecordLikelihood:
         ----------
         contours : Contour
             Contours with parameters of shape (n,).
-        rig : Rig, optional
+        rig : RigValues, optional
             Deviations from the stated rig.
         exact : bool
             Whether paths are exact to rounding, or as accurate as the noise requires.
@@ -154,7 +154,7 @@ class RecordLikelihood:
             lines=lines,
         )
 
-    def _in_sweep_frame(self, contours: Contour, rig: Rig) -> SweepFrame:
+    def _in_sweep_frame(self, contours: Contour, rig: RigValues) -> SweepFrame:
         (count,), segments = contours.shape, len(self.segments)
         base_x, base_y = self._bases(rig).reshape(-1, 2).T
         backward = np.repeat(self.segments.signs < 0.0, count)
@@ -163,7 +163,7 @@ class RecordLikelihood:
         of_rod = (np.tile(values, segments) for values in (*self._shape_of_rod(rig), self._stem(rig)))
         return SweepFrame(every, base_x, base_y, length, 0.5 * self.rod.diameter, backward, *of_rod)
 
-    def _profile(self, rig: Rig) -> Profile | None:
+    def _profile(self, rig: RigValues) -> Profile | None:
         """Return the profile of the rod, without what the rig adds to it; None for arcs."""
         return self._as_profile if self.rod.profile is not None or np.any(rig.taper) else None
 
@@ -171,20 +171,20 @@ class RecordLikelihood:
     def _as_profile(self) -> Profile:
         return self.rod.as_profile()
 
-    def _shape_of_rod(self, rig: Rig) -> tuple[Floats, Floats]:
+    def _shape_of_rod(self, rig: RigValues) -> tuple[Floats, Floats]:
         """Return rest curvature and taper of each contour, as in `Sweeps`."""
         known = self.rod.rest_curvature / self.rod.curvature_unit if self._profile(rig) is None else 0.0
         return known + rig.rest_curvature, self.rod.taper + rig.taper
 
-    def _stem(self, rig: Rig) -> Floats:
+    def _stem(self, rig: RigValues) -> Floats:
         """Return the stem of each contour, in lengths of its rod."""
         return np.asarray((self.rod.stem / self.rod.length + rig.stem) / rig.length)
 
-    def _compliance(self, rig: Rig) -> Floats:
+    def _compliance(self, rig: RigValues) -> Floats:
         """Return the compliance of the suspension of each contour, in rad per EI/L of its rod."""
         return np.asarray(rig.suspension_compliance * rig.rigidity_scale / rig.length)
 
-    def _known(self, rig: Rig) -> Tables:
+    def _known(self, rig: RigValues) -> Tables:
         """Return tables for the rod, as far as the noise allows their errors."""
         from tactile_bayes.mechanics.poses.forward_table import NO_TABLES  # numba takes a second to load
 
@@ -193,24 +193,24 @@ class RecordLikelihood:
             return NO_TABLES
         return self._tables.known(profile, rig.taper, rig.rest_curvature, rig.friction, rig.length)
 
-    def _bases(self, rig: Rig) -> Floats:
+    def _bases(self, rig: RigValues) -> Floats:
         """Return the pivots, shape (segments, n, 2)."""
         stated = np.array([segment.base for segment in self.segments])
         return np.asarray(stated[:, None] + rig.base_shifts[:, self.segments.pivots].swapaxes(0, 1))
 
-    def snap_offs(self, contours: Contour, rig: Rig | None = None) -> Floats:
+    def snap_offs(self, contours: Contour, rig: RigValues | None = None) -> Floats:
         """Return the readings of the drive angle at snap-off, in the sweep frame [rad], shape (n, segments)."""
         rig = self._rig_of(rig, contours.shape[0])
         return self._events(self._solutions(contours, rig), rig)[..., 1]
 
-    def travels(self, drive_angles: Floats, rig: Rig) -> Floats:
+    def travels(self, drive_angles: Floats, rig: RigValues) -> Floats:
         """Return travels of samples as `paths` takes them, shape (n or 1, samples): drive angles [rad], or ways [L].
 
         Parameters
         ----------
         drive_angles : ndarray, shape (samples,)
             Readings of drive angles, corrected by the data sheet; NaN for samples without interest.
-        rig : Rig
+        rig : RigValues
             Deviations from the stated rig.
         """
         sign = self.segments.signs_of_samples
@@ -221,31 +221,31 @@ class RecordLikelihood:
         known = carried & np.isfinite(drive_angles)
         return np.where(known, self.segments.angles_in_sweep_frame, in_sweep_frame)
 
-    def misread(self, rig: Rig) -> Floats:
+    def misread(self, rig: RigValues) -> Floats:
         """Return the errors of the encoder in addition to the data sheet [rad], shape (n or 1, samples)."""
         return self._misread(rig)[:, self.segments.of_sample]
 
-    def _misread(self, rig: Rig) -> Floats:
+    def _misread(self, rig: RigValues) -> Floats:
         """Return the errors of the encoder by segment [rad], shape (n or 1, segments)."""
         offset, backlash = (np.atleast_1d(v)[:, None] for v in (rig.drive_angle_offset, rig.drive_angle_backlash))
         return np.asarray(offset + 0.5 * backlash * self.segments.senses)
 
-    def usable(self, contours: Contour, rig: Rig | None = None) -> Flags:
+    def usable(self, contours: Contour, rig: RigValues | None = None) -> Flags:
         """Return True for contours that the rod reaches in every segment and is clear of after snap-off, shape (n,)."""
         return self._usable(self._solutions(contours, self._rig_of(rig, contours.shape[0])))
 
-    def predict(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags]:
+    def predict(self, contours: Contour, rig: RigValues | None = None) -> tuple[Floats, Flags]:
         """Return noise-free loads, shape (n, samples, 3), and which contours are usable, shape (n,).
 
         Forces are in the record's frame, loads in EI/L and EI/L² of the stated rod, at the drive angles read.
         """
         return self.predict_with_events(contours, rig)[:2]
 
-    def predict_with_errors(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags]:
+    def predict_with_errors(self, contours: Contour, rig: RigValues | None = None) -> tuple[Floats, Flags]:
         """Return loads for every error of the encoder, shape (n, errors, samples, 3), and which contours are usable."""
         return self._predict(contours, rig, self.encoder.errors)[:2]
 
-    def predict_with_events(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, Flags, Floats]:
+    def predict_with_events(self, contours: Contour, rig: RigValues | None = None) -> tuple[Floats, Flags, Floats]:
         """Return the results of `predict`, and the drive angles of first contact and snap-off.
 
         The angles are readings in the sweep frame [rad], shape (n, segments, 2); NaN if there is no such event.
@@ -253,7 +253,7 @@ class RecordLikelihood:
         loads, reached, events = self._predict(contours, rig, np.zeros(1))
         return loads[:, 0], reached, events
 
-    def _predict(self, contours: Contour, rig: Rig | None, errors: Floats) -> tuple[Floats, Flags, Floats]:
+    def _predict(self, contours: Contour, rig: RigValues | None, errors: Floats) -> tuple[Floats, Flags, Floats]:
         rig = self._rig_of(rig, contours.shape[0])
         found = self._solutions(contours, rig, errors)
         predicted = found.loads.reshape(-1, errors.size, *self.measured.shape)
@@ -262,7 +262,7 @@ class RecordLikelihood:
             predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
         return predicted, self._usable(found), self._events(found, rig)
 
-    def _solutions(self, contours: Contour, rig: Rig, errors: Floats | None = None) -> Solutions:
+    def _solutions(self, contours: Contour, rig: RigValues, errors: Floats | None = None) -> Solutions:
         """Solve the forward model; batch index k·n + i is contour i in segment k; without errors, for no samples."""
         from tactile_bayes.mechanics.branches.sweeps import solve_sweeps  # numba takes a second to load
 
@@ -284,19 +284,19 @@ class RecordLikelihood:
             usable &= found.snap_angle > found.clear_angle
         return np.asarray(usable.reshape(len(self.segments), -1).all(axis=0))
 
-    def _events(self, found: Solutions, rig: Rig) -> Floats:
+    def _events(self, found: Solutions, rig: RigValues) -> Floats:
         """Return readings of the drive angle at first contact and snap-off, in the sweep frame, (n, segments, 2)."""
         events = np.stack([found.first_angle, found.snap_angle], axis=-1).reshape(len(self.segments), -1, 2)
         misread = 0.0 if self.segments.is_carried else (self.segments.signs * self._misread(rig))[..., None]
         return np.asarray(events.swapaxes(0, 1) + misread)
 
-    def _shapes(self, contours: Contour, rig: Rig) -> Shapes:
+    def _shapes(self, contours: Contour, rig: RigValues) -> Shapes:
         if contours.halves is not None:
             return shapes_of(contours)
         low, high = (end.reshape(len(self.segments), -1) for end in self._in_sweep_frame(contours, rig).own_domain())
         return shapes_of(contours, low.min(axis=0), high.max(axis=0))
 
-    def _sweeps(self, rig: Rig) -> Sweeps:
+    def _sweeps(self, rig: RigValues) -> Sweeps:
         from tactile_bayes.mechanics.branches.sweeps import Sweeps
 
         count, segments = rig.friction.size, len(self.segments)
@@ -319,16 +319,16 @@ class RecordLikelihood:
             relative_length=np.tile(rig.length, segments),
         )
 
-    def _rig_of(self, rig: Rig | None, count: int) -> Rig:
+    def _rig_of(self, rig: RigValues | None, count: int) -> RigValues:
         """Return the rig of every contour, with the stated values as defaults."""
-        rig = rig or Rig(friction=self.friction)
+        rig = rig or RigValues(friction=self.friction)
         shifts = np.zeros((count, self.segments.pivots.max() + 1, 2))
         if rig.base_shifts is not None:
             shifts[:, : rig.base_shifts.shape[1]] = rig.base_shifts
-        return Rig._make((*(np.broadcast_to(value, (count,)) for value in rig[:-1]), shifts))
+        return RigValues._make((*(np.broadcast_to(value, (count,)) for value in rig[:-1]), shifts))
 
     def log_likelihood(
-        self, contours: Contour, noise_scale: Any = 1.0, rig: Rig | None = None, *, pointwise: bool = False
+        self, contours: Contour, noise_scale: Any = 1.0, rig: RigValues | None = None, *, pointwise: bool = False
     ) -> Floats:
         """Return the log-likelihood of each contour, shape (n,), or of each sample, (n, samples); −inf out of reach.
 
@@ -338,7 +338,7 @@ class RecordLikelihood:
             Contours with parameters of shape (n,).
         noise_scale : array_like, broadcastable to shape (n, 3)
             Factor on the load cell's standard deviations, by channel.
-        rig : Rig, optional
+        rig : RigValues, optional
             Deviations from the stated rig.
         pointwise : bool
             Whether the result is by sample.

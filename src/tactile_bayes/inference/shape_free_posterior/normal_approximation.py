@@ -15,11 +15,11 @@ from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.parameters.discrepancy import load_in_contact
-from tactile_bayes.inference.parameters.priors import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
 from tactile_bayes.inference.starts.contour_optimum import certainly_loaded
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.reconstruction import loaded_samples
+from tactile_bayes.rig.parameters import MAY_VANISH
 
 __all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_names", "scale_names", "split"]
 
@@ -211,7 +211,7 @@ class NormalApproximation:
     observer : Observer
         Residuals of the record.
     prior : LinearPrior
-        Prior of the linear parameters.
+        Distribution of the linear parameters.
     scales, linear : ndarray, shape (scales,), (d,)
         Point at which loads and snap-offs are linearised.
 

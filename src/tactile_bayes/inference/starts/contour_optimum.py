@@ -14,14 +14,15 @@ from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Logarithms
-from tactile_bayes.inference.found_rig import rig_with
 from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.parameters.nuisances import BIASES
 from tactile_bayes.inference.starts.axial_rig import axial_rig
 from tactile_bayes.inference.starts.start import Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
+from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, present_channels
+from tactile_bayes.rig.corrected import corrected
 
 __all__ = [
     "ContourOptimum",
@@ -354,9 +355,9 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
     rod = model.likelihood.rod
     moment, *forces = model.deviation * rod.load_units
     cell = replace(model.noise.cell, moment_noise=float(moment), force_noise=float(max(forces)))
-    rig = rig_with(model.measured, cell, _zeros(model) if found is None else found, model.nuisances.friction)
     try:
-        contacts = rig.contacts()
+        rig = {**model.nuisances.known, **(_zeros(model) if found is None else found)}
+        contacts = contacts_of(corrected(model.measured, cell, rig), "constrained" if cell.has_variances else "raw")
     except (ParameterError, RecordError):
         return None
     usable = contacts.status.values == "ok"

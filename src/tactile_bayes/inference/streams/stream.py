@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -18,13 +18,10 @@ from threadpoolctl import threadpool_limits
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
     check_function,
-    check_names,
     check_numbers,
-    check_optional,
     check_path,
     check_whole_number,
 )
-from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
 from tactile_bayes.inference.contour_model import ContourModel
@@ -32,18 +29,15 @@ from tactile_bayes.inference.contour_problem import identity_of
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, seed_sequence
 from tactile_bayes.inference.ensembles.identity import changes, seed_as_text
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.parameters.nuisances import STANDARD
-from tactile_bayes.inference.parameters.priors import Prior, check_priors
-from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig, rig_prior
+from tactile_bayes.inference.family import Family, family_of
+from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
 from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, WIDER, Particles, effective_number
 from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, tree_of
-from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import carried_sweeps, validate
 from tactile_bayes.record.netcdf import write_netcdf
-from tactile_bayes.sweep.path import friction_angle_of
+from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["LEVELS", "Stream", "surprise_after"]
 
@@ -69,9 +63,9 @@ class Stream:
 
     Parameters
     ----------
-    family, load_cell, priors, rod, friction, nuisances
-        As in `infer_contour`. A standard parameter that the record does not identify at first, like the backlash in a
-        single direction, enters with the first sample that does; if `nuisances` names it, it is refused before.
+    family, rig
+        As in `infer_contour`. An unknown of which nothing is said and that the record does not show at first, like the
+        backlash in a single direction, enters with the first sample that does.
     seed : int or numpy.random.SeedSequence
         Seed of all random numbers: the same seed and blocks give the same results.
     particles : int
@@ -81,15 +75,11 @@ class Stream:
     stop : callable, optional
         Rule for the end of measuring: a function that is called with the result of each update, and whose value
         becomes the result's `may_stop`.
-    rig : xr.DataTree, optional
-        Result of `infer_rig` for the same rig, as in `infer_contour`.
 
     Raises
     ------
     ParameterError
         If an argument is not valid. What depends on the record is checked at the first update.
-    InferenceError
-        If the rig is no result of `infer_rig`, or has not converged.
 
     Notes
     -----
@@ -109,11 +99,11 @@ class Stream:
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, scan
+    >>> from tactile_bayes import LoadCell, Rig, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
-    >>> stream = Stream(family="parabola", load_cell=cell, nuisances=[], seed=1, particles=200)
+    >>> stream = Stream(family="parabola", rig=Rig(load_cell=cell, unknown="nothing"), seed=1, particles=200)
     >>> first = stream.update(measured.isel(sample=slice(0, 10)))
     >>> now = stream.update(measured.isel(sample=slice(10, None)))
     >>> int(now.samples) == measured.sizes["sample"]
@@ -123,31 +113,17 @@ class Stream:
     def __init__(
         self,
         *,
-        family: str = "parabola",
-        load_cell: LoadCell | None = None,
-        priors: Mapping[str, Prior] | None = None,
+        family: Family | str = "parabola",
+        rig: Rig | None = None,
         seed: Seed,
-        rod: Rod | None = None,
-        friction: float | None = None,
-        nuisances: Sequence[str] = STANDARD,
         particles: int = 1000,
         x: ArrayLike | None = None,
         stop: Callable[[xr.Dataset], object] | None = None,
-        rig: xr.DataTree | None = None,
     ) -> None:
         check_whole_number("particles", particles, 100, "give a whole number of at least 100", most=10**7)
         check_function("stop", stop)
-        family_named(family)
-        check_optional("load_cell", load_cell, LoadCell)
-        check_optional("rod", rod, Rod)
-        friction_angle_of(0.0 if friction is None else friction)
-        check_names("nuisances", nuisances)
-        check_priors("priors", {} if priors is None else priors)
         self._x = None if x is None else check_numbers("x", x, "give a list of finite numbers", shape=(None,))
-        given = {} if priors is None else priors
-        check_priors("priors", given)
-        self._arguments = (family, load_cell, given, rod, friction, nuisances)
-        self._rig, self._joint = rig, None if rig is None else rig_prior(rig)
+        self._family, self._rig = family_of(family), rig_of(rig)
         self._seed, self._entropy = seed, seed_sequence(seed)
         self._particles, self._stop = particles, stop
         self._state: StreamState | None = None
@@ -303,7 +279,7 @@ class Stream:
         --------
         >>> import tempfile
         >>> from pathlib import Path
-        >>> from tactile_bayes import LoadCell, scan
+        >>> from tactile_bayes import LoadCell, Rig, scan
         >>> from tactile_bayes.contours import paper_profile
         >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
         >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
@@ -389,9 +365,9 @@ class Stream:
         return self._state
 
     def _experiment(self, record: xr.Dataset) -> Experiment:
-        experiment = Experiment(record, *self._arguments, joint=self._joint)
-        if self._rig is not None:
-            refuse_other_rig(self._rig.attrs, experiment.about)
+        experiment = Experiment(record, self._rig, self._family)
+        if self._rig.calibration is not None:
+            refuse_other_rig(self._rig.calibration, experiment.about)
         return experiment
 
     def _identity(self, experiment: Experiment) -> dict[str, str]:

@@ -137,7 +137,7 @@ def along(name: str, given: Any, length: float, positive: bool = False, miss: fl
         if abs(given.edges[-1] - length) > _SAME * length:
             raise ParameterError(
                 f"{name} is given from s = 0 to {given.edges[-1]:.6g}, and the rod is {length:.6g} long: give it from "
-                "the base to the tip; of a rod that goes on beyond its trace, state the length (length=, --length)"
+                "the base to the tip; of a rod that goes on beyond its trace, state the length"
             )
         return given
     if callable(given):

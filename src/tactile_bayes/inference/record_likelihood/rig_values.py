@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-__all__ = ["Rig"]
+__all__ = ["RigValues"]
 
 
-class Rig(NamedTuple):
+class RigValues(NamedTuple):
     """Deviations of a rig from the stated one; numbers, or arrays of shape (n,) with one for every contour."""
 
     drive_angle_offset: Any = 0.0

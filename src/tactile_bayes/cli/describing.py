@@ -1,0 +1,158 @@
+"""The command `rig`: the file of a rig in words, and what may be unknown of a rig."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tactile_bayes.cli.answer import Answer, table_of
+from tactile_bayes.cli.command import Output
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tactile_bayes.rig import Rig
+    from tactile_bayes.rig.parameters import Parameter
+
+__all__ = ["rig"]
+
+
+def rig(
+    *,
+    path: Annotated[
+        Path | None, typer.Argument(metavar="RIG.toml", help="File of a rig, to be checked.", dir_okay=False)
+    ] = None,
+    parameters: Annotated[bool, typer.Option("--parameters", help="List what may be unknown of a rig.")] = False,
+    output: Output,
+) -> Answer:
+    """Check the file of a rig, and print what it states, what is known of it, and what is unknown.
+
+    Under [unknown] a number makes a parameter known, a distribution unknown, like friction = { half_normal = 0.3 }.
+    """
+    from tactile_bayes.errors import ParameterError
+    from tactile_bayes.rig import Rig
+    from tactile_bayes.rig.parameters import PARAMETERS
+
+    if (path is None) != parameters:
+        raise ParameterError("give the file of a rig, or --parameters")
+    if path is None:
+        rows = [_row(parameter) for parameter in PARAMETERS.values()]
+        return Answer(_listed(rows), lambda: {"parameters": rows})
+    stated = Rig.read(path)
+    said = _said(stated)
+    return Answer(_words(stated, said), lambda: _numbers(stated, said))
+
+
+def _row(parameter: Parameter) -> dict[str, Any]:
+    return {
+        "name": parameter.name,
+        "meaning": parameter.meaning,
+        "unit": parameter.unit,
+        "default": _default(parameter),
+        "low": parameter.low,
+        "high": parameter.high,
+        "hidden": parameter.hidden,
+    }
+
+
+def _listed(rows: list[dict[str, Any]]) -> Iterator[Any]:
+    from tactile_bayes.rig.parameters import GROUPS, STANDARD
+
+    yield (
+        f"Unknown of a real rig, unless rig.toml says otherwise: {', '.join(STANDARD)}. All others are as stated, "
+        "unless they are named under [unknown]."
+    )
+    groups = "; ".join(f"{name} for {', '.join(members)}" for name, members in GROUPS.items())
+    yield f"Names of several: {groups}; base for the shifts of all pivots but the first, base_2_x, base_2_y and so on."
+    yield ""
+    cells = [
+        [row["name"], row["meaning"], "" if row["unit"] == "1" else row["unit"], row["default"], _bounds(row)]
+        for row in rows
+    ]
+    heads = ["name", "meaning", "unit", "default distribution", "bounds"]
+    yield table_of(heads, cells, left=heads, may_wrap=True)
+    yield ""
+    yield "No record shows, and then they are left out:"
+    for row in rows:
+        if row["hidden"]:
+            yield f"  {row['name']} {row['hidden']}"
+
+
+def _bounds(row: dict[str, Any]) -> str:
+    low, high = row["low"], row["high"]
+    if math.isinf(low) and math.isinf(high):
+        return ""
+    return f"above {low:g}" if math.isinf(high) else f"{low:.3g} to {high:.3g}"
+
+
+def _default(parameter: Parameter) -> str:
+    """Return the default distribution as text; units are those of the rod, lengths L and moments EI/L."""
+    kind = parameter.default.replace("_", "-")
+    if parameter.unit == "N":
+        unit = " EI/L²"
+    else:
+        powers = {"EI/L": parameter.of_moment, "L": parameter.of_length}
+        parts = [_power(name if power > 0 else f"1/({name})", abs(power)) for name, power in powers.items() if power]
+        unit = "".join(f" {part}" for part in parts)
+    if parameter.unit == "rad" and not unit:
+        return f"{kind}, {math.degrees(parameter.width):.3g}°"
+    return f"{kind}, {'from ' if kind == 'log-uniform' else ''}{parameter.width:g}{unit}"
+
+
+def _power(name: str, power: int) -> str:
+    return name if power == 1 else f"({name})²"
+
+
+def _said(rig: Rig) -> dict[str, str]:
+    """Return what is said of each parameter, as text: a number, a distribution, or that it has its default one."""
+    from tactile_bayes.distributions import in_words
+
+    calibrated = () if rig.calibration is None else tuple(rig.calibration.priors)
+    said = {
+        name: f"known, {value:g}"
+        if isinstance(value, float)
+        else "unknown, by default"
+        if isinstance(value, str)
+        else f"unknown, {in_words(value)}"
+        for name, value in rig.said.items()
+        if name not in calibrated
+    }
+    found = {} if rig.calibration is None else rig.calibration.priors
+    return said | {name: f"calibrated, {in_words(prior)}" for name, prior in found.items()}
+
+
+def _words(rig: Rig, said: dict[str, str]) -> Iterator[Any]:
+    rod, cell = rig.rod, rig.load_cell
+    if rod is None:
+        yield "rod         as the record states"
+    elif rod.is_dimensionless:
+        yield f"rod         {', '.join(['in units of the rod', *rod.shape_in_words('1/L')])}"
+    else:
+        of_rod = [f"L = {rod.length:g} m", f"EI = {rod.flexural_rigidity:.4g} N m²"]
+        of_rod += [f"diameter {rod.diameter:g} m"] if rod.diameter else []
+        yield f"rod         {', '.join([*of_rod, *rod.shape_in_words('1/m')])}"
+    entries = {} if cell is None else cell.entries()
+    yield f"load cell   {_list(entries) or 'as the record states, or its noise is found'}"
+    yield f"columns     {_list(rig.file.columns) or 'as in the file'}"
+    if rig.file.split_sweeps:
+        yield "sweeps      found by the turns of the drive"
+    if rig.file.missing:
+        yield f"missing     {', '.join(rig.file.missing)}"
+    yield ""
+    yield table_of(["parameter", "what is said of it"], said.items(), left=["parameter", "what is said of it"])
+    yield ""
+    yield "All other parameters are as stated; tactile-bayes rig --parameters lists them."
+
+
+def _list(entries: Any) -> str:
+    texts = {name: f"{value:.6g}" if isinstance(value, float) else str(value) for name, value in entries.items()}
+    return ", ".join(f"{name} = {text}" for name, text in texts.items())
+
+
+def _numbers(rig: Rig, said: dict[str, str]) -> dict[str, Any]:
+    from tactile_bayes.rig.rig_file import tables_of_rig
+
+    return {"rig": tables_of_rig(rig), "known": rig.known, "said": said}

@@ -1,0 +1,456 @@
+"""Distributions of a number: frozen ones of `scipy.stats`, read from tables and text and written to them.
+
+A number is known, a distribution is unknown.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import zlib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from scipy import stats
+from scipy.special import ndtri
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import as_number, check_kind, check_mapping, shown
+from tactile_bayes.errors import ParameterError
+
+__all__ = [
+    "KINDS",
+    "Distribution",
+    "Kind",
+    "all_in_words",
+    "check_distribution",
+    "check_distributions",
+    "distribution_of_table",
+    "frozen",
+    "in_words",
+    "is_finite_number",
+    "log_density_of",
+    "numbers_of",
+    "refuse_unknown_names",
+    "support_of",
+    "table_of_distribution",
+]
+
+_TRIED = 16
+"""Number of draws with which a distribution is tried."""
+
+_NARROWEST = 64.0 * float(np.finfo(float).eps)
+"""Range of draws over their size up to which they count as one number."""
+
+_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
+
+
+@runtime_checkable
+class Distribution(Protocol):
+    """Protocol of a distribution of a number, which frozen ones of scipy.stats satisfy."""
+
+    def logpdf(self, x: Any) -> Any: ...
+    def rvs(self, size: int, random_state: np.random.Generator) -> Any: ...
+    def std(self) -> Any: ...
+
+
+class Kind(NamedTuple):
+    """A distribution by the name and the numbers that a table states."""
+
+    size: int
+    """How many numbers."""
+    is_possible: Callable[..., bool]
+    rule: str
+    """Rule for the numbers, for messages."""
+    text: str
+    frozen: Callable[..., Distribution]
+    numbers: Callable[[Mapping[str, Any]], tuple[float, ...] | None]
+    """Its numbers from those of a frozen distribution of the same name; None if they do not state all of it."""
+    at: Callable[..., Any]
+    """Quantile function of numbers and probabilities."""
+
+
+KINDS = {
+    "uniform": Kind(
+        2,
+        lambda low, high: low < high,
+        "the first must be below the second",
+        "uniform from {} to {}",
+        lambda low, high: stats.uniform(low, high - low),
+        lambda n: (n["loc"], n["loc"] + n["scale"]),
+        lambda low, high, share: low + (high - low) * share,
+    ),
+    "log_uniform": Kind(
+        2,
+        lambda low, high: 0.0 < low < high,
+        "both must be positive, the first below the second",
+        "log-uniform from {} to {}",
+        lambda low, high: stats.loguniform(low, high),
+        lambda n: None if n["loc"] else (n["a"] * n["scale"], n["b"] * n["scale"]),
+        lambda low, high, share: np.exp(math.log(low) + math.log(high / low) * share),
+    ),
+    "normal": Kind(
+        2,
+        lambda mean, deviation: deviation >= 0.0,
+        "they are mean and standard deviation, which is not negative",
+        "normal, mean {}, standard deviation {}",
+        lambda mean, deviation: stats.norm(mean, deviation),
+        lambda n: (n["loc"], n["scale"]),
+        lambda mean, deviation, share: mean + deviation * ndtri(_open(share)),
+    ),
+    "log_normal": Kind(
+        2,
+        lambda median, deviation: median > 0.0 and deviation >= 0.0,
+        "they are the median, positive, and the logarithm's standard deviation, which is not negative",
+        "log-normal, median {}, standard deviation of the logarithm {}",
+        lambda median, deviation: stats.lognorm(s=deviation, scale=median),
+        lambda n: None if n["loc"] else (n["scale"], n["s"]),
+        lambda median, deviation, share: median * np.exp(deviation * ndtri(_open(share))),
+    ),
+    "half_normal": Kind(
+        1,
+        lambda scale: scale >= 0.0,
+        "it is the scale, which is not negative",
+        "half-normal, scale {}",
+        lambda scale: stats.halfnorm(scale=scale),
+        lambda n: None if n["loc"] else (n["scale"],),
+        lambda scale, share: -scale * ndtri(0.5 - 0.5 * share),
+    ),
+}
+"""Distributions that a table states by a name and a list of numbers, as { normal = [0.0, 0.1] }."""
+
+_NAMES = dict(zip(("uniform", "reciprocal", "norm", "lognorm", "halfnorm"), KINDS, strict=True))
+_NAMES["loguniform"] = "log_uniform"
+"""Names of these distributions in SciPy."""
+
+
+def distribution_of_table(
+    value: Any, name: str, number: Callable[[Any], float | None] = as_number
+) -> float | Distribution:
+    """Return what a value of a table states: a number, or a frozen distribution.
+
+    Parameters
+    ----------
+    value : Any
+        A number; { KIND = [numbers] } with a kind of `KINDS`, for a single number { KIND = number }; or
+        { NAME = { argument = number } } with any continuous distribution of `scipy.stats` and its arguments.
+    name : str
+        What it is a value of, for messages.
+    number : callable
+        Return a number of the table; None if it is none.
+
+    Raises
+    ------
+    ParameterError
+        If it states neither.
+
+    Examples
+    --------
+    >>> distribution_of_table(0.3, "friction")
+    0.3
+    >>> in_words(distribution_of_table({"half_normal": 0.3}, "friction"))
+    'halfnorm(0, 0.3)'
+    """
+    hint = (
+        f"give a number, or a distribution like {{ normal = [0.0, 0.1] }} (there are {', '.join(KINDS)}, and those of "
+        "scipy.stats by name, like { beta = { a = 2.0, b = 3.0 } })"
+    )
+    plain = number(value)
+    if plain is not None and math.isfinite(plain):
+        return plain
+    if not isinstance(value, Mapping) or len(value) != 1:
+        raise ParameterError(f"{name} is {shown(value)}: {hint}")
+    ((kind, given),) = value.items()
+    if isinstance(given, Mapping):
+        return _of_scipy(str(kind), given, name, number, hint)
+    if kind not in KINDS:
+        raise ParameterError(f"{name} has the distribution {shown(kind)}, which is unknown: {hint}")
+    numbers = [number(each) for each in (given if isinstance(given, list | tuple) else [given])]
+    count = KINDS[kind].size
+    if len(numbers) != count or not all(each is not None and math.isfinite(each) for each in numbers):
+        wanted = "a finite number" if count == 1 else f"a list of {count} finite numbers"
+        raise ParameterError(f"{name}.{kind} is {shown(given)}: give {wanted}")
+    if not KINDS[kind].is_possible(*numbers):
+        raise ParameterError(f"{name}.{kind} is {shown(given)}: {KINDS[kind].rule}")
+    found = KINDS[kind].frozen(*numbers)
+    check_distribution(name, found)
+    return found
+
+
+def _of_scipy(
+    kind: str, given: Mapping[str, Any], name: str, number: Callable[[Any], float | None], hint: str
+) -> Distribution:
+    of_scipy = getattr(stats, kind, None)
+    if not isinstance(of_scipy, stats.rv_continuous):
+        raise ParameterError(f"{name} has the distribution {shown(kind)}, which is unknown: {hint}")
+    numbers = {each: number(value) for each, value in given.items()}
+    known = [*(of_scipy.shapes.split(", ") if of_scipy.shapes else []), "loc", "scale"]
+    if set(numbers) - set(known) or None in numbers.values() or set(known[:-2]) - set(numbers):
+        raise ParameterError(f"{name}.{kind} is {shown(dict(given))}: give numbers for {', '.join(known)}")
+    found: Distribution = of_scipy(**numbers)
+    check_distribution(name, found)
+    return found
+
+
+def table_of_distribution(value: float | Distribution) -> Any:
+    """Return the value of a table that states a number or a distribution, as `distribution_of_table` takes it.
+
+    Raises
+    ------
+    ParameterError
+        If a distribution is none of SciPy with numbers.
+
+    Examples
+    --------
+    >>> table_of_distribution(stats.lognorm(s=0.5, scale=2.0)), table_of_distribution(0.3)
+    ({'log_normal': [2.0, 0.5]}, 0.3)
+    """
+    plain = as_number(value)
+    if plain is not None:
+        return plain
+    numbers = {name: float(each) for name, each in numbers_of(value).items()}
+    scipy_name = getattr(getattr(value, "dist", None), "name", "")
+    if not numbers or not isinstance(getattr(stats, scipy_name, None), stats.rv_continuous):
+        raise ParameterError(f"{shown(value)} cannot be written as text: give a distribution of scipy.stats by numbers")
+    kind = _NAMES.get(scipy_name, "")
+    short = KINDS[kind].numbers(numbers) if kind else None
+    if short is None:
+        return {scipy_name: {name: each for name, each in numbers.items() if (name, each) not in _USUAL}}
+    return {kind: list(short) if len(short) > 1 else short[0]}
+
+
+_USUAL = {("loc", 0.0), ("scale", 1.0)}
+"""Numbers of a distribution that need no mention."""
+
+
+def is_finite_number(value: Any) -> bool:
+    """Return True for a finite real number."""
+    number = as_number(value)
+    return number is not None and math.isfinite(number)
+
+
+def _open(share: Floats) -> Floats:
+    """Bound probabilities away from 0, where a normal quantile would be infinite."""
+    return np.maximum(share, 2.0**-54)
+
+
+def frozen(value: Any) -> Any:
+    """Return a distribution of SciPy's newer kind, as `scipy.stats.Normal`, with the methods of a frozen one.
+
+    Anything else is returned as it is.
+    """
+    if isinstance(value, Distribution) or not all(hasattr(value, each) for each in ("logpdf", "sample", "support")):
+        return value
+    numbers: dict[str, Any] = {name: as_number(each) for name, each in getattr(value, "_parameters", {}).items()}
+    if type(value).__name__ == "Normal" and None not in numbers.values() and {"mu", "sigma"} <= set(numbers):
+        return stats.norm(numbers["mu"], numbers["sigma"])
+    if type(value).__name__ == "Uniform" and None not in numbers.values() and {"a", "b"} <= set(numbers):
+        return stats.uniform(numbers["a"], numbers["b"] - numbers["a"])
+    return _Newer(value)
+
+
+@dataclass(frozen=True)
+class _Newer:
+    """A distribution of SciPy's newer kind with the methods of a frozen one."""
+
+    of: Any
+
+    def logpdf(self, x: Any) -> Any:
+        return self.of.logpdf(x)
+
+    def rvs(self, size: int, random_state: np.random.Generator) -> Any:
+        return self.of.sample(size, rng=random_state)
+
+    def std(self) -> Any:
+        return self.of.standard_deviation()
+
+    def median(self) -> Any:
+        return self.of.median()
+
+    def mean(self) -> Any:
+        return self.of.mean()
+
+    def ppf(self, q: Any) -> Any:
+        return self.of.icdf(q)
+
+    def cdf(self, x: Any) -> Any:
+        return self.of.cdf(x)
+
+    def support(self) -> Any:
+        return self.of.support()
+
+    def __repr__(self) -> str:
+        return repr(self.of)
+
+
+def check_distributions(name: str, given: Any) -> None:
+    """Refuse an argument that is no mapping of names to distributions with a density.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    correction = "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}"
+    check_kind(name, given, Mapping, correction)
+    check_mapping(name, given, correction)
+    for parameter, distribution in given.items():
+        check_distribution(parameter, distribution)
+
+
+def check_distribution(parameter: str, distribution: Any) -> None:
+    """Refuse what is no distribution, or has no density.
+
+    Raises
+    ------
+    ParameterError
+        If it is none; the message names the parameter.
+    """
+    if not isinstance(distribution, Distribution) or isinstance(distribution, stats.rv_continuous):
+        correction = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+        raise ParameterError(f"the prior of {parameter} is {shown(distribution)}: {correction}")
+    flaw = _flaw_of(distribution)
+    if flaw:
+        kind = getattr(getattr(distribution, "dist", None), "name", "")
+        raise ParameterError(f"the prior of {parameter}{f', {kind},' if kind else ''} {flaw}")
+
+
+def _flaw_of(distribution: Distribution) -> str:
+    """Return what keeps a distribution from having a density, and what to do; "" if nothing does."""
+    numbers = numbers_of(distribution)
+    for name, value in numbers.items():
+        number = as_number(value)
+        if number is None or np.isnan(number):
+            return f"has the {name} {shown(value)}: give a number"
+    if numbers.get("scale") == 0.0:
+        return _no_width(float(numbers["loc"]))
+    try:
+        with np.errstate(all="ignore"):
+            low, high = support_of(distribution)
+            draws = np.asarray(distribution.rvs(_TRIED, random_state=np.random.default_rng(0)), dtype=float)
+            density = np.asarray(distribution.logpdf(draws), dtype=float)
+    except (TypeError, ValueError) as error:
+        return f"cannot be drawn from ({error}): check its numbers"
+    if draws.shape != (_TRIED,) or density.shape != (_TRIED,):
+        return "does not give one number for each draw: give the distribution of a single number"
+    if not low <= high or not np.isfinite(draws).all() or np.isnan(density).any() or np.isneginf(density).any():
+        return "has no finite draws, or no density there: check its numbers"
+    if not np.ptp(draws) > _NARROWEST * float(np.abs(draws).max()):
+        return _no_width(float(draws[0]))
+    return ""
+
+
+def _no_width(value: float) -> str:
+    return f"has no width, and so no density: it is known, so give the number, {value:.6g}"
+
+
+def refuse_unknown_names(given: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
+    """Refuse distributions by names that are no parameters.
+
+    Raises
+    ------
+    ParameterError
+        If there are such names.
+    """
+    unknown = sorted(set(given) - set(names))
+    if unknown:
+        raise ParameterError(
+            f"there is a prior {whose}of {', '.join(unknown)}, which is no parameter: there are "
+            f"{', '.join(names)}{more}"
+        )
+
+
+def numbers_of(distribution: Any) -> dict[str, Any]:
+    """Return shapes, loc and scale of a frozen distribution of scipy.stats by name, however they were given.
+
+    {} for an object of another kind.
+
+    Examples
+    --------
+    >>> numbers_of(stats.lognorm(0.5, scale=2.0))
+    {'s': 0.5, 'loc': 0, 'scale': 2.0}
+    """
+    of_scipy = getattr(distribution, "dist", None)
+    if not isinstance(of_scipy, stats.rv_continuous):
+        return {}
+    shapes, loc, scale = of_scipy._parse_args(*distribution.args, **distribution.kwds)  # type: ignore[attr-defined]
+    names = of_scipy.shapes.split(", ") if of_scipy.shapes else []
+    return dict(zip((*names, "loc", "scale"), (*shapes, loc, scale), strict=True))
+
+
+def support_of(distribution: Distribution) -> tuple[float, float]:
+    """Return the ends of a distribution's support."""
+    ends = distribution.support() if hasattr(distribution, "support") else (-np.inf, np.inf)
+    return float(ends[0]), float(ends[1])
+
+
+def in_words(distribution: Distribution) -> str:
+    """Return a distribution as text, the same however its numbers were given: its identity.
+
+    Examples
+    --------
+    >>> in_words(stats.norm(scale=0.1)), in_words(stats.lognorm(0.5, scale=2.0))
+    ('norm(0, 0.1)', 'lognorm(s=0.5, scale=2)')
+    """
+    of_scipy = getattr(distribution, "dist", None)
+    if isinstance(of_scipy, stats.rv_histogram):
+        counts, edges = of_scipy._histogram  # type: ignore[attr-defined]
+        return f"histogram of {len(counts)} bins ({zlib.crc32(np.concatenate([counts, edges]).tobytes()):08x})"
+    numbers = numbers_of(distribution)
+    if of_scipy is None or not numbers:
+        return repr(distribution)
+    if numbers.keys() == {"loc", "scale"}:
+        written = [f"{value:g}" for value in numbers.values()]
+    else:
+        written = [f"{name}={value:g}" for name, value in numbers.items() if name != "loc" or value]
+    return f"{of_scipy.name}({', '.join(written)})"
+
+
+def all_in_words(distributions: Mapping[str, Distribution]) -> str:
+    """Return distributions by name as text, for an attribute."""
+    return json.dumps({name: in_words(each) for name, each in distributions.items()})
+
+
+def log_density_of(distribution: Distribution) -> Callable[[Floats], Floats]:
+    """Return the log-density of a distribution, as its `logpdf`, for common ones ten times faster.
+
+    For a few points a call of `logpdf` takes longer than the likelihood of a whole record.
+    """
+    of_scipy = getattr(distribution, "dist", None)
+    closed = _CLOSED.get(type(of_scipy))
+    if of_scipy is None or closed is None:
+        return distribution.logpdf
+    values = numbers_of(distribution)
+    if any(np.ndim(value) for value in values.values()):
+        return distribution.logpdf
+    return partial(closed, **{name: float(value) for name, value in values.items()})
+
+
+def _norm(x: Floats, *, loc: float, scale: float) -> Floats:
+    return np.asarray(-0.5 * ((x - loc) / scale) ** 2 - (_ROOT_2PI + math.log(scale)))
+
+
+def _halfnorm(x: Floats, *, loc: float, scale: float) -> Floats:
+    return np.where(x >= loc, _norm(x, loc=loc, scale=scale) + math.log(2.0), -np.inf)
+
+
+def _lognorm(x: Floats, *, s: float, loc: float, scale: float) -> Floats:
+    inside = x > loc
+    logarithm = np.log(np.where(inside, x - loc, 1.0)) - math.log(scale)
+    values = -0.5 * (logarithm / s) ** 2 - logarithm - (_ROOT_2PI + math.log(s) + math.log(scale))
+    return np.where(inside, values, -np.inf)
+
+
+def _uniform(x: Floats, *, loc: float, scale: float) -> Floats:
+    return np.where((x >= loc) & (x <= loc + scale), -math.log(scale), -np.inf)
+
+
+_CLOSED: dict[type, Callable[..., Any]] = {
+    type(stats.norm): _norm,
+    type(stats.halfnorm): _halfnorm,
+    type(stats.lognorm): _lognorm,
+    type(stats.uniform): _uniform,
+}

@@ -1,0 +1,26 @@
+"""Entries of a rig's file, as messages state them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tactile_bayes.tasks.documents import toml_key, toml_value
+
+__all__ = ["rig_entries", "rig_entry"]
+
+
+def rig_entry(name: str, value: Any, table: str = "file") -> str:
+    """Return an entry of rig.toml, with its place.
+
+    Examples
+    --------
+    >>> rig_entry("force_x", "-Fx[mN]")
+    'force_x = "-Fx[mN]" under [file] of rig.toml'
+    """
+    return rig_entries({name: value}, table)
+
+
+def rig_entries(entries: dict[str, Any], table: str = "file") -> str:
+    """Return entries of rig.toml, with their place."""
+    stated = ", ".join(f"{toml_key(name)} = {toml_value(value)}" for name, value in entries.items())
+    return f"{stated} under [{table}] of rig.toml"

@@ -1,0 +1,269 @@
+"""The parameters of a rig: how far the rig on the table may be from what its data sheets state.
+
+One table: names, meanings, units, bounds, default distributions, and when a record cannot show them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
+
+__all__ = ["BASE", "GROUPS", "MAY_VANISH", "PARAMETERS", "STANDARD", "Parameter", "members", "parameter_named"]
+
+BASE = re.compile(r"base_(\d+)_([xy])")
+"""Shift of a pivot of the record, counted from 1, along an axis."""
+
+_DEGREE = float(np.radians(1.0))
+
+_CHANNELS = ("moment", "force_x", "force_y")
+
+
+class Parameter(NamedTuple):
+    """A parameter of a rig.
+
+    Units are products of powers: of the unit of moments, EI/L (of forces, EI/L², in zeros of forces), and of lengths.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    """SI unit."""
+    default: Literal["normal", "log_normal", "half_normal", "log_uniform"]
+    """Default distribution: about the stated value where there is one, else about `neutral`; normal ones are cut off at
+    the bounds."""
+    width: float
+    """Standard deviation, or that of the logarithm, or the scale of the default distribution, in units of the rod; of a
+    log-uniform one the smallest value."""
+    neutral: float | None = 0.0
+    """Value of a rig that is as stated; None if the rod or the load cell states it."""
+    low: float = -np.inf
+    high: float = np.inf
+    of_moment: int = 0
+    """Power of the unit of moments."""
+    of_length: int = 0
+    """Power of the unit of lengths."""
+    hidden: str = ""
+    """When no record shows it, or which one does not."""
+
+
+_NO_MOMENT = "without the moment"
+_NO_TURN = "in sweeps of one direction, where drive_angle_offset has the same effect, and where the base is carried"
+
+_ROWS = (
+    Parameter(
+        "rigidity_scale",
+        "flexural rigidity over the stated one",
+        "1",
+        "log_normal",
+        0.05,
+        1.0,
+        0.0,
+        hidden="beside the gains of all channels, which have the same effect",
+    ),
+    Parameter(
+        "drive_angle_offset", "reading of the encoder less the angle", "rad", "normal", _DEGREE, 0.0, -np.pi, np.pi
+    ),
+    *(
+        Parameter(
+            f"{channel}_bias",
+            f"reading of {channel} without load, in the middle of the record",
+            "N m" if channel == "moment" else "N",
+            "normal",
+            0.1,
+            of_moment=1,
+        )
+        for channel in _CHANNELS
+    ),
+    *(
+        Parameter(
+            f"lever_{axis}",
+            f"{axis} of the point to which the moment refers, from the pivot, in the cell's frame",
+            "m",
+            "normal",
+            0.005,
+            of_length=1,
+            hidden=_NO_MOMENT,
+        )
+        for axis in "xy"
+    ),
+    Parameter(
+        "backlash",
+        "reading of the encoder in forward motion less that in backward motion",
+        "rad",
+        "normal",
+        0.2 * _DEGREE,
+        0.0,
+        -np.pi,
+        np.pi,
+        hidden=_NO_TURN,
+    ),
+    Parameter(
+        "friction",
+        "Coulomb's coefficient between rod and object",
+        "1",
+        "half_normal",
+        0.3,
+        0.0,
+        0.0,
+        float(np.tan(MAX_FRICTION_ANGLE)),
+    ),
+    *(
+        Parameter(
+            f"{channel}_drift",
+            f"change of the zero of {channel} from the first sample to the last, linear",
+            "N m" if channel == "moment" else "N",
+            "normal",
+            0.1,
+            of_moment=1,
+        )
+        for channel in _CHANNELS
+    ),
+    *(
+        Parameter(f"{channel}_gain", f"reading of {channel} over the load", "1", "normal", 0.02, 1.0, 0.0)
+        for channel in _CHANNELS
+    ),
+    Parameter(
+        "moment_curve_quadratic",
+        "curve of the moment's reading",
+        "1/N/m",
+        "normal",
+        0.05,
+        None,
+        of_moment=-1,
+        hidden=_NO_MOMENT,
+    ),
+    Parameter(
+        "moment_curve_cubic",
+        "curve of the moment's reading",
+        "1/N²/m²",
+        "normal",
+        0.02,
+        None,
+        of_moment=-2,
+        hidden=_NO_MOMENT,
+    ),
+    Parameter(
+        "suspension_compliance",
+        "turn of the pivot per holding moment",
+        "rad/(N m)",
+        "half_normal",
+        0.05,
+        0.0,
+        0.0,
+        of_moment=-1,
+    ),
+    Parameter("rest_curvature", "mean curvature of the unloaded rod", "1/m", "normal", 0.05, None, of_length=-1),
+    Parameter("taper", "part by which the diameter falls to the tip", "1", "normal", 0.05, None, 0.0, STEEPEST_TAPER),
+    Parameter(
+        "stem",
+        "rigid, straight piece between pivot and rod",
+        "m",
+        "normal",
+        0.02,
+        None,
+        0.0,
+        of_length=1,
+        hidden="beside the lever where the base is only carried without turning",
+    ),
+    Parameter("length", "length of the rod", "m", "normal", 0.01, None, 0.0, of_length=1),
+    *(
+        Parameter(
+            f"gauge_{axis}",
+            f"{axis} of the gauge less the stated one",
+            "m",
+            "normal",
+            0.01,
+            of_length=1,
+            hidden="unless the contour is that of a gauge",
+        )
+        for axis in "xy"
+    ),
+    Parameter(
+        "discrepancy_scale",
+        "smooth deviation of readings in contact over the largest load of the sweep",
+        "1",
+        "log_normal",
+        1.0,
+        0.005,
+        0.0,
+    ),
+    Parameter(
+        "discrepancy_length",
+        "drive angle, or travel in rod lengths, over which it changes",
+        "rad",
+        "log_normal",
+        0.5,
+        0.3,
+        0.0,
+    ),
+    Parameter(
+        "noise_scale",
+        "noise over the one that the load cell states",
+        "1",
+        "log_normal",
+        0.5,
+        1.0,
+        0.0,
+        hidden="unless the load cell states a noise",
+    ),
+    Parameter(
+        "moment_noise",
+        "standard deviation of the moment",
+        "N m",
+        "log_uniform",
+        1e-6,
+        None,
+        0.0,
+        of_moment=1,
+        hidden="where the load cell states its noise",
+    ),
+    Parameter(
+        "force_noise",
+        "standard deviation of each force",
+        "N",
+        "log_uniform",
+        1e-6,
+        None,
+        0.0,
+        of_moment=1,
+        hidden="where the load cell states its noise",
+    ),
+)
+
+PARAMETERS = {row.name: row for row in _ROWS}
+"""All parameters by name, except the shifts of pivots, of which there are as many as pivots."""
+
+GROUPS = {
+    **{what: tuple(f"{channel}_{what}" for channel in _CHANNELS) for what in ("bias", "drift", "gain")},
+    "lever": ("lever_x", "lever_y"),
+    "moment_curve": ("moment_curve_quadratic", "moment_curve_cubic"),
+    "gauge": ("gauge_x", "gauge_y"),
+    "discrepancy": ("discrepancy_scale", "discrepancy_length"),
+}
+"""Names that stand for several parameters; "base" stands for the shifts of all pivots but the first."""
+
+STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
+"""What is unknown of a real rig, unless it is said to be known."""
+
+MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem")
+"""Parameters that are zero or positive, and may be zero."""
+
+
+def parameter_named(name: str) -> Parameter | None:
+    """Return the parameter of a name, also of the shift of a pivot; None if there is none."""
+    shift = BASE.fullmatch(name)
+    if shift is None:
+        return PARAMETERS.get(name)
+    meaning = f"{shift[2]} of pivot {shift[1]} less the recorded one"
+    return Parameter(name, meaning, "m", "normal", 0.01, of_length=1, hidden="of the first pivot")
+
+
+def members(name: str) -> Iterator[str]:
+    """Yield the parameters that a name stands for."""
+    yield from GROUPS.get(name, (name,))

@@ -1,0 +1,342 @@
+"""The file of a rig, rig.toml: tables of rod, load cell, files, unknowns and calibration."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tactile_bayes.checks import as_number, check_array, check_kind, check_number, check_path, shown
+from tactile_bayes.distributions import distribution_of_table, table_of_distribution
+from tactile_bayes.errors import ParameterError, TactileBayesError
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rods.along import Along
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.record.plain_csv import columns_in
+from tactile_bayes.record.quantity import accepted_units, converted, unit_of
+from tactile_bayes.record.schema import CHANNELS, COLUMNS, LOAD_CELL_UNITS, MEASURED
+from tactile_bayes.record.spelling import nearest
+from tactile_bayes.rig.file_format import FileFormat
+from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, members, parameter_named
+from tactile_bayes.rig.rig import NOTHING, Rig
+from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.tasks import write_atomically
+from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
+
+__all__ = ["file_of_rig", "read_rig", "rig_of_tables", "tables_of_rig", "text_of_rig", "write_rig"]
+
+_SEVERAL = {
+    **{what: tuple(f"{what}_{name}" for name in CHANNELS) for what in ("bias", "bias_uncertainty")},
+    "gain": tuple(f"gain_{to}_{of}" for to, of in product(CHANNELS, CHANNELS)),
+    "lever": ("lever_x", "lever_y"),
+    "moment_curve": ("moment_curve_quadratic", "moment_curve_cubic"),
+}
+"""Entries of the load cell that may be lists."""
+
+_ROD_UNITS = {
+    "length": "m",
+    "flexural_rigidity": "N m²",
+    "diameter": "m",
+    "youngs_modulus": "N/m²",
+    "elastic_strain": "1",
+    "rest_curvature": "1/m",
+    "rest_curvature_deviation": "1/m",
+    "taper": "1",
+    "stem": "m",
+}
+_TABLES = {
+    "rod": (*_ROD_UNITS, "rigidity_profile", "shape"),
+    "load_cell": (
+        *LOAD_CELL_UNITS,
+        "bias",
+        "bias_uncertainty",
+        "gain",
+        "lever",
+        "moment_curve",
+        "correlation",
+        "frame",
+    ),
+    "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), "split_sweeps", "missing"),
+    "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
+    "calibration": ("parameters", "correlation", "error", "source", "stated"),
+}
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+
+_LARGEST = 1 << 20
+"""Largest number of characters of a file."""
+
+_HEAD = """\
+# A rig, for the option --rig of tactile-bayes and for tactile_bayes.Rig.read: what its data sheets state, how its files
+# are written, and what is unknown. Numbers are in SI units, or texts with a unit, like "200 mm"; a number is known, a
+# distribution is unknown. `tactile-bayes rig --parameters` lists what may be unknown.
+"""
+
+
+def read_rig(path: str | os.PathLike[str]) -> Rig:
+    """Read a rig from a TOML file; see `Rig.read`."""
+    path = check_path("the rig", path, "give a file rig.toml")
+    try:
+        with open(path, encoding="utf-8-sig") as file:
+            text = file.read(_LARGEST + 1)
+        if len(text) > _LARGEST:
+            raise ParameterError(f"it has more than {_LARGEST} characters, and is no file of a rig")
+        return rig_of_tables(read_toml(text), path.parent)
+    except (TactileBayesError, UnicodeDecodeError) as error:
+        raise ParameterError(f"{path}: {error}") from error
+
+
+def write_rig(rig: Rig, path: str | os.PathLike[str]) -> None:
+    """Write a rig to a TOML file, whole or not at all; see `Rig.write`."""
+    path, text = check_path("path", path, "give a file rig.toml"), file_of_rig(rig)
+    with write_atomically(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def file_of_rig(rig: Rig) -> str:
+    """Return the whole text of the file of a rig.
+
+    Raises
+    ------
+    ParameterError
+        If a distribution is none of SciPy's, which text cannot state.
+    """
+    return _HEAD + text_of_rig(rig)
+
+
+def text_of_rig(rig: Rig) -> str:
+    """Return the text in TOML that states a rig.
+
+    Raises
+    ------
+    ParameterError
+        If a distribution is none of SciPy's, which text cannot state.
+    """
+    tables = tables_of_rig(rig)
+    unknown = tables.pop("unknown") if isinstance(tables.get("unknown"), str) else None
+    first = "" if unknown is None else f"unknown = {toml_value(unknown)}\n\n"
+    return first + "\n".join(
+        f"[{name}]\n" + "".join(f"{toml_key(key)} = {toml_value(value)}\n" for key, value in table.items())
+        for name, table in tables.items()
+    )
+
+
+def tables_of_rig(rig: Rig) -> dict[str, Any]:
+    """Return the tables that state a rig; `rig_of_tables` is the inverse.
+
+    Raises
+    ------
+    ParameterError
+        If a distribution is none of SciPy's, which text cannot state.
+    """
+    tables: dict[str, Any] = {}
+    if rig.rod is not None:
+        names = ("length", "flexural_rigidity") if not rig.rod.is_dimensionless else ()
+        given = {name: getattr(rig.rod, name) for name in (*names, *_TABLES["rod"]) if hasattr(rig.rod, name)}
+        usual = {"length": None, "flexural_rigidity": None} if names else {"length": 1.0, "flexural_rigidity": 1.0}
+        texts = {name: value.text if isinstance(value, Along) else value for name, value in given.items()}
+        tables["rod"] = {n: v for n, v in texts.items() if v is not None and v != usual.get(n, 0.0)}
+    if rig.load_cell is not None:
+        tables["load_cell"] = rig.load_cell.entries()
+    file: dict[str, Any] = dict(rig.file.columns)
+    if rig.file.split_sweeps:
+        file["split_sweeps"] = True
+    if rig.file.missing:
+        file["missing"] = list(rig.file.missing)
+    if file:
+        tables["file"] = file
+    if rig.entries == dict(NOTHING):
+        tables["unknown"] = "nothing"
+    elif rig.entries:
+        said = rig.entries.items()
+        tables["unknown"] = {n: v if isinstance(v, str) else table_of_distribution(v) for n, v in said}
+    if rig.calibration is not None:
+        found = rig.calibration
+        tables["calibration"] = {
+            "source": found.source,
+            "error": found.error,
+            "parameters": {name: table_of_distribution(prior) for name, prior in found.priors.items()},
+            "correlation": found.correlation.tolist(),
+            "stated": {n: v.item() if isinstance(v, np.generic) else v for n, v in found.stated.items()},
+        }
+    return tables
+
+
+def rig_of_tables(tables: Mapping[str, Any], folder: Path = Path()) -> Rig:
+    """Return the rig that tables state.
+
+    Parameters
+    ----------
+    tables : mapping
+        Tables rod, load_cell, file, unknown and calibration, as in rig.toml.
+    folder : Path
+        Folder to which the path of the rod's shape is relative.
+
+    Raises
+    ------
+    ParameterError
+        If a key is unknown or misspelt, or a value impossible.
+    """
+    _refuse_unknown(tables, _TABLES, "the rig")
+    for name, table in tables.items():
+        if name != "unknown" or table != "nothing":
+            check_kind(name, table, Mapping, f"write it as a table, [{name}]")
+            _refuse_unknown(table, _TABLES[name], f"[{name}]", is_known=parameter_named if name == "unknown" else None)
+    said = tables.get("rod")
+    rod = None if said is None else _rod(said, folder)
+    is_si = rod is not None and not rod.is_dimensionless
+    calibration = tables.get("calibration")
+    return Rig(
+        rod=rod,
+        load_cell=None if "load_cell" not in tables else _load_cell(tables["load_cell"], is_si),
+        unknown=_unknown(tables.get("unknown", {}), is_si),
+        calibration=None if calibration is None else _calibration(calibration),
+        file=_file(tables.get("file", {})),
+    )
+
+
+def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
+    numbers: dict[str, Any] = {
+        name: said[name]
+        if name == "rest_curvature" and str(said[name]).lstrip().startswith("{")
+        else _quantity(said[name], unit, f"rod.{name}", is_si="length" in said or "shape" in said)
+        for name, unit in _ROD_UNITS.items()
+        if name in said
+    }
+    if "rigidity_profile" in said:
+        numbers["rigidity_profile"] = said["rigidity_profile"]
+    modulus = numbers.pop("youngs_modulus", None)
+    if modulus is not None:
+        if "flexural_rigidity" in numbers or "diameter" not in numbers:
+            raise ParameterError(
+                "[rod] states youngs_modulus: give the diameter beside it, and leave out flexural_rigidity"
+            )
+        numbers["flexural_rigidity"] = modulus * math.pi * numbers["diameter"] ** 4 / 64.0
+    if "shape" in said:
+        check_kind("rod.shape", said["shape"], str, "give the path of a CSV file with columns x and y [m]")
+        if "flexural_rigidity" not in numbers:
+            raise ParameterError("[rod] states a shape, and no flexural_rigidity (or youngs_modulus and diameter)")
+        x, y = columns_in(folder / said["shape"], ("x", "y"))
+        return Rod.from_shape(x, y, numbers.pop("flexural_rigidity"), **numbers)
+    if ("length" in numbers) != ("flexural_rigidity" in numbers):
+        raise ParameterError(
+            "[rod] needs length and flexural_rigidity (or youngs_modulus and diameter) together; without them the rig "
+            "is dimensionless, in units of the rod"
+        )
+    return Rod(**numbers)
+
+
+def _load_cell(said: Mapping[str, Any], is_si: bool) -> LoadCell:
+    entries: dict[str, Any] = {}
+    for name, value in said.items():
+        if name == "frame":
+            entries[name] = value
+        elif name in _SEVERAL:
+            names = _SEVERAL[name]
+            rows = np.ravel(np.array(value, dtype=object)).tolist() if isinstance(value, list) else []
+            if len(rows) != len(names):
+                raise ParameterError(
+                    f"load_cell.{name} is {shown(value)}: give a list of {len(names)}, {', '.join(names)}"
+                )
+            entries |= {
+                each: _quantity(row, LOAD_CELL_UNITS[each], f"load_cell.{name}", is_si)
+                for each, row in zip(names, rows, strict=True)
+            }
+        else:
+            entries[name] = _quantity(value, LOAD_CELL_UNITS[name], f"load_cell.{name}", is_si)
+    return LoadCell.from_entries(entries)
+
+
+def _file(said: Mapping[str, Any]) -> FileFormat:
+    columns = {name: value for name, value in said.items() if name not in ("split_sweeps", "missing")}
+    missing = said.get("missing", [])
+    check_kind("file.missing", missing, list, "give a list of channels, like ['force_x']")
+    texts = {name: repr(value) if as_number(value) is not None else value for name, value in columns.items()}
+    return FileFormat(texts, said.get("split_sweeps", False), tuple(missing))
+
+
+def _unknown(said: Mapping[str, Any] | str, is_si: bool) -> Any:
+    if isinstance(said, str):
+        return said
+    found = {}
+    for name, value in said.items():
+        row = parameter_named(next(members(name)))
+        unit = "m" if row is None else row.unit
+        number = partial(_number_in, unit=unit, name=f"unknown.{name}", is_si=is_si)
+        found[name] = value if value == "default" else distribution_of_table(value, f"unknown.{name}", number)
+    return found
+
+
+def _calibration(said: Mapping[str, Any]) -> RigPrior:
+    absent = [name for name in _TABLES["calibration"] if name not in said]
+    if absent:
+        raise ParameterError(f"[calibration] has no {', '.join(absent)}: calibrate the rig again")
+    for name, kind in (("parameters", Mapping), ("stated", Mapping), ("source", str)):
+        check_kind(f"calibration.{name}", said[name], kind, "calibrate the rig again")
+    error = check_number("calibration.error", said["error"], "calibrate the rig again", least=0.0)
+    _refuse_unknown(said["parameters"], PARAMETERS, "[calibration.parameters]")
+    priors: dict[str, Any] = {}
+    for name, value in said["parameters"].items():
+        found = distribution_of_table(value, f"calibration.parameters.{name}")
+        if isinstance(found, float):
+            raise ParameterError(f"calibration.parameters.{name} is the number {found:g}: calibrate the rig again")
+        priors[name] = found
+    correlation = check_array("calibration.correlation", said["correlation"], "calibrate the rig again")
+    if correlation.shape != (len(priors), len(priors)) or not np.isfinite(correlation).all():
+        raise ParameterError("calibration.correlation does not fit its parameters: calibrate the rig again")
+    if np.linalg.eigvalsh(correlation).min() <= 0.0 or not np.allclose(np.diag(correlation), 1.0):
+        raise ParameterError("calibration.correlation is no matrix of correlations: calibrate the rig again")
+    return RigPrior(priors, correlation, error, said["source"], dict(said["stated"]))
+
+
+def _quantity(value: Any, unit: str, name: str, is_si: bool) -> float:
+    """Return a number in a unit, from a number, or a text with another unit of the kind."""
+    number = _number_in(value, unit=unit, name=name, is_si=is_si)
+    if number is None:
+        raise ParameterError(
+            f'{name} is {shown(value)}: give a number [{unit}], or a text with a unit, like "1.5 {unit}"'
+        )
+    return number
+
+
+def _number_in(value: Any, *, unit: str, name: str, is_si: bool) -> float | None:
+    """Return `_quantity`, or None for what is neither a number nor a text with a unit."""
+    match = _NUMBER.match(value.strip()) if isinstance(value, str) else None
+    if match is None:
+        return as_number(value)
+    said = match.string[match.end() :].strip()
+    said = said[1:-1].strip() if said.startswith("[") and said.endswith("]") else said
+    stated, wanted = unit_of(said or "1"), unit_of(unit)
+    assert wanted is not None
+    if stated is None or stated.dimension != wanted.dimension:
+        raise ParameterError(f"{name} is {value!r}, which is not in {accepted_units(unit)}")
+    if not is_si and any(wanted.dimension[:3]):
+        raise ParameterError(
+            f"{name} is {value!r}, but the rig is dimensionless: give [rod] with length and flexural_rigidity, or a "
+            "number in units of the rod (L, EI/L, EI/L²)"
+        )
+    return float(converted(float(match[0]), stated, wanted))
+
+
+def _refuse_unknown(
+    table: Mapping[str, Any], known: Iterable[str], where: str, is_known: Callable[[str], Any] | None = None
+) -> None:
+    known = list(known)
+    for key in table:
+        if key in known or (is_known is not None and is_known(key) is not None):
+            continue
+        elsewhere = [name for name, keys in _TABLES.items() if key in keys]
+        near = nearest(key, known)
+        if elsewhere:
+            hint = f"its place is the table [{elsewhere[0]}]"
+        elif near:
+            hint = f"did you mean {near!r}?"
+        else:
+            hint = f"there are {', '.join(known)}"
+        raise ParameterError(f"{where} has no entry {key!r}: {hint}")

@@ -1,0 +1,106 @@
+"""The joint prior of parameters of a rig that a calibration has found: marginals, joined by a normal copula."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy import stats
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.distributions import Distribution, numbers_of
+
+__all__ = ["RigPrior"]
+
+_FARTHEST = 30.0
+"""Largest normal score, beyond which densities vanish anyway."""
+
+
+@dataclass(frozen=True, eq=False)
+class RigPrior:
+    """Joint prior of parameters of a rig: marginals, joined by a normal copula.
+
+    With normal and log-normal marginals it is a multivariate normal distribution of the parameters or their logarithms.
+
+    Parameters
+    ----------
+    priors : mapping of str to frozen scipy.stats distribution
+        Marginals by name: normal, log-normal, or truncated normal where a parameter may be zero but not negative.
+    correlation : ndarray, shape (parameters, parameters)
+        Correlations of the parameters' normal scores.
+    error : float
+        Largest difference between quantiles of draws and density, along each parameter and each principal axis, in
+        standard deviations; with several records of gauges, that of the worst density.
+    source : str
+        SHA-256 of the record of the gauge, or of all of them with blanks between.
+    stated : mapping
+        Attributes of the posterior that state rod, load cell, frame and units, of which the parameters are deviations.
+    posterior : xr.DataTree, optional
+        The posterior itself.
+    """
+
+    priors: Mapping[str, Distribution]
+    correlation: Floats
+    error: float
+    source: str
+    stated: Mapping[str, Any] = field(default_factory=dict)
+    posterior: xr.DataTree | None = None
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """Attributes of a posterior with this prior."""
+        return {
+            "rig_parameters": json.dumps(list(self.priors)),
+            "rig_correlation": json.dumps(self.correlation.tolist()),
+            "rig_density_error": self.error,
+            "rig_data_sha256": self.source,
+        }
+
+    def without(self, names: Collection[str]) -> RigPrior:
+        """Return the prior of the parameters without some of them."""
+        kept = [i for i, name in enumerate(self.priors) if name not in names]
+        own = {name: prior for name, prior in self.priors.items() if name not in names}
+        return replace(self, priors=own, correlation=self.correlation[np.ix_(kept, kept)])
+
+    def log_dependence(self, points: Floats) -> Floats:
+        """Return the log-density of points, shape (n, parameters), less that of independent marginals, shape (n,)."""
+        scores = self.scores(points)
+        root = np.linalg.cholesky(self.correlation)
+        whitened = np.linalg.solve(root, scores.T)
+        growth = 0.5 * (np.square(scores).sum(axis=1) - np.square(whitened).sum(axis=0))
+        return np.asarray(growth - np.log(np.diag(root)).sum())
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        """Draw points, shape (count, parameters)."""
+        scores = rng.standard_normal((count, len(self.priors))) @ np.linalg.cholesky(self.correlation).T
+        columns = [_at_scores(prior, z) for prior, z in zip(self.priors.values(), scores.T, strict=True)]
+        return np.stack(columns, axis=1)
+
+    def scores(self, points: Floats) -> Floats:
+        """Return the normal scores of points, shape (n, parameters)."""
+        columns = [_scores_of(prior, x) for prior, x in zip(self.priors.values(), points.T, strict=True)]
+        return np.stack(columns, axis=1)
+
+
+def _scores_of(prior: Distribution, x: Floats) -> Floats:
+    """Return the normal scores of values: quantiles of the standard normal with the same probabilities."""
+    known = numbers_of(prior)
+    match prior.dist.name:  # type: ignore[attr-defined]
+        case "norm":
+            scores = (x - known["loc"]) / known["scale"]
+        case "lognorm":
+            with np.errstate(divide="ignore", invalid="ignore"):
+                scores = np.nan_to_num(np.log(x / known["scale"]) / known["s"], nan=-np.inf)
+        case _:
+            below, above = prior.cdf(x), prior.sf(x)  # type: ignore[attr-defined]
+            scores = np.where(below < 0.5, stats.norm.ppf(below), -stats.norm.ppf(above))
+    return np.clip(scores, -_FARTHEST, _FARTHEST)
+
+
+def _at_scores(prior: Distribution, scores: Floats) -> Floats:
+    """Return the values with these normal scores."""
+    return np.asarray(prior.ppf(stats.norm.cdf(scores)))  # type: ignore[attr-defined]

@@ -1,0 +1,264 @@
+"""The analysis of many records of one rig: a folder of a run for each, and one table of all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.checks import check_function, check_path, check_probability, check_seed, refused
+from tactile_bayes.errors import ParameterError, TactileBayesError
+from tactile_bayes.inference.ensembles import SamplerSettings, settings_of
+from tactile_bayes.inference.family import Family, family_of
+from tactile_bayes.record import read_record
+from tactile_bayes.record.bag import is_bag
+from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.runs.contour import analyse
+from tactile_bayes.runs.folder import Folder
+from tactile_bayes.runs.names import MANY
+from tactile_bayes.tasks import TaskProgress, errors_of, refuse_replacing, run_tasks, write_atomically
+from tactile_bayes.tasks.documents import read_json
+
+__all__ = ["ROW", "infer_contours", "records_in"]
+
+ROW = "run.json"
+"""File with the row of a run in the table of all, written when the run is complete."""
+
+_SUFFIXES = (".csv", ".nc", ".mcap", ".bag", ".db3")
+
+
+@dataclass(frozen=True)
+class _Task:
+    """A record to be analysed."""
+
+    path: Path
+    out: Path
+    rig: Rig
+    family: Family
+    seed: int
+    settings: SamplerSettings
+    probability: float
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """Everything that determines the run, as text."""
+        return {
+            "record": _digest(self.path),
+            "rig": self.rig.text,
+            "family": repr(self.family),
+            "seed": str(self.seed),
+            "settings": json.dumps(asdict(self.settings)),
+            "probability": repr(self.probability),
+            "version": version("tactile-bayes"),
+        }
+
+
+def infer_contours(
+    records: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    rig: Rig | None = None,
+    *,
+    out: str | os.PathLike[str],
+    family: Family | str = "parabola",
+    seed: int,
+    settings: SamplerSettings | None = None,
+    probability: float = 0.95,
+    workers: int | str | None = None,
+    progress: Callable[[TaskProgress], object] | None = None,
+) -> xr.Dataset:
+    """Infer the contours of many records of one rig, each into a folder of its own, and return one table of all.
+
+    Each record is inferred as by `infer_contour`, with the same seed. A record that fails is a row with the reason. A
+    run that is complete and was made from the same record, rig, family, seed and settings is not made again, so that a
+    stopped call goes on where it was, and records may be added.
+
+    Parameters
+    ----------
+    records : path-like or sequence of path-like
+        Files of records, or a folder of them.
+    rig : Rig, optional
+        The rig, and how it writes its files.
+    out : path-like
+        Folder for a folder of each record, by the name of its file, and for runs.csv and runs.nc, the table; created if
+        missing.
+    family, seed, settings
+        As in `infer_contour`.
+    probability : float
+        Probability of bands and intervals, in (0, 1).
+    workers : int or str, optional
+        Number of processes on this machine, by default one for each core, or the address of a Dask scheduler, such as
+        "tcp://10.0.0.1:8786".
+    progress : callable, optional
+        Called with a `TaskProgress` after each record.
+
+    Returns
+    -------
+    xr.Dataset
+        By `record` (names of the folders): `verdict`, the first line of the verdicts, `converged`, `error` (the reason
+        of a failure, else ""), `seconds`, `band_width` (median over what was touched), and by
+        `quantity` the `median`, `lower` and `upper` end of the interval, with `unit`; NaN where a record has none.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not valid, there are no records, or a run would replace one of them.
+    TaskError
+        As in `run_tasks`.
+    """
+    paths, folder = records_in(records), check_path("out", out, "give the path of a folder")
+    check_probability("probability", probability)
+    check_function("progress", progress)
+    names = _names(paths)
+    refuse_replacing((folder / name for name in MANY), paths)
+    made = (rig_of(rig), family_of(family), check_seed(seed), settings_of(settings), probability)
+    tasks = [_Task(path, folder / name, *made) for path, name in zip(paths, names, strict=True)]
+    rows = {task.out.name: row for task in tasks if (row := _kept(task)) is not None}
+    began, left = time.monotonic(), [task for task in tasks if task.out.name not in rows]
+    pool: dict[str, Any] = {"scheduler": workers} if isinstance(workers, str) else {"workers": workers}
+    with closing(run_tasks(_analysed, left, **pool)) as results:
+        for count, (task, row) in enumerate(results, start=1):
+            rows[task.out.name] = row
+            if progress is not None:
+                done = len(tasks) - len(left) + count
+                progress(TaskProgress(done, len(tasks), count, time.monotonic() - began))
+    table = _table({name: rows[name] for name in names})
+    with Folder(folder, MANY) as written:
+        written.write_netcdf("table", "runs.nc", table)
+        with written.file("table as text", "runs.csv") as temporary:
+            _flat(table).to_dataframe().to_csv(temporary)
+    return table
+
+
+def records_in(records: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[Path]:
+    """Return the files of records, of a folder those with the suffix of a record.
+
+    Raises
+    ------
+    ParameterError
+        If there are none.
+    """
+    correction = "give files of records, or a folder of them"
+    if not isinstance(records, str | os.PathLike | Iterable):
+        raise refused("records", records, correction)
+    given = [records] if isinstance(records, str | os.PathLike) else list(records)
+    found: list[Path] = []
+    for each in given:
+        path = check_path("records", each, correction)
+        if path.is_dir() and not is_bag(path):
+            inside = sorted(file for file in path.iterdir() if file.suffix.lower() in _SUFFIXES or is_bag(file))
+            if not inside:
+                raise ParameterError(f"{path} holds no record: give a folder of .csv, .nc or .mcap files")
+            found += inside
+        else:
+            found.append(path)
+    if not found:
+        raise ParameterError("there are no records: give files, or a folder of them")
+    return found
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """Return a name for each record: that of its file, with its folder where several have the same."""
+    stems = Counter(path.stem for path in paths)
+    names = [path.stem if stems[path.stem] == 1 else f"{path.resolve().parent.name}-{path.stem}" for path in paths]
+    if twice := [name for name, count in Counter(names).items() if count > 1]:
+        raise ParameterError(f"several records are called {twice[0]}: rename one, since each has a folder of its name")
+    return names
+
+
+def _kept(task: _Task) -> dict[str, Any] | None:
+    """Return the row of a run that is complete and the same; None if it is to be made."""
+    try:
+        stored = read_json((task.out / ROW).read_bytes(), ROW)
+        same = stored["identity"] == task.identity
+    except (OSError, ParameterError, KeyError, TypeError):
+        return None
+    row: dict[str, Any] | None = stored.get("row") if same and (task.out / "summary.txt").is_file() else None
+    return row
+
+
+def _analysed(task: _Task) -> dict[str, Any]:
+    """Analyse a record, and return its row; keep it beside the run if it is complete."""
+    began = time.monotonic()
+    try:
+        identity = task.identity
+        measured = read_record(task.path, task.rig)
+        run = analyse(
+            measured,
+            task.out,
+            rig=task.rig.without_bare_cell,
+            family=task.family,
+            probability=task.probability,
+            seed=task.seed,
+            settings=task.settings,
+            record_file=task.path,
+        )
+    except (TactileBayesError, OSError) as error:
+        return {"error": str(error), "seconds": time.monotonic() - began}
+    numbers = run.summary
+    width = float("nan") if run.band is None else float((run.band.upper - run.band.lower).median())
+    row = {
+        "verdict": run.verdicts[0],
+        "converged": bool(run.posterior.attrs["converged"]),
+        "error": "",
+        "seconds": time.monotonic() - began,
+        "band_width": width,
+        "quantities": {
+            str(name): [float(numbers[part].sel(quantity=name)) for part in ("median", "lower", "upper")]
+            for name in numbers.quantity.values
+        },
+        "units": {str(name): str(numbers["unit"].sel(quantity=name).values) for name in numbers.quantity.values},
+    }
+    text = json.dumps({"identity": identity, "row": row}, indent=1)
+    with errors_of(task.out / ROW), write_atomically(task.out / ROW) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return row
+
+
+def _digest(path: Path) -> str:
+    """Return the SHA-256 of a file, or of the names and contents of the files of a folder."""
+    files = sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(str(file.relative_to(path)).encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+def _table(rows: Mapping[str, Mapping[str, Any]]) -> xr.Dataset:
+    quantities = list(dict.fromkeys(name for row in rows.values() for name in row.get("quantities", {})))
+    none = [float("nan")] * 3
+    numbers = np.array(
+        [[row.get("quantities", {}).get(name, none) for name in quantities] for row in rows.values()], dtype=float
+    ).reshape(len(rows), len(quantities), 3)
+    units: dict[str, str] = {}
+    for row in rows.values():
+        units = {**row.get("units", {}), **units}
+    columns: dict[str, Any] = {
+        "verdict": ("record", [str(row.get("verdict", "")) for row in rows.values()]),
+        "converged": ("record", [bool(row.get("converged", False)) for row in rows.values()]),
+        "error": ("record", [str(row.get("error", "")) for row in rows.values()]),
+        "seconds": ("record", [float(row["seconds"]) for row in rows.values()]),
+        "band_width": ("record", [float(row.get("band_width", float("nan"))) for row in rows.values()]),
+        **{part: (("record", "quantity"), numbers[..., i]) for i, part in enumerate(("median", "lower", "upper"))},
+        "unit": ("quantity", [units.get(name, "1") for name in quantities]),
+    }
+    return xr.Dataset(columns, coords={"record": list(rows), "quantity": quantities})
+
+
+def _flat(table: xr.Dataset) -> xr.Dataset:
+    """Return the table with three columns for each quantity."""
+    columns = {
+        f"{name}{suffix}": table[part].sel(quantity=name, drop=True)
+        for name in table.quantity.values.tolist()
+        for part, suffix in (("median", ""), ("lower", "_lower"), ("upper", "_upper"))
+    }
+    return table.drop_dims("quantity").assign(columns)

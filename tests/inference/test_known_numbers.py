@@ -1,0 +1,198 @@
+"""A number is known: each parameter of a rig as a number is as if it were inferred, at that value."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.contour_posteriors import BRIEF, infer_as_stated, only, swept
+from tactile_bayes.contours import Circle
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.found_rig import found_rig
+from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.report.frames import motion_of
+from tactile_bayes.rig import Rig
+from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
+from tactile_bayes.uncertainty.implied_contacts import implied_contacts
+
+ROD = Rod(0.1, 2e-4, rest_curvature=2.0, taper=0.2, stem=0.004)
+CELL = LoadCell(
+    force_noise=0.05 * ROD.force_unit,
+    moment_noise=0.02 * ROD.moment_unit,
+    gain=((1.02, 0.0, 0.0003), (0.0, 0.97, 0.01), (0.0, 0.0, 1.0)),
+    lever=(0.001, 0.002),
+    moment_curve=(0.02 / ROD.moment_unit, 0.001 / ROD.moment_unit**2),
+    drive_angle_offset=0.01,
+    drive_angle_backlash=0.01,
+)
+PIN = Circle(0.02, 0.05, 0.002)
+MOMENT, FORCE = ROD.moment_unit, ROD.force_unit
+KNOWN = {
+    "rigidity_scale": 1.04,
+    "drive_angle_offset": 0.015,
+    "moment_bias": 0.05 * MOMENT,
+    "force_x_bias": -0.04 * FORCE,
+    "force_y_bias": 0.03 * FORCE,
+    "lever_x": 0.0005,
+    "lever_y": -0.0007,
+    "backlash": 0.02,
+    "friction": 0.15,
+    "moment_drift": 0.1 * MOMENT,
+    "force_x_drift": 0.07 * FORCE,
+    "force_y_drift": -0.08 * FORCE,
+    "moment_gain": 1.03,
+    "force_x_gain": 0.96,
+    "force_y_gain": 1.05,
+    "moment_curve_quadratic": -0.01 / MOMENT,
+    "moment_curve_cubic": 0.004 / MOMENT**2,
+    "suspension_compliance": 0.03 / MOMENT,
+    "rest_curvature": 1.1,
+    "taper": 0.25,
+    "stem": 0.0055,
+    "length": 0.102,
+    "gauge_x": 0.0006,
+    "gauge_y": -0.0008,
+    "noise_scale": 1.7,
+    "base_2_x": 0.0009,
+    "base_2_y": -0.0004,
+}
+NEVER_KNOWN = {*GROUPS["discrepancy"], "moment_noise", "force_noise"}
+"""Parameters of which numbers are refused, with what is to be said in their place."""
+
+
+@cache
+def record() -> xr.Dataset:
+    return CELL.measure(swept(PIN, bases=((0.0, 0.0), (0.01, 0.003)), rod=ROD, step=0.1), seed=1)
+
+
+FEW = replace(BRIEF, max_steps=2, block_steps=2)
+
+
+def model_of(said, cell=CELL, **options):
+    model = Experiment(record(), Rig(load_cell=cell, unknown=only(**said)), "circle", **options).model
+    model.likelihood.exact = True  # tables of paths depend on which parameters vary
+    return model
+
+
+def points_of(model, **values):
+    """A point at the truth, and one off it."""
+    every = {"r": PIN.r, "q": PIN.q, "x_c": PIN.x_c, "noise_scale": 1.2, **values}
+    return np.array([[every[name] for name in model.names]]) * np.array([[1.0], [1.01]]) ** np.array(
+        [name in ("r", "q") for name in model.names]
+    )
+
+
+def test_numbers_of_all_parameters_are_tried():
+    assert {name for name in KNOWN if not name.startswith("base")} == set(PARAMETERS) - NEVER_KNOWN
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_a_known_number_is_as_one_that_is_inferred_at_that_value(name):
+    """Beside other deviations, of contours at the truth and off it."""
+    gauge = {"gauge": Gauge(PIN)} if name in GROUPS["gauge"] else {}
+    known, free = model_of({name: KNOWN[name]}, **gauge), model_of({name: "default"}, **gauge)
+    assert name not in known.names
+    assert name in free.names
+    expected = free.log_likelihood(points_of(free, **{name: KNOWN[name]}), pointwise=True)
+    found = known.log_likelihood(points_of(known), pointwise=True)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    as_stated = model_of({}, **gauge)
+    assert np.abs(found - as_stated.log_likelihood(points_of(as_stated), pointwise=True)).max() > 1e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_some_known_and_others_inferred_are_as_all_inferred(seed):
+    rng = np.random.default_rng(seed)
+    names = [name for name in KNOWN if name not in (*GROUPS["gauge"], "rigidity_scale")]
+    chosen = rng.permutation(names)[: rng.integers(2, len(names))]
+    known = {str(name): KNOWN[name] for name in chosen}
+    one = model_of({**dict.fromkeys(names, "default"), **known})
+    all_ = model_of(dict.fromkeys(names, "default"))
+    found, expected = (m.log_likelihood(points_of(m, **{n: KNOWN[n] for n in names})) for m in (one, all_))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "flaw",
+    [
+        {"relative_noise": 0.02},
+        {"drive_angle_noise": 0.005},
+        {"force_resolution": 0.002},
+        {"bias_uncertainty": (0.0, 0.01 * FORCE, 0.0)},
+    ],
+    ids=lambda flaw: next(iter(flaw)),
+)
+def test_a_known_factor_of_the_noise_is_as_one_that_is_inferred(flaw):
+    cell = replace(CELL, **flaw)
+    known, free = model_of({"noise_scale": 1.7}, cell), model_of({}, cell)
+    expected = free.log_likelihood(points_of(free, noise_scale=1.7))
+    # With the noise goes the number of encoder errors over which the likelihood is a sum.
+    off = {"rtol": 1e-4} if "drive_angle_noise" in flaw else {"rtol": 1e-9}
+    np.testing.assert_allclose(known.log_likelihood(points_of(known)), expected, **off)
+
+
+def test_a_curvature_that_is_known_as_stated_stays_so_beside_an_unknown_length():
+    """Not known, it changes with the length, as the rod keeps its turn from base to tip."""
+    stated = ROD.mean_rest_curvature
+    known = model_of({"length": "default", "rest_curvature": stated})
+    free = model_of({"length": "default", "rest_curvature": "default"})
+    expected = free.log_likelihood(points_of(free, length=0.103, rest_curvature=stated))
+    np.testing.assert_allclose(known.log_likelihood(points_of(known, length=0.103)), expected, rtol=1e-9)
+    silent = model_of({"length": "default"})
+    assert np.abs(silent.log_likelihood(points_of(silent, length=0.103)) - expected).max() > 1e-3
+
+
+def test_the_place_of_a_gauge_is_no_number_of_a_record_without_one():
+    plain, placed = model_of({}), model_of({"gauge_x": 0.001})
+    np.testing.assert_array_equal(placed.log_likelihood(points_of(placed)), plain.log_likelihood(points_of(plain)))
+
+
+def with_rig(tree, **rig):
+    """The posterior as if every draw had this rig, found and not known."""
+    draws = tree["posterior"].to_dataset()
+    draws = draws.assign({name: xr.full_like(draws["q"], value) for name, value in rig.items()})
+    groups = {name: group.to_dataset() for name, group in tree.children.items()}
+    made = xr.DataTree.from_dict({**groups, "posterior": draws})
+    made.attrs = tree.attrs | {"nuisances": json.dumps(list(rig)), "known": "{}"}
+    return made
+
+
+@cache
+def posterior() -> xr.DataTree:
+    return infer_as_stated(record(), family="circle", load_cell=CELL, unknown=OF_STEP_2, seed=1, settings=FEW)
+
+
+OF_STEP_2 = {name: value for name, value in KNOWN.items() if name not in (*GROUPS["gauge"], "noise_scale")}
+
+
+@pytest.mark.slow
+def test_what_follows_from_a_posterior_takes_known_numbers_as_found_ones():
+    """Step 2, the contacts that contours imply, and the drawing of the rod."""
+    known, found = posterior(), with_rig(posterior(), **OF_STEP_2)
+    assert json.loads(known.attrs["known"]) == OF_STEP_2
+    one, other = (found_rig(record(), tree, CELL) for tree in (known, found))
+    xr.testing.assert_allclose(one.record, other.record, rtol=1e-12)
+    assert one.load_cell == other.load_cell
+    assert one[2:] == other[2:]
+    implied = [implied_contacts(tree, draws=20)["posterior"].to_dataset() for tree in (known, found)]
+    shared = [name for name in implied[0] if name in implied[1]]
+    xr.testing.assert_allclose(implied[0][shared], implied[1][shared])
+    drawn = [motion_of(tree) for tree in (known, found)]
+    for each in ("rod_x", "rod_y", "contact_x", "loads", "drive_angle", "cell_angle", "pivots"):
+        np.testing.assert_allclose(getattr(drawn[0], each), getattr(drawn[1], each), rtol=1e-12, err_msg=each)
+
+
+def test_a_factor_of_the_noise_that_is_known_is_no_parameter():
+    tree = infer_as_stated(
+        record(), family="circle", load_cell=CELL, unknown={"noise_scale": 1.5}, seed=1, settings=FEW
+    )
+    assert list(tree["posterior"].data_vars) == ["r", "q", "x_c"]
+    assert tree.attrs["load_cell_force_noise"] == pytest.approx(1.5 * CELL.force_noise)
+    assert tree["posterior_predictive"].sizes["sample"] == record().sizes["sample"]
+    assert set(CHANNELS) <= set(tree["posterior_predictive"].data_vars)

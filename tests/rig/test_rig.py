@@ -1,0 +1,212 @@
+"""A rig: what is known and unknown of it, by one rule; names that are refused; and its way to other processes."""
+
+import copy
+import pickle
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tactile_bayes.contours import Parabola
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.file_format import FileFormat
+from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, STANDARD, members
+from tactile_bayes.rig.rig import expanded, rig_of
+from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.sweep import scan
+
+CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+RECORD = scan(Parabola(0.5, q=0.5), drive_step=0.1).record
+ALL = tuple(name for group in STANDARD for name in members(group))
+
+
+def unknown_of(said, record=RECORD, **rig):
+    """Unknown parameters of the rig, without those of the noise."""
+    return Experiment(record, Rig(load_cell=CELL, unknown=said, **rig)).nuisances.names
+
+
+# --- The rule -------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_not_named_is_unknown_if_it_is_unknown_of_a_real_rig():
+    assert unknown_of({}) == ALL
+    assert unknown_of({"drift": "default"}) == (*ALL, *GROUPS["drift"])
+
+
+def test_a_number_is_known_and_a_distribution_unknown():
+    wide = stats.norm(0.0, 0.5)
+    rig = Rig(load_cell=CELL, unknown={"friction": 0.2, "moment_bias": wide, "suspension_compliance": "default"})
+    assert rig.known == {"friction": 0.2}
+    assert rig.distributions == {"moment_bias": wide}
+    experiment = Experiment(RECORD, rig)
+    assert "friction" not in experiment.nuisances.names
+    assert experiment.nuisances.known == {"friction": 0.2}
+    assert experiment.priors["moment_bias"] is wide
+    assert "suspension_compliance" in experiment.priors
+
+
+def test_nothing_is_unknown_of_a_rig_that_is_as_stated():
+    assert Rig(unknown="nothing").entries == Rig(unknown=NOTHING).entries == dict(NOTHING)
+    assert unknown_of("nothing") == ()
+    assert unknown_of({**NOTHING, "friction": "default"}) == ("friction",)
+    assert set(NOTHING) == set(STANDARD)
+    assert Experiment(RECORD, Rig(load_cell=CELL, unknown="nothing")).nuisances.known == {}
+
+
+def test_a_group_stands_for_its_members_with_exceptions():
+    assert expanded({"moment_bias": 0.1, "bias": "default"})["moment_bias"] == 0.1
+    assert expanded({"bias": "default", "moment_bias": 0.1})["moment_bias"] == 0.1
+    assert unknown_of({**NOTHING, "bias": "default", "moment_bias": 0.1}) == ("force_x_bias", "force_y_bias")
+    assert unknown_of({**NOTHING, "moment_gain": stats.norm(1.0, 0.1)}) == ("moment_gain",)
+    narrow = stats.norm(0.0, 0.01)
+    priors = Experiment(RECORD, Rig(load_cell=CELL, unknown={"lever": narrow, "lever_y": "default"})).priors
+    assert priors["lever_x"] is narrow
+    assert priors["lever_y"].std() == pytest.approx(0.005)
+
+
+def test_the_shifts_of_all_pivots_are_a_group():
+    record = scan(Parabola(0.5, q=0.5), drive_step=0.1, base=[(0.0, 0.0), (0.2, 0.0), (-0.2, 0.0)]).record
+    every = ("base_2_x", "base_2_y", "base_3_x", "base_3_y")
+    assert unknown_of({**NOTHING, "base": "default"}, record) == every
+    assert unknown_of({**NOTHING, "base": "default", "base_2_x": 0.01}, record) == every[1:]
+    assert unknown_of({**NOTHING, "base": "default"}) == ()
+    known = Experiment(record, Rig(load_cell=CELL, unknown={**NOTHING, "base_x": 0.01})).nuisances.known
+    assert known == {"base_2_x": 0.01, "base_3_x": 0.01}
+
+
+HIDDEN = {
+    "a channel that is missing": (("holding_moment",), {"moment_bias", "lever_x", "lever_y", "moment_gain"}),
+    "another one": (("force_x",), {"force_x_bias", "force_x_gain"}),
+}
+
+
+@pytest.mark.parametrize(("missing", "names"), HIDDEN.values(), ids=HIDDEN)
+def test_an_unknown_that_the_record_does_not_show_is_left_out(missing, names):
+    record = RECORD.assign({name: np.nan * RECORD[name] for name in missing})
+    said = {**NOTHING, **dict.fromkeys(names, "default"), "rest_curvature": stats.norm(0.0, 0.1), "gauge": "default"}
+    assert unknown_of(said, record) == ("rest_curvature",)
+    assert set(unknown_of(said)) == {*names, "rest_curvature"}
+
+
+def test_a_rig_without_unknowns_of_noise_states_it():
+    assert Experiment(RECORD, Rig(load_cell=CELL, unknown={"noise_scale": 1.0})).noise.names == ()
+    assert Experiment(RECORD, Rig(load_cell=CELL)).noise.names == ("noise_scale",)
+    assert Experiment(RECORD, Rig()).noise.names == ("moment_noise", "force_noise")
+    with pytest.raises(ParameterError, match=r"moment_noise is known: state it in LoadCell"):
+        Experiment(RECORD, Rig(unknown={"moment_noise": 0.02})).noise  # noqa: B018
+
+
+# --- What is refused ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ({"frictoin": 0.1}, "did you mean 'friction'"),
+        ({"momentbias": 0.1}, "did you mean 'moment_bias'"),
+        ({"bases": 0.1}, "did you mean 'base'"),
+        ({"rust": 0.1}, "there are bias, drift, gain, lever"),
+        ({"base_1_x": 0.1}, "base_1_x is never unknown"),
+        ({3: 0.1}, "by name"),
+        ({"friction": "wide"}, "'friction'.* 'wide': give a number, a distribution, or \"default\""),
+        ({"friction": None}, "frozen distribution"),
+        ({"friction": stats.halfnorm}, "frozen distribution"),
+        ({"friction": stats.halfnorm(scale=0.0)}, "give the number, 0"),
+        ({"friction": -0.1}, "from 0 to"),
+        ({"friction": float("nan")}, "finite number"),
+        ({"taper": 1.5}, "from 0 to 0.95"),
+        ({"gain": -1.0}, "finite number from"),
+        *(({name: 0.0}, "finite number from") for name in ("moment_gain", "rigidity_scale", "length", "noise_scale")),
+        ("everything", "nothing"),
+        (["bias"], "by name"),
+        (None, "by name"),
+    ],
+)
+def test_what_cannot_be_said_of_a_rig_is_refused(said, words):
+    with pytest.raises(ParameterError, match=words):
+        Rig(unknown=said)
+
+
+@pytest.mark.parametrize("part", ["rod", "load_cell", "file"])
+def test_parts_of_another_kind_are_refused(part):
+    with pytest.raises(ParameterError, match=part):
+        Rig(**{part: 0.2})
+
+
+def test_what_is_no_rig_is_refused():
+    with pytest.raises(ParameterError, match=r"posterior is 0\.2"):
+        Rig.of(0.2)
+    assert rig_of(None).entries == {}
+    with pytest.raises(ParameterError, match=r"rig is 0.2: give Rig\("):
+        rig_of(0.2)
+
+
+def test_a_calibrated_parameter_is_not_unknown_as_well():
+    found = RigPrior({"lever_x": stats.norm(0.001, 1e-4)}, np.eye(1), 0.01, "0")
+    with pytest.raises(ParameterError, match="lever_x"):
+        Rig(unknown={"lever": "default"}, calibration=found)
+    assert Rig(unknown={"lever_y": 0.0}, calibration=found).known == {"lever_y": 0.0}
+
+
+# --- Other rigs -----------------------------------------------------------------------------------------------------
+
+
+def test_of_a_rig_something_else_can_be_said():
+    rig = Rig(load_cell=CELL, unknown="nothing").with_unknown(friction="default", lever_x=0.01)
+    assert rig.load_cell is CELL
+    assert unknown_of(rig.unknown) == ("friction",)
+    assert rig.known["lever_x"] == 0.01
+    assert rig.with_unknown(friction=0.1).known["friction"] == 0.1
+
+
+def test_a_rig_cannot_be_changed():
+    rig = Rig(unknown={"friction": 0.2})
+    with pytest.raises(TypeError):
+        rig.unknown["friction"] = 0.3
+    given = {"friction": 0.2}
+    rig = Rig(unknown=given)
+    given["friction"] = 0.5
+    assert rig.known == {"friction": 0.2}
+
+
+WHOLE = Rig(
+    rod=Rod(0.1, 1e-5, rest_curvature=lambda s: 3.0 * s),
+    load_cell=CELL,
+    unknown={"friction": stats.halfnorm(scale=0.2), "lever": 0.0, "drift": "default"},
+    calibration=RigPrior({"rigidity_scale": stats.lognorm(s=0.01)}, np.eye(1), 0.01, "0"),
+    file=FileFormat({"force_x": "-Fx[mN]"}, True, ("force_y",)),
+)
+
+
+def same(one, other):
+    """What can be said of two rigs is the same."""
+    assert one.text == other.text
+    assert one.file == other.file
+    assert list(one.entries) == list(other.entries)
+
+
+@pytest.mark.parametrize("travel", [copy.deepcopy, lambda rig: pickle.loads(pickle.dumps(rig))])
+def test_a_rig_travels(travel):
+    same(travel(WHOLE), WHOLE)
+    assert travel(Rig(unknown="nothing")).entries == dict(NOTHING)
+
+
+def names_there(rig):
+    return Experiment(RECORD, Rig(load_cell=rig.load_cell, unknown=rig.unknown)).nuisances.names, rig.text
+
+
+@pytest.mark.slow
+def test_a_rig_travels_to_another_process():
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        assert pool.submit(names_there, WHOLE).result() == names_there(WHOLE)
+
+
+def test_every_name_is_one_of_the_table():
+    for name in (*PARAMETERS, *GROUPS, "base", "base_x", "base_4_y"):
+        assert list(Rig(unknown={name: "default"}).entries) == [name]

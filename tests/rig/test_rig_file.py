@@ -1,0 +1,288 @@
+"""The file of a rig: written and read, in units as text, from hostile text; what is refused, with the file's name."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
+from tactile_bayes.rig.file_format import FileFormat
+from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
+from tactile_bayes.rig.rig_prior import RigPrior
+
+S = np.linspace(0.0, 1.0, 40)
+RODS = {
+    "dimensionless": Rod(),
+    "dimensionless, curved": Rod(rest_curvature=0.3, taper=0.2, stem=0.01, diameter=0.01),
+    "SI": Rod(0.2, 3.1e-4),
+    "SI, all": Rod(0.2, 3.1e-4, diameter=1e-3, elastic_strain=0.02, rest_curvature=1.2, taper=0.4, stem=0.003),
+    "curved along": Rod(0.2, 3.1e-4, rest_curvature=lambda s: 3.0 * s - 0.1, rigidity_profile=lambda s: 1.0 - 0.3 * s),
+    "traced": Rod.from_shape(0.1 * S, 0.02 * S**2, 1e-5),
+}
+CELLS = {
+    "noise": LoadCell(force_noise=0.05, moment_noise=0.02),
+    "everything": LoadCell(
+        force_noise=0.05,
+        moment_noise=0.02,
+        relative_noise=0.01,
+        force_resolution=1e-3,
+        moment_resolution=2e-3,
+        force_range=5.0,
+        moment_range=7.0,
+        bias=(0.1, -0.2, 0.3),
+        gain=((1.0, 0.0, 0.02), (0.01, 1.1, 0.0), (0.0, 0.03, 0.95)),
+        lever=(-0.01, 0.04),
+        moment_curve=(0.01, 0.002),
+        drive_angle_offset=-0.02,
+        drive_angle_backlash=0.01,
+        drive_angle_noise=0.001,
+        frame="turning",
+    ),
+    "drifts": LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(moment=0.1, force=0.2)),
+    "wanders": LoadCell(force_noise=0.05, moment_noise=0.02, drift=OrnsteinUhlenbeck(0.1, 0.2, 50.0)),
+    "doubtful zero": LoadCell(force_noise=0.05, moment_noise=0.02, bias_uncertainty=(0.1, 0.0, 0.2)),
+    "dependent": LoadCell(force_noise=0.05, moment_noise=0.02, correlation=(0.1, -0.2, 0.3)),
+    "heavy tails": LoadCell(force_noise=0.05, moment_noise=0.02, degrees_of_freedom=4.0),
+}
+SAID = {
+    "nothing": "nothing",
+    "numbers": {"friction": 0.2, "lever": 0.0, "base_3_x": -1e-17},
+    "distributions": {
+        "friction": stats.halfnorm(scale=1.0 / 3.0),
+        "bias": stats.norm(0.1, 0.3),
+        "rigidity_scale": stats.lognorm(s=0.1, scale=1.02),
+        "drive_angle_offset": stats.uniform(-0.1, 0.3),
+        "moment_noise": stats.loguniform(1e-5, 0.3),
+        "taper": stats.truncnorm(-1.0, 2.0, loc=0.2, scale=0.1),
+        "backlash": stats.t(df=4.0, scale=0.01),
+    },
+    "defaults": {"drift": "default", "gain": "default", "discrepancy": "default", "base": "default"},
+}
+FORMATS = {
+    "as of records": FileFormat(),
+    "of a rig": FileFormat(
+        {"force_x": "-Fx[mN]", "drive_angle": '"angle" [deg]', "base_x": "2e-3"}, True, ("force_y",)
+    ),
+}
+CALIBRATION = RigPrior(
+    {
+        "rigidity_scale": stats.lognorm(s=0.013, scale=1.03),
+        "lever_x": stats.norm(0.001, 1.0 / 3e3),
+        "taper": stats.truncnorm(-0.5, np.inf, loc=0.05, scale=0.1),
+    },
+    np.array([[1.0, 0.3, -0.1], [0.3, 1.0, 0.2], [-0.1, 0.2, 1.0]]),
+    0.0123,
+    "0f 1e",
+    {"rod_length": 0.2, "units": "SI", "load_cell_gain_force_x_moment": 0.0, "rod_count": 3},
+)
+
+
+def rigs():
+    for name, rod in RODS.items():
+        yield f"rod, {name}", Rig(rod=rod)
+    for name, cell in CELLS.items():
+        yield f"load cell, {name}", Rig(load_cell=cell)
+    for name, said in SAID.items():
+        yield f"unknown, {name}", Rig(unknown=said)
+    for name, form in FORMATS.items():
+        yield f"file, {name}", Rig(file=form)
+    yield "calibration", Rig(calibration=CALIBRATION)
+    of_rig = {"rod": RODS["SI, all"], "load_cell": CELLS["everything"], "file": FORMATS["of a rig"]}
+    yield "all", Rig(**of_rig, unknown={"friction": stats.halfnorm(scale=0.1), "bias": 0.0}, calibration=CALIBRATION)
+
+
+RIGS = dict(rigs())
+
+
+def read(path, text):
+    path.write_text(text, encoding="utf-8")
+    return Rig.read(path)
+
+
+@pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS)
+def test_what_is_written_is_read_as_it_was(rig, tmp_path):
+    path = tmp_path / "rig.toml"
+    rig.write(path)
+    again = Rig.read(path)
+    assert again.text == rig.text
+    assert again.rod == rig.rod
+    assert again.load_cell == rig.load_cell
+    assert again.file == rig.file
+    assert list(again.entries) == list(rig.entries)
+    for name, value in rig.entries.items():
+        other = again.entries[name]
+        if isinstance(value, float | str):
+            assert other == value
+        else:
+            np.testing.assert_array_equal(other.ppf([0.1, 0.5, 0.9]), value.ppf([0.1, 0.5, 0.9]))
+    assert path.read_text(encoding="utf-8").startswith("# A rig")
+
+
+def test_a_calibration_is_read_as_it_was(tmp_path):
+    Rig(calibration=CALIBRATION).write(tmp_path / "rig.toml")
+    found = Rig.read(tmp_path / "rig.toml").calibration
+    np.testing.assert_array_equal(found.correlation, CALIBRATION.correlation)
+    assert (found.error, found.source, dict(found.stated)) == (0.0123, "0f 1e", dict(CALIBRATION.stated))
+    points = CALIBRATION.draw(np.random.default_rng(1), 20)
+    np.testing.assert_allclose(found.log_dependence(points), CALIBRATION.log_dependence(points), rtol=1e-12)
+    for name, prior in CALIBRATION.priors.items():
+        np.testing.assert_array_equal(found.priors[name].ppf([0.1, 0.9]), prior.ppf([0.1, 0.9]))
+    assert found.posterior is None
+
+
+def test_distributions_of_ones_own_are_not_written(tmp_path):
+    own = stats.rv_histogram((np.ones(4), np.linspace(0.3, 0.7, 5)))()
+    rig = Rig(unknown={"friction": own})
+    with pytest.raises(ParameterError, match="cannot be written"):
+        rig.write(tmp_path / "rig.toml")
+    assert list(tmp_path.iterdir()) == []
+    assert rig.text == "not written"
+
+
+UNITS = """
+[rod]
+length = "200 mm"
+diameter = "0.4 mm"
+youngs_modulus = "2.1e11 N/m²"
+stem = "3 mm"
+
+[load_cell]
+force_noise = "5 mN"
+moment_noise = "0.2 mN m"
+lever = ["1 mm", "-2 mm"]
+drive_angle_offset = "1 deg"
+
+[unknown]
+lever_x = "0.5 mm"
+drive_angle_offset = "2 deg"
+moment_bias = { normal = ["0 mN m", "1 mN m"] }
+base_2_x = "3 mm"
+length = { normal = ["201 mm", "1 mm"] }
+"""
+
+
+def test_units_are_texts(tmp_path):
+    rig = read(tmp_path / "rig.toml", UNITS)
+    assert rig.rod == Rod(0.2, 2.1e11 * math.pi * 4e-4**4 / 64.0, diameter=4e-4, stem=0.003)
+    assert rig.load_cell.force_noise == pytest.approx(5e-3)
+    assert rig.load_cell.moment_noise == pytest.approx(2e-4)
+    assert rig.load_cell.lever == pytest.approx((1e-3, -2e-3))
+    assert rig.load_cell.drive_angle_offset == pytest.approx(np.radians(1.0))
+    assert rig.known == pytest.approx({"lever_x": 5e-4, "drive_angle_offset": np.radians(2.0), "base_2_x": 3e-3})
+    assert rig.distributions["moment_bias"].std() == pytest.approx(1e-3)
+    assert rig.distributions["length"].mean() == pytest.approx(0.201)
+
+
+def test_a_shape_is_found_beside_the_file(tmp_path, monkeypatch):
+    folder = tmp_path / "rigs"
+    folder.mkdir()
+    lines = "".join(f"{x!r},{y!r}\n" for x, y in zip((0.1 * S).tolist(), (0.02 * S**2).tolist(), strict=True))
+    (folder / "shape.csv").write_text(f"x,y\n{lines}", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    found = read(folder / "rig.toml", '[rod]\nshape = "shape.csv"\nflexural_rigidity = 1e-5\n').rod
+    assert found == RODS["traced"]
+    with pytest.raises((ParameterError, FileNotFoundError), match=r"other\.csv"):
+        read(folder / "rig.toml", '[rod]\nshape = "other.csv"\nflexural_rigidity = 1e-5\n')
+
+
+def test_a_rig_without_a_rod_in_metres_has_no_units(tmp_path):
+    plain = read(
+        tmp_path / "rig.toml", '[load_cell]\nforce_noise = 0.05\nmoment_noise = 0.02\n[unknown]\nbacklash = "1 deg"'
+    )
+    assert plain.load_cell == CELLS["noise"]
+    assert plain.known["backlash"] == pytest.approx(np.radians(1.0))
+    for text in ('[load_cell]\nforce_noise = "5 mN"', '[unknown]\nlever_x = "1 mm"', '[rod]\nstem = "1 mm"'):
+        with pytest.raises(ParameterError, match="dimensionless"):
+            read(tmp_path / "rig.toml", text)
+
+
+WRONG = {
+    "no table": ("[road]", "did you mean 'rod'"),
+    "no parameter": ("[unknown]\nfrictoin = 0.1", "did you mean 'friction'"),
+    "no entry": ("[rod]\nlenght = 0.1", "did you mean 'length'"),
+    "another table's": ("[rod]\nforce_noise = 0.1", "load_cell"),
+    "no column": ("[file]\nforce_z = 'Fz'", "force_z"),
+    "a table that is none": ("rod = 1", "rod"),
+    "another unit": ('[rod]\nlength = "3 N"\nflexural_rigidity = 1e-5', "rod.length.*not in"),
+    "a list": ("[rod]\nlength = [1.0]\nflexural_rigidity = 1e-5", "rod.length"),
+    "a switch": ("[rod]\nlength = true\nflexural_rigidity = 1e-5", "rod.length"),
+    "a length alone": ("[rod]\nlength = 0.1", "flexural_rigidity"),
+    "a modulus alone": ("[rod]\nlength = 0.1\nyoungs_modulus = 1e11", "diameter"),
+    "a shape alone": ("[rod]\nshape = 'shape.csv'", "flexural_rigidity"),
+    "too few": ("[load_cell]\nlever = [0.1]", "lever"),
+    "no distribution": ("[unknown]\nfriction = { wide = 1.0 }", "unknown.friction"),
+    "no width": ("[unknown]\nfriction = { normal = [0.1, 0.0] }", "give the number"),
+    "out of bounds": ("[unknown]\nfriction = -1.0", "friction"),
+    "text": ('[unknown]\nfriction = "wide"', "friction"),
+    "everything": ('unknown = "everything"', "unknown"),
+    "no number": ("[rod]\nlength = nan\nflexural_rigidity = 1.0", "length"),
+    "half a calibration": ("[calibration]\nerror = 0.1", "parameters"),
+    "no TOML": ("[rod\nlength", "line"),
+    "deep": ("x = " + "[" * 5000 + "]" * 5000, "nested deeper"),
+    "deep tables": ("[" + "a." * 5000 + "a]", "5001 parts"),
+    "large": ("#" * (1 << 20) + "\n#", "more than"),
+    "digits": ("[rod]\nlength = " + "9" * 5000 + "\nflexural_rigidity = 1.0", "no TOML|not TOML|number"),
+    "a zero byte": ("[rod]\nlength = 0.1\x00", "line 2"),
+}
+
+
+@pytest.mark.parametrize(("text", "words"), WRONG.values(), ids=WRONG)
+def test_what_is_wrong_with_a_file_is_named_with_it(text, words, tmp_path):
+    where = re.escape(str(tmp_path / "rig.toml"))
+    with pytest.raises(ParameterError, match=f"(?s)^{where}: .*({words})"):
+        read(tmp_path / "rig.toml", text)
+
+
+CALIBRATED = """
+[calibration]
+source = "0"
+error = 0.01
+stated = {{}}
+parameters = {parameters}
+correlation = {correlation}
+"""
+NORMAL = "{ lever_x = { normal = [0.0, 0.1] }, lever_y = { normal = [0.0, 0.1] } }"
+
+
+@pytest.mark.parametrize(
+    ("parameters", "correlation", "words"),
+    [
+        (NORMAL, "[[1.0]]", "does not fit"),
+        (NORMAL, "[[1.0, 2.0], [2.0, 1.0]]", "no matrix of correlations"),
+        (NORMAL, "[[2.0, 0.0], [0.0, 1.0]]", "no matrix of correlations"),
+        (NORMAL, "[[1.0, nan], [nan, 1.0]]", "does not fit"),
+        (NORMAL, '[["a", 0.0], [0.0, 1.0]]', "correlation"),
+        (NORMAL, "[[1.0, 0.0], [0.0]]", "correlation"),
+        ("{ lever_x = 0.1 }", "[[1.0]]", "lever_x"),
+        ("{}", "[]", "does not fit"),
+        ("{ rust = { normal = [0.0, 0.1] } }", "[[1.0]]", "rust"),
+        ("[1.0]", "[[1.0]]", "parameters"),
+    ],
+)
+def test_a_calibration_that_is_none_is_refused(parameters, correlation, words, tmp_path):
+    with pytest.raises(ParameterError, match=f"(?s)rig.toml.*{words}"):
+        read(tmp_path / "rig.toml", CALIBRATED.format(parameters=parameters, correlation=correlation))
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    (tmp_path / "rig.toml").write_bytes(b"[rod]\nlength = 0.1 # \xff")
+    with pytest.raises(ParameterError, match=r"rig\.toml"):
+        Rig.read(tmp_path / "rig.toml")
+    with pytest.raises(FileNotFoundError):
+        Rig.read(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("name", [*PARAMETERS, *GROUPS, "base", "base_x", "base_2_y"])
+def test_of_every_parameter_all_that_can_be_said_is_written(name, tmp_path):
+    row = PARAMETERS.get(GROUPS.get(name, (name,))[0])
+    number = 0.5 if row is None else float(np.clip(0.5, row.low, row.high))
+    for value in (number, "default", stats.norm(number, 0.1)):
+        Rig(unknown={name: value}).write(tmp_path / "rig.toml")
+        again = Rig.read(tmp_path / "rig.toml").entries
+        assert list(again) == [name]
+        assert (again[name] == value) if isinstance(value, float | str) else again[name].mean() == number
