@@ -105,6 +105,7 @@ def test_a_posterior_of_contacts_alone_is_refused():
         trust(tree)
 
 
+@pytest.mark.slow
 def test_a_distribution_that_is_none_of_scipys_has_to_be_given_again():
     """A histogram of q: the posterior states that it was one, and not its numbers."""
     heights = stats.rv_histogram(np.histogram(np.linspace(0.3, 0.7, 50), bins=5), density=True)()

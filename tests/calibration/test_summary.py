@@ -75,7 +75,7 @@ def test_right_posteriors_are_calibrated():
     assert verdict.endswith("The check of the record raises an alarm in 0.0% of 100.")
     assert found.sizes == {"replicate": 100, "quantity": 8, "claim": 6}
     assert found.attrs["false_alarm"] == FALSE_ALARM == 0.01
-    assert (found.attrs["family"], found.attrs["seed"], found.attrs["probability"]) == ("Family('parabola')", "1", 0.9)
+    assert (found.attrs["family"], found.attrs["seed"], found.attrs["probability"]) == ("parabola", "1", 0.9)
 
 
 def false_verdicts(sets, count):

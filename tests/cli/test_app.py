@@ -398,7 +398,7 @@ def test_a_file_that_is_not_there(tmp_path, name):
 @pytest.mark.parametrize("name", ["a.csv", "a.nc", "a"])
 def test_a_directory_for_a_record(tmp_path, name):
     (tmp_path / name).mkdir()
-    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), "is a folder: give the record itself")
+    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), "holds no record: give a folder of .csv")
 
 
 def test_a_folder_that_cannot_be_made(record):

@@ -101,6 +101,7 @@ def test_an_inspection_and_contacts_of_a_carried_rod(carried, tmp_path):
     assert call("reconstruct", measured, "--out", tmp_path / "contacts").exit_code == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "kind"), [("carried", "travel"), pytest.param("mixed", "sample", marks=pytest.mark.slow)]
 )

@@ -163,6 +163,7 @@ def test_figures_of_it_are_drawn(tree, figure):
     plt.close("all")
 
 
+@pytest.mark.slow
 def test_the_report_of_it_is_written(tmp_path):
     record = record_of(infer_as_stated(measured(), family=CENTRED, load_cell=CELL, seed=1, settings=BRIEF))
     rig = Rig(load_cell=CELL, unknown="nothing")

@@ -207,6 +207,7 @@ def test_a_posterior_is_known_by_its_own_rig(posterior):
     )
 
 
+@pytest.mark.slow
 def test_what_a_posterior_knows_of_rig_and_contour_is_known(measured):
     rig = Rig(load_cell=CELL, unknown={**NOTHING, "friction": 0.1, "moment_bias": "default", "noise_scale": 1.0})
     known = Family("parabola", q=0.5, a=stats.norm(0.5, 0.1))
