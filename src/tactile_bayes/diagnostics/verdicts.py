@@ -73,12 +73,12 @@ _CAUSES = {
 def verdicts(
     posterior: xr.DataTree, contacts: xr.Dataset | None = None, trust: xr.Dataset | None = None
 ) -> tuple[str, ...]:
-    """Judge a result of `infer_contour` or `infer_rig`: what is wrong, the most serious first, or that all is well.
+    """Judge a posterior of a contour or a rig: what is wrong, the most serious first, or that all is well.
 
     Parameters
     ----------
     posterior : xr.DataTree
-        From `infer_contour` or `infer_rig`.
+        From `infer_contour`, or the `calibration.posterior` of a rig from `calibrate_rig`.
     contacts : xr.Dataset, optional
         From `reconstruct` by method="constrained", whose misfits show whether the loads of a sample agree.
     trust : xr.Dataset, optional
@@ -103,12 +103,12 @@ def verdicts(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.02, moment_noise=0.008)
     >>> measured = cell.measure(scan(paper_profile("III", q=0.5), drive_step=0.03).record, seed=1)
     >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=50)
-    >>> found = verdicts(infer_contour(measured, load_cell=cell, nuisances=[], seed=1, settings=quick))
+    >>> found = verdicts(infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), seed=1, settings=quick))
     >>> print(found[0].split(":")[0])
     The family parabola and the rig as assumed do not describe the record
     """

@@ -35,7 +35,7 @@ _SLIDING = (
 )
 """What to do where friction would hold a rod that is carried, and one that turns about a pivot."""
 
-_FREE = "without friction the rod has a path (friction=0.0, or friction = 0 under [unknown] of rig.toml); with it, "
+_FREE = "without friction the rod has a path (friction = 0 under [unknown] of rig.toml); with it, "
 
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
 """Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
