@@ -49,6 +49,9 @@ _GROUPS = 10
 _THICKEST = 0.05
 """Largest scatter of the points, as a share of the length."""
 
+_THINNEST = 1e-12
+"""Least scatter that is taken, as a share of the length."""
+
 _MOST_BEYOND = 1.5
 """Largest length of a rod over that of its points."""
 
@@ -151,10 +154,10 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None, leng
             f"{fit.length:.3g} long: trace one rod, its points in order"
         )
     if scatter is not None:
-        if not scatter <= _THICKEST * fit.length:
+        if not _THINNEST * fit.length <= scatter <= _THICKEST * fit.length:
             raise ParameterError(
-                f"scatter is {scatter:.3g}, and the rod is {fit.length:.3g} long: give at most a twentieth of that, in "
-                "the unit of x and y"
+                f"scatter is {scatter:.3g}, and the rod is {fit.length:.3g} long: give at most a twentieth of that, "
+                "and more than rounding, in the unit of x and y"
             )
         if fit.posterior.probability_below(scatter / fit.length) < _FALSE_ALARM:
             raise ParameterError(
