@@ -18,7 +18,7 @@ from scipy import stats
 from scipy.special import ndtri
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import as_number, check_kind, check_mapping, shown
+from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import ParameterError
 
 __all__ = [
@@ -27,7 +27,6 @@ __all__ = [
     "Kind",
     "all_in_words",
     "check_distribution",
-    "check_distributions",
     "distribution_of_table",
     "frozen",
     "in_words",
@@ -284,21 +283,6 @@ class _Newer:
 
     def __repr__(self) -> str:
         return repr(self.of)
-
-
-def check_distributions(name: str, given: Any) -> None:
-    """Refuse an argument that is no mapping of names to distributions with a density.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
-    correction = "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}"
-    check_kind(name, given, Mapping, correction)
-    check_mapping(name, given, correction)
-    for parameter, distribution in given.items():
-        check_distribution(parameter, distribution)
 
 
 def check_distribution(parameter: str, distribution: Any) -> None:

@@ -3,9 +3,20 @@
 import os
 import signal
 import time
+from multiprocessing import Pipe
 from pathlib import Path
 
-__all__ = ["alive", "die", "die_once", "double", "fail", "fail_strangely", "note_and_sleep", "wait_until"]
+__all__ = [
+    "alive",
+    "die",
+    "die_once",
+    "double",
+    "fail",
+    "fail_strangely",
+    "note_and_sleep",
+    "through_a_pipe",
+    "wait_until",
+]
 
 
 def double(number):
@@ -69,3 +80,11 @@ def wait_until(condition, seconds=120.0):
         if time.monotonic() > end:
             raise AssertionError(f"it did not happen in {seconds:g} s")
         time.sleep(0.01)
+
+
+def through_a_pipe(value):
+    """A value as another process of the machine receives it."""
+    one, other = Pipe()
+    with one, other:
+        one.send(value)
+        return other.recv()

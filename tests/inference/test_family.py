@@ -2,7 +2,6 @@
 
 import copy
 import json
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +12,7 @@ from scipy import stats
 
 from helpers.contour_posteriors import BRIEF, CELL, MODEST, infer_as_stated, measured
 from helpers.report_pages import analysed_quickly
+from helpers.tasks import through_a_pipe
 from tactile_bayes import plotting
 from tactile_bayes.contours import Ellipse
 from tactile_bayes.diagnostics.record_check import check_record
@@ -84,7 +84,7 @@ def test_families_are_equal_if_they_say_the_same():
     assert family_of(one) is one
 
 
-@pytest.mark.parametrize("travel", [copy.deepcopy, lambda family: pickle.loads(pickle.dumps(family))])
+@pytest.mark.parametrize("travel", [copy.deepcopy, through_a_pipe])
 def test_a_family_travels_to_another_process(travel):
     family = Family("parabola/power-law", q=stats.norm(0.5, 0.1), x_c=0.02)
     assert travel(family) == family

@@ -1,7 +1,6 @@
 """A rig: what is known and unknown of it, by one rule; names that are refused; and its way to other processes."""
 
 import copy
-import pickle
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
@@ -9,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.tasks import through_a_pipe
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.experiment import Experiment
@@ -191,7 +191,7 @@ def same(one, other):
     assert list(one.entries) == list(other.entries)
 
 
-@pytest.mark.parametrize("travel", [copy.deepcopy, lambda rig: pickle.loads(pickle.dumps(rig))])
+@pytest.mark.parametrize("travel", [copy.deepcopy, through_a_pipe])
 def test_a_rig_travels(travel):
     same(travel(WHOLE), WHOLE)
     assert travel(Rig(unknown="nothing")).entries == dict(NOTHING)

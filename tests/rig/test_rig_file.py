@@ -166,6 +166,13 @@ length = { normal = ["201 mm", "1 mm"] }
 """
 
 
+@pytest.mark.parametrize("name", ["bias", "bias_uncertainty", "gain", "lever", "moment_curve", "correlation"])
+def test_entries_of_several_numbers_are_lists(tmp_path, name):
+    value = np.ravel(getattr(CELLS["everything"], name)).tolist()
+    rig = read(tmp_path / "rig.toml", f"[load_cell]\n{name} = {value}\n")
+    assert np.ravel(getattr(rig.load_cell, name)).tolist() == value
+
+
 def test_units_are_texts(tmp_path):
     rig = read(tmp_path / "rig.toml", UNITS)
     assert rig.rod == Rod(0.2, 2.1e11 * math.pi * 4e-4**4 / 64.0, diameter=4e-4, stem=0.003)

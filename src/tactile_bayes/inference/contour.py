@@ -222,7 +222,7 @@ def calibrate_rig(
     settings, rig = settings_of(settings), rig_of(rig)
     posterior = rig_posterior(records, contour, rig, seed, settings, checkpoint, progress, keep)
     found = rig_prior(posterior)
-    left = {name: value for name, value in expanded(rig.unknown).items() if name not in found.priors}
+    left = {name: value for name, value in expanded(rig.entries).items() if name not in found.priors}
     return replace(rig, unknown=left, calibration=found)
 
 

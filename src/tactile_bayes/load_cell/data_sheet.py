@@ -29,7 +29,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.attribute_names import no_entry
 
-__all__ = ["CERTAIN", "DataSheet"]
+__all__ = ["CERTAIN", "SEVERAL", "DataSheet"]
 
 Triple = tuple[float, float, float]
 
@@ -55,7 +55,7 @@ _SCALARS = (
 )
 _DRIFTS: dict[type[Drift], str] = {RandomWalk: "random_walk", OrnsteinUhlenbeck: "ornstein_uhlenbeck"}
 _PAIRS = tuple(combinations(CHANNELS, 2))
-_SEVERAL: dict[str, tuple[str, ...]] = {
+SEVERAL: dict[str, tuple[str, ...]] = {
     "bias": tuple(f"bias_{name}" for name in CHANNELS),
     "bias_uncertainty": tuple(f"bias_uncertainty_{name}" for name in CHANNELS),
     "gain": tuple(f"gain_{to}_{of}" for to, of in product(CHANNELS, CHANNELS)),
@@ -112,7 +112,7 @@ class DataSheet:
     def __post_init__(self) -> None:
         for name in _SCALARS:
             object.__setattr__(self, name, self._number(name))
-        for name, names in _SEVERAL.items():
+        for name, names in SEVERAL.items():
             shape = (3, 3) if name == "gain" else (len(names),)
             numbers = check_numbers(f"the load cell's {name}", getattr(self, name), _CORRECTIONS[name], shape=shape)
             rows = map(tuple, numbers.tolist()) if name == "gain" else numbers.tolist()
@@ -332,7 +332,7 @@ class DataSheet:
     def _all_entries(self) -> Iterator[tuple[str, Any]]:
         for name in _SCALARS:
             yield name, float(getattr(self, name))
-        for name, names in _SEVERAL.items():
+        for name, names in SEVERAL.items():
             yield from zip(names, np.ravel(getattr(self, name)).tolist(), strict=True)
             if name == "bias_uncertainty" and self.drift is not None:
                 prefix = _DRIFTS[type(self.drift)]
@@ -365,7 +365,7 @@ class DataSheet:
 
         options: dict[str, Any] = {name: entries[name] for name in (*_SCALARS, "frame") if name in entries}
         ideal = dict(DataSheet()._all_entries())
-        for name, names in _SEVERAL.items():
+        for name, names in SEVERAL.items():
             numbers = [entries.get(one, ideal[one]) for one in names]
             options[name] = [numbers[:3], numbers[3:6], numbers[6:]] if name == "gain" else numbers
         processes = [kind for kind, prefix in _DRIFTS.items() if any(name.startswith(f"{prefix}_") for name in entries)]

@@ -122,7 +122,7 @@ class Plan:
     @property
     def friction(self) -> float:
         """Coulomb's coefficient if it is known, else 0."""
-        return self.rig.known.get("friction", 0.0)
+        return self.rig.friction
 
     @cached_property
     def cell(self) -> LoadCell:

@@ -35,8 +35,8 @@ class Parameter(NamedTuple):
     unit: str
     """SI unit."""
     default: Literal["normal", "log_normal", "half_normal", "log_uniform"]
-    """Default distribution: about the stated value where there is one, else about `neutral`; normal ones are cut off at
-    the bounds."""
+    """Default distribution: about the stated value where there is one, else about `neutral`; that of what may vanish is
+    cut off at the bounds."""
     width: float
     """Standard deviation, or that of the logarithm, or the scale of the default distribution, in units of the rod; of a
     log-uniform one the smallest value."""

@@ -7,7 +7,7 @@ import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -96,7 +96,7 @@ class Rig:
         check_kind("file", self.file, FileFormat, "give FileFormat(columns={'force_x': '-Fx[mN]'})")
         object.__setattr__(self, "unknown", MappingProxyType(_checked(self.unknown)))
         if self.calibration is not None:
-            both = sorted(set(expanded(self.unknown)) & set(self.calibration.priors))
+            both = sorted(set(self._expanded) & set(self.calibration.priors))
             if both:
                 raise ParameterError(
                     f"unknown has {', '.join(both)}, which the calibration of the rig has found: leave one of the two"
@@ -111,17 +111,21 @@ class Rig:
     @property
     def entries(self) -> dict[str, Unknown]:
         """What `unknown` says of parameters and groups."""
-        return dict(NOTHING) if isinstance(self.unknown, str) else dict(self.unknown)
+        return dict(cast("Mapping[str, Unknown]", self.unknown))  # checked and written out at the beginning
+
+    @property
+    def _expanded(self) -> dict[str, Unknown]:
+        return expanded(self.entries)
 
     @property
     def said(self) -> dict[str, Unknown]:
         """What is said of each parameter, those included that are unknown of a real rig; "base" stays a group."""
-        return {**{name: DEFAULT for of in STANDARD for name in members(of)}, **expanded(self.unknown)}
+        return {**{name: DEFAULT for of in STANDARD for name in members(of)}, **self._expanded}
 
     @property
     def known(self) -> dict[str, float]:
         """Numbers of the parameters that are said to be known."""
-        return {name: value for name, value in expanded(self.unknown).items() if isinstance(value, float)}
+        return {name: value for name, value in self._expanded.items() if isinstance(value, float)}
 
     @property
     def known_rod(self) -> Rod:
@@ -146,12 +150,12 @@ class Rig:
     @property
     def distributions(self) -> dict[str, Distribution]:
         """Distributions of the parameters of which one is given."""
-        said = expanded(self.unknown).items()
+        said = self._expanded.items()
         return {name: value for name, value in said if not isinstance(value, float | str)}
 
     def is_named(self, name: str) -> bool:
         """Return True if something is said of a parameter."""
-        return name in expanded(self.unknown)
+        return name in self._expanded
 
     def with_unknown(self, **said: Unknown) -> Rig:
         """Return the rig of which something else is said about some parameters."""
@@ -234,7 +238,7 @@ def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
     return rod.reshaped(curvature, rig.get("taper", rod.taper), rig.get("stem"), length)
 
 
-def expanded(unknown: Mapping[str, Unknown] | Literal["nothing"]) -> dict[str, Unknown]:
+def expanded(unknown: Mapping[str, Unknown]) -> dict[str, Unknown]:
     """Return what is said of each parameter, groups first, so that one of a group may be an exception.
 
     Examples
@@ -242,9 +246,8 @@ def expanded(unknown: Mapping[str, Unknown] | Literal["nothing"]) -> dict[str, U
     >>> expanded({"moment_bias": 0.1, "bias": "default"})
     {'moment_bias': 0.1, 'force_x_bias': 'default', 'force_y_bias': 'default'}
     """
-    said = dict(NOTHING) if isinstance(unknown, str) else dict(unknown)
-    of_groups = {member: value for name, value in said.items() if name in GROUPS for member in GROUPS[name]}
-    return {**of_groups, **{name: value for name, value in said.items() if name not in GROUPS}}
+    of_groups = {member: value for name, value in unknown.items() if name in GROUPS for member in GROUPS[name]}
+    return {**of_groups, **{name: value for name, value in unknown.items() if name not in GROUPS}}
 
 
 def _checked(unknown: Any) -> dict[str, Unknown]:

@@ -7,7 +7,6 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +16,12 @@ from tactile_bayes.checks import as_number, check_array, check_kind, check_numbe
 from tactile_bayes.distributions import distribution_of_table, table_of_distribution
 from tactile_bayes.errors import ParameterError, TactileBayesError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.data_sheet import SEVERAL
 from tactile_bayes.mechanics.rods.along import Along
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.plain_csv import columns_in
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
-from tactile_bayes.record.schema import CHANNELS, COLUMNS, LOAD_CELL_UNITS, MEASURED
+from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, members, parameter_named
@@ -31,14 +31,6 @@ from tactile_bayes.tasks import write_atomically
 from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
 __all__ = ["file_of_rig", "read_rig", "rig_of_tables", "tables_of_rig", "text_of_rig", "write_rig"]
-
-_SEVERAL = {
-    **{what: tuple(f"{what}_{name}" for name in CHANNELS) for what in ("bias", "bias_uncertainty")},
-    "gain": tuple(f"gain_{to}_{of}" for to, of in product(CHANNELS, CHANNELS)),
-    "lever": ("lever_x", "lever_y"),
-    "moment_curve": ("moment_curve_quadratic", "moment_curve_cubic"),
-}
-"""Entries of the load cell that may be lists."""
 
 _ROD_UNITS = {
     "length": "m",
@@ -53,16 +45,7 @@ _ROD_UNITS = {
 }
 _TABLES = {
     "rod": (*_ROD_UNITS, "rigidity_profile", "shape"),
-    "load_cell": (
-        *LOAD_CELL_UNITS,
-        "bias",
-        "bias_uncertainty",
-        "gain",
-        "lever",
-        "moment_curve",
-        "correlation",
-        "frame",
-    ),
+    "load_cell": (*LOAD_CELL_UNITS, *SEVERAL, "frame"),
     "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), "split_sweeps", "missing"),
     "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
     "calibration": ("parameters", "correlation", "error", "source", "stated"),
@@ -137,9 +120,8 @@ def tables_of_rig(rig: Rig) -> dict[str, Any]:
     """
     tables: dict[str, Any] = {}
     if rig.rod is not None:
-        names = ("length", "flexural_rigidity") if not rig.rod.is_dimensionless else ()
-        given = {name: getattr(rig.rod, name) for name in (*names, *_TABLES["rod"]) if hasattr(rig.rod, name)}
-        usual = {"length": None, "flexural_rigidity": None} if names else {"length": 1.0, "flexural_rigidity": 1.0}
+        usual = {"length": 1.0, "flexural_rigidity": 1.0} if rig.rod.is_dimensionless else {}
+        given = {name: getattr(rig.rod, name) for name in _TABLES["rod"] if hasattr(rig.rod, name)}
         texts = {name: value.text if isinstance(value, Along) else value for name, value in given.items()}
         tables["rod"] = {n: v for n, v in texts.items() if v is not None and v != usual.get(n, 0.0)}
     if rig.load_cell is not None:
@@ -237,8 +219,8 @@ def _load_cell(said: Mapping[str, Any], is_si: bool) -> LoadCell:
     for name, value in said.items():
         if name == "frame":
             entries[name] = value
-        elif name in _SEVERAL:
-            names = _SEVERAL[name]
+        elif name in SEVERAL:
+            names = SEVERAL[name]
             rows = np.ravel(np.array(value, dtype=object)).tolist() if isinstance(value, list) else []
             if len(rows) != len(names):
                 raise ParameterError(

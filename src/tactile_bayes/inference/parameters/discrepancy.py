@@ -42,12 +42,9 @@ def discrepancy_priors(rig: Rig) -> dict[str, Distribution]:
         )
     if not any(not isinstance(value, float) for value in said.values()):
         return {}
-    priors: dict[str, Distribution] = {}
-    for name in PARAMETERS:
-        value, row = said.get(name, "default"), RIG_PARAMETERS[name]
-        default = stats.lognorm(s=row.width, scale=row.neutral or 1.0)
-        priors[name] = default if isinstance(value, float | str) else value
-    return priors
+    rows = [RIG_PARAMETERS[name] for name in PARAMETERS]
+    usual = {row.name: stats.lognorm(s=row.width, scale=row.neutral or 1.0) for row in rows}
+    return {name: rig.distributions.get(name, default) for name, default in usual.items()}
 
 
 def load_in_contact(loads: Floats, course: Course) -> Floats:

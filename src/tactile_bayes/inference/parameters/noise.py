@@ -76,15 +76,13 @@ def noise_of(measured: xr.Dataset, rig: Rig, discrepancy: Mapping[str, Distribut
         If the load cell states only noise in proportion to the load.
     """
     cell = rig.load_cell or LoadCell.from_record(measured)
-    said = rig.said
     present = present_channels(measured)
     if cell is not None and any(cell.standard_deviations[name] > 0.0 for name in present):
-        factor = said.get("noise_scale", "default")
-        if isinstance(factor, float):
+        if (factor := rig.known.get("noise_scale")) is not None:
             scaled = ("force_noise", "moment_noise", "relative_noise")
             louder = replace(cell, **{name: factor * getattr(cell, name) for name in scaled})
             return Noise(louder, tuple(discrepancy), (), dict(discrepancy))
-        prior = stats.lognorm(s=PARAMETERS["noise_scale"].width) if isinstance(factor, str) else factor
+        prior = rig.distributions.get("noise_scale", stats.lognorm(s=PARAMETERS["noise_scale"].width))
         return Noise(cell, ("noise_scale", *discrepancy), (CHANNELS,), {"noise_scale": prior, **discrepancy})
     if cell is not None and cell.relative_noise:
         raise ParameterError("the load cell states only relative_noise: state its force_noise and moment_noise as well")
@@ -93,13 +91,10 @@ def noise_of(measured: xr.Dataset, rig: Rig, discrepancy: Mapping[str, Distribut
     sources = {"moment_noise": (("holding_moment",), moment), "force_noise": (CHANNELS[1:], force)}
     sources = {name: source for name, source in sources.items() if set(source[0]) & set(present)}
     for name in sources:
-        if isinstance(said.get(name), float):
+        if name in rig.known:
             raise ParameterError(f"{name} is known: state it in LoadCell({name}=...), and noise_scale = 1")
-    priors: dict[str, Distribution] = {}
-    for name, (_, unit) in sources.items():
-        value = said.get(name, "default")
-        default = stats.loguniform(PARAMETERS[name].width * unit, _LOUDEST * unit)
-        priors[name] = default if isinstance(value, float | str) else value
+    usual = {n: stats.loguniform(PARAMETERS[n].width * unit, _LOUDEST * unit) for n, (_, unit) in sources.items()}
+    priors = {name: rig.distributions.get(name, default) for name, default in usual.items()}
     return Noise(
         replace(cell or LoadCell(), force_noise=1.0, moment_noise=1.0),
         (*sources, *discrepancy),

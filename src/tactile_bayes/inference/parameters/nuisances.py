@@ -19,7 +19,7 @@ from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.load_cell.curve import curved
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
-from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, parameter_named
+from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, parameter_named
 
 if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig, Unknown
@@ -334,7 +334,7 @@ def _default_prior(name: str, nuisances: Nuisances, stated: Mapping[str, float],
         return stats.lognorm(s=parameter.width, scale=centre)
     if parameter.default == "half_normal":
         return stats.halfnorm(scale=scale)
-    if name in ("taper", "stem"):
+    if name in MAY_VANISH:
         ends = ((end - centre) / scale for end in (parameter.low, parameter.high))
         return stats.truncnorm(*ends, loc=centre, scale=scale)
     return stats.norm(centre, scale)

@@ -30,7 +30,6 @@ from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, seed
 from tactile_bayes.inference.ensembles.identity import changes, seed_as_text
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
 from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, WIDER, Particles, effective_number
 from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, tree_of
@@ -365,10 +364,7 @@ class Stream:
         return self._state
 
     def _experiment(self, record: xr.Dataset) -> Experiment:
-        experiment = Experiment(record, self._rig, self._family)
-        if self._rig.calibration is not None:
-            refuse_other_rig(self._rig.calibration, experiment.about)
-        return experiment
+        return Experiment(record, self._rig, self._family)
 
     def _identity(self, experiment: Experiment) -> dict[str, str]:
         """Return all that the numbers of a stream depend on, as text."""
