@@ -119,10 +119,10 @@ if TYPE_CHECKING:
     from tactile_bayes.planning.sensitivity import sensitivity as sensitivity
     from tactile_bayes.reconstruction import reconstruct as reconstruct
     from tactile_bayes.record import in_frame as in_frame
-    from tactile_bayes.record import make_record as make_record
-    from tactile_bayes.record import read_record as read_record
     from tactile_bayes.record import write_record as write_record
     from tactile_bayes.report import write_report as write_report
+    from tactile_bayes.rig import make_record as make_record
+    from tactile_bayes.rig import read_record as read_record
     from tactile_bayes.rig.rig import Rig as Rig
     from tactile_bayes.runs.many import infer_contours as infer_contours
     from tactile_bayes.sweep import Motion as Motion

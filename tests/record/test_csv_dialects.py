@@ -9,7 +9,8 @@ from helpers import commands
 from helpers.record_tables import WIRE
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError, RecordWarning
-from tactile_bayes.record import read_record, record_hash
+from tactile_bayes.record import record_hash
+from tactile_bayes.rig import Rig, read_record
 
 NAMES = "Winkel;Mz;Fx;Fy"
 ROWS = ("60,0;0,1;1;2", "61,0;0,25;-1,5;40")
@@ -20,7 +21,7 @@ STATED = {"drive_angle": "Winkel[deg]", "holding_moment": "Mz[N mm]", "force_x":
 def read(tmp_path, *lines, columns=COLUMNS, encoding="utf-8", end="\n", rod=WIRE):
     path = tmp_path / "rig.csv"
     path.write_bytes((end.join(lines) + end).encode(encoding))
-    return read_record(path, columns=columns, split_sweeps=True, rod=rod)
+    return read_record(path, Rig(rod=rod, file={**columns, "split_sweeps": True}))
 
 
 @pytest.fixture
@@ -95,7 +96,7 @@ def test_a_row_of_units_also_tells_those_of_names_that_a_record_has(tmp_path):
 
 def read_record_of(tmp_path, *lines):
     (tmp_path / "rig.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return read_record(tmp_path / "rig.csv", rod=WIRE)
+    return read_record(tmp_path / "rig.csv", Rig(rod=WIRE))
 
 
 @pytest.mark.parametrize(
@@ -172,4 +173,4 @@ def test_windows_1252_far_below_keeps_the_lines_of_errors(tmp_path):
 def test_what_is_neither_utf8_nor_windows_1252_is_refused(tmp_path, content, message):
     (tmp_path / "rig.csv").write_bytes(content)
     with refused(RecordError, re.sub(r"^", f"{tmp_path / 'rig.csv'}: ", message)):
-        read_record(tmp_path / "rig.csv", columns=COLUMNS, split_sweeps=True)
+        read_record(tmp_path / "rig.csv", Rig(file={**COLUMNS, "split_sweeps": True}))

@@ -17,8 +17,9 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, STANDARD, members
-from tactile_bayes.rig.rig import expanded, rig_of
+from tactile_bayes.rig.rig import rig_of
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.unknown import expanded
 from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)

@@ -43,9 +43,9 @@ def frame_of(record: xr.Dataset) -> Frame:
 
     Examples
     --------
-    >>> from tactile_bayes.record import make_record
+    >>> from tactile_bayes.rig import Rig, make_record
     >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": 0.5, "force_x": 0.1}
-    >>> frame_of(make_record(columns, missing="force_y", load_cell_frame="turning"))
+    >>> frame_of(make_record(columns, Rig(load_cell=LoadCell(frame="turning"), file={"missing": "force_y"})))
     'turning'
     """
     return stated_frame(record.attrs, Source())

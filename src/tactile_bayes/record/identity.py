@@ -39,9 +39,9 @@ def record_hash(record: xr.Dataset) -> str:
 
     Examples
     --------
-    >>> from tactile_bayes.record import make_record
+    >>> from tactile_bayes.rig import Rig, make_record
     >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "force_y": [0.1], "force_x": [0.0]}
-    >>> plain = make_record(columns, missing=("holding_moment",))
+    >>> plain = make_record(columns, Rig(file={"missing": "holding_moment"}))
     >>> record_hash(plain) == record_hash(plain.assign(truth_force_y=plain["force_y"] + 0.01))
     True
     """

@@ -237,9 +237,9 @@ def present_channels(record: xr.Dataset) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> from tactile_bayes.record import make_record
+    >>> from tactile_bayes.rig import Rig, make_record
     >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "force_y": [0.1], "force_x": [0.0]}
-    >>> present_channels(make_record(columns, missing=("holding_moment",)))
+    >>> present_channels(make_record(columns, Rig(file={"missing": "holding_moment"})))
     ('force_x', 'force_y')
     """
     return tuple(name for name in CHANNELS if not np.isnan(record[name].values).all())

@@ -39,9 +39,9 @@ def rod_of(record: xr.Dataset) -> Rod:
 
     Examples
     --------
-    >>> from tactile_bayes.record import make_record
+    >>> from tactile_bayes.rig import Rig, make_record
     >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [1e-4]}
-    >>> rod_of(make_record(columns, rod=Rod(0.1, 1.2e-5), missing=("force_x", "force_y")))
+    >>> rod_of(make_record(columns, Rig(Rod(0.1, 1.2e-5), file={"missing": ["force_x", "force_y"]})))
     Rod(length=0.1, flexural_rigidity=1.2e-05, diameter=0.0)
     """
     return stated_rod(record.attrs, Source())
@@ -102,9 +102,9 @@ def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
 
     Examples
     --------
-    >>> from tactile_bayes.record import make_record
+    >>> from tactile_bayes.rig import Rig, make_record
     >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [6e-5]}
-    >>> record = make_record(columns, rod=Rod(0.1, 1.2e-5), missing=("force_x", "force_y"))
+    >>> record = make_record(columns, Rig(Rod(0.1, 1.2e-5), file={"missing": ["force_x", "force_y"]}))
     >>> float(to_dimensionless(record)["holding_moment"][0])
     0.5
     """
@@ -135,9 +135,9 @@ def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
 
     Examples
     --------
-    >>> from tactile_bayes.record import make_record
+    >>> from tactile_bayes.rig import Rig, make_record
     >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [0.5]}
-    >>> record = to_si(make_record(columns, missing=("force_x", "force_y")), Rod(0.1, 1.2e-5))
+    >>> record = to_si(make_record(columns, Rig(file={"missing": ["force_x", "force_y"]})), Rod(0.1, 1.2e-5))
     >>> float(record["holding_moment"][0]), record["holding_moment"].attrs["units"]
     (6e-05, 'N m')
     """

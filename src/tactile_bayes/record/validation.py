@@ -54,9 +54,9 @@ def validate(record: xr.Dataset) -> xr.Dataset:
 
     Examples
     --------
-    >>> from tactile_bayes.record import make_record
+    >>> from tactile_bayes.rig import Rig, make_record
     >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.3, 1.2], "holding_moment": [0.0, 0.4]}
-    >>> make_record(columns, missing=("force_x", "force_y"))
+    >>> make_record(columns, Rig(file={"missing": ["force_x", "force_y"]}))
     Traceback (most recent call last):
     ...
     tactile_bayes.errors.RecordError: sweep 0 is labelled 'forward', but its drive angle decreases, from 1.3 rad (sample 0) to 1.2 rad (sample 1): label it 'backward', or put its samples in the order in which they were measured

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,14 +23,16 @@ from tactile_bayes.record.plain_csv import columns_in
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED
 from tactile_bayes.record.spelling import nearest
-from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, members, parameter_named
-from tactile_bayes.rig.rig import NOTHING, Rig
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.unknown import NOTHING
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
-__all__ = ["file_of_rig", "read_rig", "rig_of_tables", "tables_of_rig", "text_of_rig", "write_rig"]
+if TYPE_CHECKING:
+    from tactile_bayes.rig.rig import Rig
+
+__all__ = ["file_of_rig", "read_rig", "stated_in", "tables_of_rig", "text_of_rig", "write_rig"]
 
 _ROD_UNITS = {
     "length": "m",
@@ -62,15 +64,15 @@ _HEAD = """\
 """
 
 
-def read_rig(path: str | os.PathLike[str]) -> Rig:
-    """Read a rig from a TOML file; see `Rig.read`."""
+def read_rig(path: str | os.PathLike[str], made: Callable[[Mapping[str, Any], Path], Rig]) -> Rig:
+    """Return the rig made of the tables of a TOML file, and of its folder; see `Rig.read`."""
     path = check_path("the rig", path, "give a file rig.toml")
     try:
         with open(path, encoding="utf-8-sig") as file:
             text = file.read(_LARGEST + 1)
         if len(text) > _LARGEST:
             raise ParameterError(f"it has more than {_LARGEST} characters, and is no file of a rig")
-        return rig_of_tables(read_toml(text), path.parent)
+        return made(read_toml(text), path.parent)
     except (TactileBayesError, UnicodeDecodeError) as error:
         raise ParameterError(f"{path}: {error}") from error
 
@@ -111,7 +113,7 @@ def text_of_rig(rig: Rig) -> str:
 
 
 def tables_of_rig(rig: Rig) -> dict[str, Any]:
-    """Return the tables that state a rig; `rig_of_tables` is the inverse.
+    """Return the tables that state a rig; `Rig.of_tables` is the inverse.
 
     Raises
     ------
@@ -126,13 +128,8 @@ def tables_of_rig(rig: Rig) -> dict[str, Any]:
         tables["rod"] = {n: v for n, v in texts.items() if v is not None and v != usual.get(n, 0.0)}
     if rig.load_cell is not None:
         tables["load_cell"] = rig.load_cell.entries()
-    file: dict[str, Any] = dict(rig.file.columns)
-    if rig.file.split_sweeps:
-        file["split_sweeps"] = True
-    if rig.file.missing:
-        file["missing"] = list(rig.file.missing)
-    if file:
-        tables["file"] = file
+    if rig.format.table:
+        tables["file"] = rig.format.table
     if rig.entries == dict(NOTHING):
         tables["unknown"] = "nothing"
     elif rig.entries:
@@ -150,21 +147,8 @@ def tables_of_rig(rig: Rig) -> dict[str, Any]:
     return tables
 
 
-def rig_of_tables(tables: Mapping[str, Any], folder: Path = Path()) -> Rig:
-    """Return the rig that tables state.
-
-    Parameters
-    ----------
-    tables : mapping
-        Tables rod, load_cell, file, unknown and calibration, as in rig.toml.
-    folder : Path
-        Folder to which the path of the rod's shape is relative.
-
-    Raises
-    ------
-    ParameterError
-        If a key is unknown or misspelt, or a value impossible.
-    """
+def stated_in(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the arguments of `Rig` that tables state; see `Rig.of_tables`."""
     _refuse_unknown(tables, _TABLES, "the rig")
     for name, table in tables.items():
         if name != "unknown" or table != "nothing":
@@ -174,13 +158,13 @@ def rig_of_tables(tables: Mapping[str, Any], folder: Path = Path()) -> Rig:
     rod = None if said is None else _rod(said, folder)
     is_si = rod is not None and not rod.is_dimensionless
     calibration = tables.get("calibration")
-    return Rig(
-        rod=rod,
-        load_cell=None if "load_cell" not in tables else _load_cell(tables["load_cell"], is_si),
-        unknown=_unknown(tables.get("unknown", {}), is_si),
-        calibration=None if calibration is None else _calibration(calibration),
-        file=_file(tables.get("file", {})),
-    )
+    return {
+        "rod": rod,
+        "load_cell": None if "load_cell" not in tables else _load_cell(tables["load_cell"], is_si),
+        "unknown": _unknown(tables.get("unknown", {}), is_si),
+        "calibration": None if calibration is None else _calibration(calibration),
+        "file": tables.get("file", {}),
+    }
 
 
 def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
@@ -233,14 +217,6 @@ def _load_cell(said: Mapping[str, Any], is_si: bool) -> LoadCell:
         else:
             entries[name] = _quantity(value, LOAD_CELL_UNITS[name], f"load_cell.{name}", is_si)
     return LoadCell.from_entries(entries)
-
-
-def _file(said: Mapping[str, Any]) -> FileFormat:
-    columns = {name: value for name, value in said.items() if name not in ("split_sweeps", "missing")}
-    missing = said.get("missing", [])
-    check_kind("file.missing", missing, list, "give a list of channels, like ['force_x']")
-    texts = {name: repr(value) if as_number(value) is not None else value for name, value in columns.items()}
-    return FileFormat(texts, said.get("split_sweeps", False), tuple(missing))
 
 
 def _unknown(said: Mapping[str, Any] | str, is_si: bool) -> Any:
