@@ -50,11 +50,11 @@ FIRST_ROW = 9
 MISTAKES = {
     "a missing column": (
         lambda rows: (NAMES[:-1], without_last(rows)),
-        ["column 'force_y'", "columns={'force_y': 'NAME[UNIT]'}", 'force_y = "NAME[UNIT]"', 'missing = ["force_y"]'],
+        ["column 'force_y'", "Rig(file={'force_y': 'NAME[UNIT]'})", 'force_y = "NAME[UNIT]"', 'missing = ["force_y"]'],
     ),
     "a misspelt column": (
         lambda rows: ([name.replace("drive_angle", "drive_angel") for name in NAMES], rows),
-        ["column 'drive_angel'", "columns={'drive_angle': 'drive_angel'}", 'drive_angle = "drive_angel"'],
+        ["column 'drive_angel'", "Rig(file={'drive_angle': 'drive_angel'})", 'drive_angle = "drive_angel"'],
     ),
     "text in a row": (
         lambda rows: (NAMES, edited(rows, 3, "force_x", "overload")),

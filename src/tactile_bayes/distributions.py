@@ -239,7 +239,7 @@ def text_or_unwritten(text: Callable[[], str]) -> str:
         return UNWRITTEN
 
 
-def stated_text(attrs: Mapping[str, Any], entry: str) -> str:
+def stated_text(attrs: Mapping[Any, Any], entry: str) -> str:
     """Return the text of `text_or_unwritten` in the attributes of a posterior, or refuse one that is not written."""
     text = attrs.get(entry, UNWRITTEN)
     if not isinstance(text, str) or text == UNWRITTEN:

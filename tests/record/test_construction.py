@@ -106,7 +106,7 @@ def test_declaring_missing_what_is_no_channel_is_refused():
 
 
 def test_declaring_missing_what_has_values_is_refused():
-    with refused(RecordError, "column 'force_x' has values, but is declared missing: leave it out of missing="):
+    with refused(RecordError, "column 'force_x' has values, but is declared missing"):
         make_record(columns(), Rig(file={"missing": ("force_x",)}))
 
 

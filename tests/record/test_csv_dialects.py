@@ -106,7 +106,7 @@ def read_record_of(tmp_path, *lines):
             [NAMES + ";T", "°;mN m;mX;mN;°C", ROWS[0] + ";20"],
             "line 2: this looks like a row of units, but 'mX' below 'Fx' is none that is known here: empty that cell",
         ),
-        ([NAMES, "°;mN m;s;mN", *ROWS], "line 2, column 'force_x' ('Fx' in the file) is in [s], but takes N, kN, mN"),
+        ([NAMES, "°;mN m;s;mN", *ROWS], "line 2, column 'force_x' ('Fx' as given) is in [s], but takes N, kN, mN"),
         ([NAMES, ROWS[0], "°;mN m;mN;mN"], "line 3, column 'Winkel': '°' is not a number"),
         ([NAMES, "°;mN m;mN;mN", *ROWS, "62;x;1;1"], "line 5, column 'Mz': 'x' is not a number"),
         ([NAMES, "°;mN m;mN", *ROWS], "line 2: there are 3 cells in 4 columns"),
@@ -126,7 +126,7 @@ def test_what_is_wrong_in_or_below_a_row_of_units_has_its_line(tmp_path, lines, 
 
 
 def test_a_unit_that_is_given_beside_another_in_the_row_is_refused(tmp_path):
-    with refused(RecordError, "line 2, column 'force_x' ('Fx' in the file) is in [mN], but [N] is given for it"):
+    with refused(RecordError, "line 2, column 'force_x' ('Fx' as given) is in [mN], but [N] is given for it"):
         read(tmp_path, NAMES, "°;mN m;mN;mN", *ROWS, columns={**COLUMNS, "force_x": "Fx[N]"})
 
 

@@ -210,8 +210,6 @@ def test_a_frame_that_is_none_is_refused(frame):
             use(record)
     with refused(RecordError, message):
         make_record(columns(), attrs={"load_cell_frame": frame})
-    with refused(RecordError, message):
-        make_record(columns(), Rig(load_cell=LoadCell(frame=frame)))
 
 
 def test_a_frame_to_convert_to_that_is_none_is_refused(scanned):

@@ -319,12 +319,12 @@ def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
         (
             {},
             {"force_y": "Fy[mm]"},
-            "line 1, column 'force_y' ('Fy' in the file) is in [mm], but takes N, kN, mN, µN or gf",
+            "line 1, column 'force_y' ('Fy' as given) is in [mm], but takes N, kN, mN, µN or gf",
         ),
         (
             {},
             {"holding_moment": "Moment[N]"},
-            "line 1, column 'holding_moment' ('Moment' in the file) is in [N], but takes N m, N mm, mN m, µN m or mN",
+            "line 1, column 'holding_moment' ('Moment' as given) is in [N], but takes N m, N mm, mN m, µN m or mN",
         ),
         ({}, {"base_y": "12[deg]"}, "column 'base_y' is in [deg], but takes m, cm, mm or µm"),
         ({}, {"force_x": "Fx (mN)[N]"}, "column 'Fx (mN)' is in [mN] by its name, but [N] is given for it"),
@@ -332,12 +332,12 @@ def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
         (
             {"Fy": ["1", "2", "", "4", "5", "6"]},
             {},
-            "line 4, column 'force_y' ('Fy' in the file): the value is missing (nan)",
+            "line 4, column 'force_y' ('Fy' as given): the value is missing (nan)",
         ),
         (
             {"Fz [ch1]": np.zeros(6)},
             {"force_y": "Fz [ch1]"},
-            "line 1, column 'force_y' ('Fz [ch1]' in the file) is in [ch1], but takes N, kN, mN, µN or gf",
+            "line 1, column 'force_y' ('Fz [ch1]' as given) is in [ch1], but takes N, kN, mN, µN or gf",
         ),
     ],
 )
@@ -380,13 +380,13 @@ SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
         (
             {"Fy": ["1", "2", "", "4", "5", "6"]},
             {},
-            "line 4, column 'force_y' ('Fy' in the file): the value is missing",
+            "line 4, column 'force_y' ('Fy' as given): the value is missing",
         ),
         (
             {"Moment": None},
             {"holding_moment": None},
             "there is no column 'holding_moment' (columns: Zeit [s], Hub, Richtung, Winkel [°], Fx (mN), Fy, a / b, "
-            "a [b]): add it, or say what stands for it, columns={'holding_moment': 'NAME[UNIT]'}, or "
+            "a [b]): add it, or say what stands for it, Rig(file={'holding_moment': 'NAME[UNIT]'}), or "
             'holding_moment = "NAME[UNIT]" under [file] of rig.toml, or declare the channel missing',
         ),
     ],
@@ -405,7 +405,7 @@ def test_a_column_that_is_nearly_one_of_a_record_is_called_as_in_the_file(tmp_pa
     with refused(
         RecordError,
         "there is no column 'drive_angle', but a column 'drive/angle': did you mean 'drive_angle'? Rename it, or say "
-        "what stands for it, columns={'drive_angle': 'drive/angle'}, or "
+        "what stands for it, Rig(file={'drive_angle': 'drive/angle'}), or "
         'drive_angle = "drive/angle" under [file] of rig.toml',
     ):
         read_record(path)
@@ -414,10 +414,10 @@ def test_a_column_that_is_nearly_one_of_a_record_is_called_as_in_the_file(tmp_pa
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("A", "columns={'drive_angle': 'A[deg]'} of read_record, or drive_angle = \"A[deg]\" under [file] of rig.toml"),
-        ("-A", "columns={'drive_angle': '-A[deg]'} of read_record"),
-        ("-A+90", "columns={'drive_angle': '90-A[deg]'} of read_record"),
-        ("A-0.5", "columns={'drive_angle': '-0.5+A[deg]'} of read_record"),
+        ("A", "Rig(file={'drive_angle': 'A[deg]'}), or drive_angle = \"A[deg]\" under [file] of rig.toml"),
+        ("-A", "Rig(file={'drive_angle': '-A[deg]'})"),
+        ("-A+90", "Rig(file={'drive_angle': '90-A[deg]'})"),
+        ("A-0.5", "Rig(file={'drive_angle': '-0.5+A[deg]'})"),
     ],
 )
 def test_what_looks_like_degrees_may_be_said_to_be_in_the_words_of_the_file(tmp_path, given, message):
@@ -447,7 +447,7 @@ def test_the_case_of_a_name_is_no_obstacle_to_finding_what_was_meant(wanted, the
 def test_a_unit_in_the_header_and_another_one_given_contradict_each_other(tmp_path):
     path = rig_file(tmp_path / "rig.csv", header=["# column Fy: number [mN]"])
     read_record(path, Rig(rod=WIRE, file={**NAMED, "force_y": "Fy"}))
-    with refused(RecordError, "line 1, column 'force_y' ('Fy' in the file) is in [mN], but [N] is given for it"):
+    with refused(RecordError, "line 1, column 'force_y' ('Fy' as given) is in [mN], but [N] is given for it"):
         read_record(path, Rig(rod=WIRE, file={**NAMED, "force_y": "Fy[N]"}))
 
 

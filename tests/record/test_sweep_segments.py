@@ -113,7 +113,7 @@ def test_a_file_without_sweeps_is_split(tmp_path, suffix):
         read_record(path)
     with refused(
         RecordError,
-        "or have the record split where the drive turns back: split_sweeps=True, or split_sweeps = true under [file]",
+        "where the drive turns back: Rig(file={'split_sweeps': True}), or split_sweeps = true under [file]",
     ):
         read_record(path)
     write_record(record, path)

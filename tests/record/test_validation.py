@@ -36,9 +36,12 @@ def test_coordinates_stay_coordinates():
         (
             columns(force_x=None, force_z=np.zeros(6)),
             "there is no column 'force_x', but a column 'force_z': did you mean 'force_x'? Rename it, or declare the "
-            "channel missing, with an empty column or missing=('force_x',)",
+            "channel missing, with an empty column, Rig(file={'missing': ['force_x']})",
         ),
-        (columns(force_x=None), "add it, or declare the channel missing, with an empty column or missing=('force_x',)"),
+        (
+            columns(force_x=None),
+            "declare the channel missing, with an empty column, Rig(file={'missing': ['force_x']})",
+        ),
         (
             columns(base_x=None, Base_X=np.zeros(6)),
             "there is no column 'base_x', but a column 'Base_X': did you mean 'base_x'? Rename it, or add a column "
@@ -80,7 +83,7 @@ def test_coordinates_stay_coordinates():
         ),
         (columns(truth_force_x=["a"] * 6), "sample 0, column 'truth_force_x': 'a' is not a number"),
         (columns(time=np.zeros(6, "datetime64[s]")), "column 'time': np.datetime64('1970-01-01T00:00:00') is a time"),
-        (columns(**{"a/b": np.zeros(6)}), "the name 'a/b' cannot be stored in every file"),
+        (columns(**{"a/b": np.zeros(6), "a|b": np.zeros(6)}), "the name 'a/b' cannot be stored in every file"),
         (columns(**{".": np.zeros(6)}), "the name '.' cannot be stored in every file"),
     ],
 )

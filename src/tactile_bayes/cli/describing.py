@@ -153,6 +153,4 @@ def _list(entries: Any) -> str:
 
 
 def _numbers(rig: Rig, said: dict[str, str]) -> dict[str, Any]:
-    from tactile_bayes.rig.rig_file import tables_of_rig
-
-    return {"rig": tables_of_rig(rig), "known": rig.known, "said": said}
+    return {"rig": rig.tables, "known": rig.known, "said": said}

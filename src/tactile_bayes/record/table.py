@@ -112,7 +112,7 @@ class Source:
     def column(self, name: str) -> str:
         """Return the name of a column in messages."""
         alias = self.aliases.get(name, name)
-        return f"column {name!r}" if alias == name else f"column {name!r} ({alias!r} in the file)"
+        return f"column {name!r}" if alias == name else f"column {name!r} ({alias!r} as given)"
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,14 @@ from typing import Any, Literal, cast
 
 import xarray as xr
 
-from tactile_bayes.checks import check_kind, check_optional
+from tactile_bayes.checks import check_kind, check_optional, check_path
 from tactile_bayes.distributions import Distribution, in_words, stated_text, text_or_unwritten
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import STANDARD, members
-from tactile_bayes.rig.rig_file import read_rig, stated_in, text_of_rig, write_rig
+from tactile_bayes.rig.rig_file import named_in_errors, read_tables, stated_in, tables_of, text_of, write_file
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import DEFAULT, Unknown, checked_unknown, expanded
 from tactile_bayes.tasks.documents import read_toml
@@ -177,7 +177,9 @@ class Rig:
         FileNotFoundError
             If there is no such file.
         """
-        return read_rig(path, cls.of_tables)
+        path = check_path("the rig", path, "give a file rig.toml")
+        with named_in_errors(path):
+            return cls.of_tables(read_tables(path), path.parent)
 
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any], folder: Path = Path()) -> Rig:
@@ -203,9 +205,20 @@ class Rig:
         return cls.of_tables(read_toml(stated_text(posterior.attrs, "rig")))
 
     @property
+    def tables(self) -> dict[str, Any]:
+        """Tables that state the rig, as in rig.toml; the inverse of `of_tables`.
+
+        Raises
+        ------
+        ParameterError
+            If a distribution is none of SciPy's, which text cannot state.
+        """
+        return tables_of(self.rod, self.load_cell, self.entries, self.calibration, self.format)
+
+    @property
     def text(self) -> str:
         """The rig as text, as in its file; "not written" if one of its distributions is none of SciPy's."""
-        return text_or_unwritten(lambda: text_of_rig(self))
+        return text_or_unwritten(lambda: text_of(self.tables))
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the rig to a TOML file, whole or not at all.
@@ -215,7 +228,7 @@ class Rig:
         ParameterError
             If a distribution is none of SciPy's, which text cannot state.
         """
-        write_rig(self, path)
+        write_file(self.tables, check_path("path", path, "give a file rig.toml"))
 
 
 def rig_of(rig: Rig | None) -> Rig:
