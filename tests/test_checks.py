@@ -113,7 +113,7 @@ NAMED_BY = {
     "unknown": "unknown|rig|prior",
     "r": "r|circle",
     "false_alarm": "false_alarm|record",
-    "file": "columns|missing|split_sweeps",
+    "file": "file|columns|missing|split_sweeps",
 }
 """What a refusal calls arguments that it does not call by their names."""
 UNKNOWN = [{"friction": None}, {"friction": "wide"}, {"left": 0.1}, {"friction": stats.norm}, {1: 0.1}, "everything"]

@@ -192,11 +192,6 @@ def _units_below(file: BinaryIO, header: Header, meant: Mapping[str, Kind], sour
 
     In such a row a measured column has a unit, and no cell is a number; a unit of another column, like °C, may be
     unknown. Pure numbers alone are no row of units: 1 and - may be units, but readings too.
-
-    Raises
-    ------
-    RecordError
-        If a measured column has an unknown unit, or one that differs from the header.
     """
     cells = cells_in(next(iter(lines_below(file)), ""), header.delimiter)
     texts = [_without_brackets(cell) for cell in cells]

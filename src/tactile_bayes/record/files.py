@@ -24,15 +24,7 @@ _WRITERS = {".csv": write_csv, ".nc": write_netcdf_record}
 
 
 def read_table(path: str | os.PathLike[str], columns: Mapping[str, str]) -> Table:
-    """Read a table as it is in a file; from a bag, the messages that columns of a record come from.
-
-    Raises
-    ------
-    RecordError
-        If the path is a folder, a pipe or a device, has another suffix, or its content is no table.
-    FileNotFoundError
-        If there is no such file.
-    """
+    """Read a table as it is in a file; from a bag, the messages that columns of a record come from."""
     path = check_path("path", path)
     if not path.exists():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))

@@ -22,21 +22,6 @@ def record_hash(record: xr.Dataset) -> str:
     It does not depend on further columns, like those of the truth, on the order of columns, or on other attributes. A
     record has the same hash before and after it is written to a file.
 
-    Parameters
-    ----------
-    record : xr.Dataset
-        A record.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits.
-
-    Raises
-    ------
-    RecordError
-        If `record` is not a record.
-
     Examples
     --------
     >>> from tactile_bayes.rig import Rig, make_record
