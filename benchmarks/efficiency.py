@@ -39,8 +39,8 @@ def compared(task: tuple[float, int]) -> Floats:
     """Return standard deviation over bound of every parameter."""
     factor, seed = task
     plan = PLAN.with_noise(factor)
-    measured = plan.cell.measure(plan.scan.record, seed=seed)
-    posterior = tb.infer_contour(measured, rig=plan.rig, seed=seed, settings=SETTINGS)
+    measured = plan.cell.measure(plan.scan.record, rng=seed)
+    posterior = tb.infer_contour(measured, rig=plan.rig, rng=seed, settings=SETTINGS)
     draws = posterior["posterior"].to_dataset()
     of_record = plan.with_noise(float(draws.noise_scale.mean()))
     bounds = information(of_record).bound_with_priors.sel(parameter=list(PLAN.model.names)).values

@@ -141,7 +141,7 @@ def calibrated(name: str, run: Run, replicates: int) -> xr.Dataset:
     folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in name.strip())
     settings = None if run.options.get("family") == "shape-free" else SETTINGS
     options = {"rig": run.rig, "truth": run.truth, "settings": settings, **run.options}
-    return tb.calibrate(seed=2029, replicates=replicates, out=folder, **options)
+    return tb.calibrate(rng=2029, replicates=replicates, out=folder, **options)
 
 
 def row(name: str, found: xr.Dataset) -> str:

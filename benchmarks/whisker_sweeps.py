@@ -181,7 +181,7 @@ def calibrated(folder: Path, rod: tb.Rod) -> tuple[tb.Rig, xr.DataTree]:
             options = {"checkpoint": folder / "rig", "settings": LONG}
         probe = tb.contours.Circle(r=1e-5, q=-1e-5)
         rig = tb.Rig(load_cell=SENSOR, unknown=unknown)
-        rig = tb.calibrate_rig(points(rod), contour=probe, rig=rig, seed=1, **options)
+        rig = tb.calibrate_rig(points(rod), contour=probe, rig=rig, rng=1, **options)
         assert rig.calibration is not None
         assert rig.calibration.posterior is not None
         rig.write(file)
@@ -203,7 +203,7 @@ def measured(
             record_of(name, rod),
             family="shape-free" if of_any_shape else "circle",
             rig=rig.with_unknown(**unknown),
-            seed=1,
+            rng=1,
             settings=ENOUGH_OF_ANY_SHAPE if of_any_shape else ENOUGH,
         )
         tb.write_result(found, path)

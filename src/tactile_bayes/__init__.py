@@ -4,7 +4,7 @@ Contour → scan → record → load cell → contact points and contour posteri
 
 >>> import tactile_bayes as tb
 >>> scan = tb.scan(tb.contours.paper_profile("II", q=0.5))
->>> measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(scan.record, seed=1)
+>>> measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(scan.record, rng=1)
 >>> contacts = tb.reconstruct(measured)
 
 Names are loaded when they are first used, so that importing the package is quick.

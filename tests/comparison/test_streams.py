@@ -13,7 +13,7 @@ from tactile_bayes.inference.parameters.matched_priors import matched_priors
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 RIG = tb.Rig(load_cell=CELL, unknown="nothing")
-OPTIONS = {"rig": RIG, "seed": 1, "particles": 200}
+OPTIONS = {"rig": RIG, "rng": 1, "particles": 200}
 FAMILIES = ["circle", "ellipse", "parabola"]
 X = [-0.1, 0.0, 0.1]
 
@@ -21,7 +21,7 @@ X = [-0.1, 0.0, 0.1]
 @pytest.fixture(scope="module")
 def measured():
     scan = tb.scan(tb.contours.Circle(0.4, q=0.5), drive_step=0.08)
-    return CELL.measure(scan.record, seed=3)
+    return CELL.measure(scan.record, rng=3)
 
 
 def fed(streams, measured, blocks):
@@ -51,7 +51,7 @@ def test_each_family_is_a_stream_of_its_own(compared, measured):
 @pytest.mark.slow
 def test_the_last_evidences_agree_with_those_of_the_whole_record(measured):
     quick = tb.SamplerSettings(ensembles=2, min_ess=400, max_r_hat=1.05)
-    options = {"rig": RIG, "seed": 1, "leave_one_out": False, "settings": quick}
+    options = {"rig": RIG, "rng": 1, "leave_one_out": False, "settings": quick}
     whole = tb.compare_families(measured, families=FAMILIES[:2], **options)
     streams = tb.StreamComparison(families=FAMILIES[:2], **(OPTIONS | {"particles": 1000}))
     now = fed(streams, measured, 3)[-1]
@@ -101,7 +101,7 @@ def test_resumed_streams_go_on_with_the_same_numbers(measured, tmp_path):
     xr.testing.assert_identical(resumed.latest(), streams.latest())
     one, other = (each.update(block) for each in (streams, resumed))
     xr.testing.assert_identical(one.drop_vars("seconds"), other.drop_vars("seconds"))
-    for changed in ({"families": FAMILIES[1:]}, {"families": FAMILIES[:2], "seed": 2}):
+    for changed in ({"families": FAMILIES[1:]}, {"families": FAMILIES[:2], "rng": 2}):
         with pytest.raises(InferenceError):
             tb.StreamComparison.resume(tmp_path / "streams.nc", **(options | changed))
     with pytest.raises(InferenceError, match=r"streams\.nc"):

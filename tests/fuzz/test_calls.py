@@ -55,7 +55,9 @@ SENSIBLE = {
     "probability": lambda value: value is None or a_number(1e-323, 1.0 - 1e-16)(value),
     "false_alarm": a_number(1e-323, 1.0 - 1e-16),
     "friction": lambda value: value is None or a_number(0.0, 100.0)(value) or hasattr(value, "logpdf"),
-    "seed": lambda value: (type(value) is int and value >= 0) or isinstance(value, np.random.Generator),
+    "rng": lambda value: (
+        (type(value) is int and value >= 0) or isinstance(value, (np.random.Generator, np.random.SeedSequence))
+    ),
     "workers": lambda value: value is None or (type(value) is int and value > 0),
     "rod": a_kind(tb.Rod),
     "load_cell": a_kind(tb.LoadCell),

@@ -74,7 +74,7 @@ def ideal() -> xr.Dataset:
 
 @functools.cache
 def measured() -> xr.Dataset:
-    return CELL.measure(ideal(), seed=1)
+    return CELL.measure(ideal(), rng=1)
 
 
 @functools.cache
@@ -85,12 +85,12 @@ def scanned():
 @functools.cache
 def posterior() -> xr.DataTree:
     """A posterior of a few draws: enough for every figure and summary, not for numbers."""
-    return infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF)
+    return infer_as_stated(measured(), load_cell=CELL, rng=1, settings=BRIEF)
 
 
 @functools.cache
 def contacts_drawn() -> xr.DataTree:
-    return tb.infer_contacts(measured(), rig=Rig(load_cell=CELL), seed=1, draws=40, method="importance")
+    return tb.infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40, method="importance")
 
 
 @functools.cache
@@ -126,18 +126,18 @@ def plan_si() -> tb.Plan:
 
 @functools.cache
 def sensitivity() -> xr.DataTree:
-    return tb.sensitivity(PARABOLA, seed=1, rig=STATED, drive_step=0.1, samples=8)
+    return tb.sensitivity(PARABOLA, rng=1, rig=STATED, drive_step=0.1, samples=8)
 
 
 @functools.cache
 def designed() -> xr.Dataset:
-    return tb.design(posterior(), bases=[(0.0, 0.0), (0.0, -0.1)], drive_steps=[0.1], draws=2, seed=1)
+    return tb.design(posterior(), bases=[(0.0, 0.0), (0.0, -0.1)], drive_steps=[0.1], draws=2, rng=1)
 
 
 @functools.cache
 def mapped() -> xr.Dataset:
     options = {"noise_factors": [0.1, 1.0], "replicates": 1, "drive_step": 0.1}
-    return tb.error_map(["II"], rig=STATED, seed=1, workers=1, **options)
+    return tb.error_map(["II"], rig=STATED, rng=1, workers=1, **options)
 
 
 @functools.cache
@@ -154,19 +154,19 @@ def inspected() -> Inspection:
 @functools.cache
 def stream() -> tb.Stream:
     """A stream before its first update."""
-    return tb.Stream(rig=STATED, seed=1, particles=100)
+    return tb.Stream(rig=STATED, rng=1, particles=100)
 
 
 @functools.cache
 def updated() -> tb.Stream:
-    made = tb.Stream(rig=STATED, seed=1, particles=100)
+    made = tb.Stream(rig=STATED, rng=1, particles=100)
     made.update(measured().isel(sample=slice(0, 10)))
     return made
 
 
 @functools.cache
 def streams() -> tb.StreamComparison:
-    made = tb.StreamComparison(families=["parabola", "circle"], rig=STATED, seed=1, particles=100)
+    made = tb.StreamComparison(families=["parabola", "circle"], rig=STATED, rng=1, particles=100)
     made.update(measured().isel(sample=slice(0, 10)))
     return made
 
@@ -291,9 +291,9 @@ def _load_cell_calls() -> dict[str, Call]:
         "LoadCell.from_zero_load": Call(tb.LoadCell.from_zero_load, zero),
         "LoadCell.log_density_left_out": Call(CELL.log_density_left_out, density),
         "LoadCell.log_likelihood": Call(CELL.log_likelihood, {**density, "pointwise": False}),
-        "LoadCell.measure": Call(CELL.measure, {"record": ideal(), "seed": 1}),
+        "LoadCell.measure": Call(CELL.measure, {"record": ideal(), "rng": 1}),
         "LoadCell.refuse_other_frame": Call(tb.LoadCell(frame="fixed").refuse_other_frame, {"record": measured()}),
-        "LoadCell.simulate": Call(CELL.simulate, {"loads": loads, "seed": 1, "noise_scale": 1.0, "discrepancy": None}),
+        "LoadCell.simulate": Call(CELL.simulate, {"loads": loads, "rng": 1, "noise_scale": 1.0, "discrepancy": None}),
         "LoadCell.squared_mahalanobis_distance": Call(CELL.squared_mahalanobis_distance, {"readings": loads}),
         "OrnsteinUhlenbeck": Call(tb.OrnsteinUhlenbeck, {"moment": 0.1, "force": 0.1, "time": 100.0}),
         "RandomWalk": Call(tb.RandomWalk, {"moment": 0.1, "force": 0.1}),
@@ -429,7 +429,7 @@ def _data_set(folder: Path) -> Path:
 
 
 def _inference_calls(folder: Path) -> dict[str, Call]:
-    rig = {"rig": STATED, "seed": 1}
+    rig = {"rig": STATED, "rng": 1}
     sampled = {"settings": BRIEF, "progress": None}
     stored = {**rig, **sampled, "checkpoint": None, "keep": None}
     streamed = {**rig, "particles": 100, "x": [0.0, 0.1], "stop": None}
@@ -480,7 +480,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
                 "measured": measured(),
                 "rig": STATED,
                 "prior": "flat",
-                "seed": 1,
+                "rng": 1,
                 "draws": 40,
                 "method": "importance",
             },
@@ -492,7 +492,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
                 "axial": np.linspace(0.2, 0.6, 20),
                 "lateral": np.linspace(0.01, 0.05, 20),
                 "reading": np.linspace(0.1, 0.9, 20) ** 2,
-                "seed": 1,
+                "rng": 1,
                 "priors": None,
                 "full_scale": None,
             },
@@ -504,7 +504,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
                 "measured": measured(),
                 "families": ["parabola", "circle"],
                 "rig": STATED,
-                "seed": 1,
+                "rng": 1,
                 "false_alarm": 1e-3,
             },
         ),
@@ -559,7 +559,7 @@ def _summary_calls() -> dict[str, Call]:
                 "probability": None,
                 "family": None,
                 "rig": None,
-                "seed": 1,
+                "rng": 1,
                 "out": None,
                 "workers": 1,
                 "scheduler": None,
@@ -574,7 +574,7 @@ def _planning_calls() -> dict[str, Call]:
     sweep = {"drive": None, "base": (0.0, 0.0), "direction": "both", "drive_step": 0.1, "drive_angles": None}
     tasks = {"out": None, "workers": 1, "scheduler": None, "progress": None}
     made = updated().posterior()
-    sampled = {"seed": 1, "family": "parabola", "settings": None, "probability": 0.9}
+    sampled = {"rng": 1, "family": "parabola", "settings": None, "probability": 0.9}
     driven = {"drive": None, "base": (0.0, 0.0), "direction": "both", "drive_angles": None}
     calibration = {"rig": STATED, **sampled, **driven, "truth": None, "misspecification": None}
     return {
@@ -588,7 +588,7 @@ def _planning_calls() -> dict[str, Call]:
                 **rig,
                 **sweep,
                 "contour": PARABOLA,
-                "seed": 1,
+                "rng": 1,
                 "band_widths": [0.01],
                 "probability": 0.9,
                 "samples": 8,
@@ -601,7 +601,7 @@ def _planning_calls() -> dict[str, Call]:
             {
                 **tasks,
                 "known": posterior(),
-                "seed": 1,
+                "rng": 1,
                 "bases": [(0.0, 0.0)],
                 "drives": None,
                 "drive_steps": [0.2],
@@ -618,7 +618,7 @@ def _planning_calls() -> dict[str, Call]:
                 **rig,
                 **tasks,
                 "contours": ["II"],
-                "seed": 1,
+                "rng": 1,
                 "distances": [0.5],
                 "noise_factors": [1.0],
                 "base_x": 0.0,
@@ -651,7 +651,7 @@ def _planning_calls() -> dict[str, Call]:
                 "posterior": made,
                 "drive_angles": measured().drive_angle[10:20].values,
                 "x": [0.0, 0.1],
-                "seed": 1,
+                "rng": 1,
                 "probability": 0.9,
                 "draws": 2,
             },
@@ -679,7 +679,7 @@ def _figure_calls(folder: Path) -> dict[str, Call]:
         "drive_step": 0.1,
         "rods": 3,
         "load_cell": None,
-        "seed": 1,
+        "rng": 1,
         "width": 7.0,
     }
     files = {

@@ -25,7 +25,7 @@ SMALL = {
     "noise_factors": [1.0],
     "distances": [0.4, 0.5],
     "replicates": 2,
-    "seed": 3,
+    "rng": 3,
     "drive_step": 0.1,
     "rig": Rig(unknown="nothing"),
     "workers": 1,
@@ -43,7 +43,7 @@ def test_cells_are_the_same_for_any_number_of_workers():
 
 
 def test_another_seed_draws_other_noise_and_expects_the_same():
-    other, nearer = error_map(**{**SMALL, "seed": 4, "distances": [0.4]}), small().sel(distance=[0.4])
+    other, nearer = error_map(**{**SMALL, "rng": 4, "distances": [0.4]}), small().sel(distance=[0.4])
     drawn = "rms_along"
     assert np.all(other[drawn].values != nearer[drawn].values)
     np.testing.assert_array_equal(other.expected_gap_width.values, nearer.expected_gap_width.values)
@@ -85,7 +85,7 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "other",
     [
-        {"seed": 4},
+        {"rng": 4},
         {"replicates": 3},
         {"noise_factors": [2.0]},
         {"contours": {"II": Parabola(0.6, 0.5)}},
@@ -145,7 +145,7 @@ def test_first_order_is_what_small_noise_gives():
         noise_factors=[0.01],
         replicates=replicates,
         drive_step=step,
-        seed=1,
+        rng=1,
         workers=1,
         rig=Rig(unknown="nothing"),
     ).squeeze()
@@ -167,7 +167,7 @@ def test_first_order_is_what_small_noise_gives():
 
 def test_first_order_is_not_what_large_noise_gives():
     found = error_map(
-        ["II"], noise_factors=[0.01, 100.0], replicates=3, drive_step=0.1, seed=1, workers=1, rig=Rig(unknown="nothing")
+        ["II"], noise_factors=[0.01, 100.0], replicates=3, drive_step=0.1, rng=1, workers=1, rig=Rig(unknown="nothing")
     ).squeeze()
     quiet, loud = found.isel(noise_factor=0), found.isel(noise_factor=1)
     growth = (loud.median_error / quiet.median_error).sel(reconstruction="constrained")
@@ -249,7 +249,7 @@ def test_posteriors_are_inferred_in_some_cells():
         {"replicates": 2.0},
         {"posterior_cells": -1},
         {"posterior_replicates": 0},
-        {"seed": -1},
+        {"rng": -1},
         {"probability": 1.0},
         {"rig": "bias"},
         {"family": "parabola"},

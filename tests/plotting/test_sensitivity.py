@@ -17,14 +17,14 @@ ROD = Rod(0.1, 1e-5)
 
 @pytest.fixture(scope="module")
 def found():
-    return sensitivity(seed=1, drive_step=0.1, samples=8)
+    return sensitivity(rng=1, drive_step=0.1, samples=8)
 
 
 @pytest.fixture(scope="module")
 def in_si():
     cell = LoadCell(force_noise=2e-5, moment_noise=1e-6)
     return sensitivity(
-        seed=1,
+        rng=1,
         rig=Rig(rod=ROD, load_cell=cell, unknown="nothing"),
         drive_step=0.2,
         parts=["information", "required_noise"],
@@ -34,7 +34,7 @@ def in_si():
 @pytest.fixture(scope="module")
 def study():
     """Profile II at three distances, of which the last is out of reach."""
-    options = {"noise_factors": [1.0, 0.1], "replicates": 1, "seed": 1, "workers": 1, "drive_step": 0.2}
+    options = {"noise_factors": [1.0, 0.1], "replicates": 1, "rng": 1, "workers": 1, "drive_step": 0.2}
     return error_map(["II"], distances=[0.4, 0.8, 1.5], rig=Rig(unknown="nothing"), **options)
 
 
