@@ -114,7 +114,7 @@ def coverage(sweeps: int, seed: int) -> dict[str, NDArray[np.generic]]:
         held["posterior ok"] = np.ones(measured.sizes["sample"], dtype=bool)
         for i in loaded.tolist():
             place = measured.truth_contact_x.values[i], measured.truth_contact_y.values[i]
-            held["posterior"][i] = tb.contact_region(posterior, i).least_probability(*place)
+            held["posterior"][i] = tb.uncertainty.contact_region(posterior, i).least_probability(*place)
         held["phase"] = measured.truth_contact_phase.values
         of_sweep = np.repeat(list(PLACES), [SAMPLES[place] for place in PLACES])
         held["place"] = np.tile(of_sweep, measured.sizes["sample"] // of_sweep.size)

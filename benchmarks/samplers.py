@@ -31,7 +31,7 @@ from tactile_bayes.inference.ensembles import sample
 from tactile_bayes.inference.ensembles.diagnosis import walker_major
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
-from tactile_bayes.random_numbers import spawn
+from tactile_bayes.numerics.random_numbers import spawn
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.tasks import one_thread
 

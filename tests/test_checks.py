@@ -15,6 +15,7 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers.public_calls import AcceptedError, end_before_sampling
+from helpers.public_names import public
 from helpers.refusals import refused
 from helpers.wrong_values import WRONG
 from tactile_bayes.checks import (
@@ -290,7 +291,7 @@ def cases(tmp_path):
             {"record": no_records()},
         ),
         "zero_load": (
-            tb.zero_load,
+            tb.load_cell.zero_load,
             {"record": (measured(), never), "false_alarm": (1e-3, number(TINY, 0.499))},
             {"record": no_records(), "false_alarm": [0.5]},
         ),
@@ -359,7 +360,7 @@ def cases(tmp_path):
             {**of_posterior, "x": [[[0.0, 1.0]], [0.0, math.nan]], "probability": NO_SHARES},
         ),
         "predictive_interval": (
-            tb.predictive_interval,
+            tb.uncertainty.predictive_interval,
             {"posterior": (posterior(), never), "probability": (0.9, SHARE)},
             {"probability": NO_SHARES},
         ),
@@ -570,18 +571,17 @@ def test_what_is_long_is_shown_by_its_kind():
 
 def switches():
     """(name of a public function, its boolean parameter), by annotation or default."""
-    for module in (tb, tb.contours, tb.datasets, tb.elastica, tb.paper_figures, tb.plotting):
-        for name in module.__all__:
-            value = getattr(module, name)
-            methods = [f"{name}.{own}" for own in dir(value) if inspect.isclass(value) and not own.startswith("_")]
-            for label in [name, *methods]:
-                function = functools.reduce(getattr, label.split("."), module)
-                if not callable(function) or inspect.ismodule(function):
-                    continue
-                with contextlib.suppress(ValueError, TypeError):  # of some builtins
-                    for parameter in inspect.signature(function).parameters.values():
-                        if parameter.annotation in (bool, "bool") or isinstance(parameter.default, bool):
-                            yield module, label, parameter.name
+    for module, name, _ in public():
+        value = getattr(module, name)
+        methods = [f"{name}.{own}" for own in dir(value) if inspect.isclass(value) and not own.startswith("_")]
+        for label in [name, *methods]:
+            function = functools.reduce(getattr, label.split("."), module)
+            if not callable(function) or inspect.ismodule(function):
+                continue
+            with contextlib.suppress(ValueError, TypeError):  # of some builtins
+                for parameter in inspect.signature(function).parameters.values():
+                    if parameter.annotation in (bool, "bool") or isinstance(parameter.default, bool):
+                        yield module, label, parameter.name
 
 
 def required():

@@ -26,7 +26,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings, moves
 from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.random_numbers import child
+from tactile_bayes.numerics.random_numbers import child
 from tactile_bayes.rig import NOTHING, Rig
 
 module = importlib.import_module("tactile_bayes.calibration.calibrate")

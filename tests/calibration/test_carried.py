@@ -16,7 +16,7 @@ OPTIONS = {"family": FAMILY, "rig": tb.Rig(unknown="nothing"), "rng": 1, "drive"
 
 @pytest.mark.slow
 def test_a_replicate_is_scored_by_the_travel_of_its_end():
-    replicate = tb.calibration_replicate(0, **OPTIONS)
+    replicate = tb.calibration.calibration_replicate(0, **OPTIONS)
     assert replicate.outcome.message.startswith("converged")
     assert {"snap_off_forward", "snap_off_backward"} <= replicate.outcome.ranks.keys()
     measured = replicate.measured

@@ -208,7 +208,7 @@ gain_force_x_force_y = 0.02
         relative_noise=0.01,
         degrees_of_freedom=5.0,
         bias_uncertainty=(0.1, 0.2, 0.3),
-        drift=tb.OrnsteinUhlenbeck(moment=0.01, force=0.02, time=30.0),
+        drift=tb.load_cell.OrnsteinUhlenbeck(moment=0.01, force=0.02, time=30.0),
         force_range=9.0,
         moment_range=2.0,
         force_resolution=0.01,

@@ -100,7 +100,7 @@ def contacts() -> xr.Dataset:
 
 @functools.cache
 def implied() -> xr.DataTree:
-    return tb.implied_contacts(posterior(), draws=10)
+    return tb.uncertainty.implied_contacts(posterior(), draws=10)
 
 
 @functools.cache
@@ -114,14 +114,14 @@ def gap() -> xr.Dataset:
 
 
 @functools.cache
-def plan() -> tb.Plan:
-    return tb.Plan(PARABOLA, rig=STATED, drive_step=0.1)
+def plan() -> tb.planning.Plan:
+    return tb.planning.Plan(PARABOLA, rig=STATED, drive_step=0.1)
 
 
 @functools.cache
-def plan_si() -> tb.Plan:
+def plan_si() -> tb.planning.Plan:
     contour = tb.contours.Parabola(5.0, 0.05)
-    return tb.Plan(contour, rig=Rig(rod=ROD, load_cell=SI_CELL, unknown="nothing"), drive_step=0.1)
+    return tb.planning.Plan(contour, rig=Rig(rod=ROD, load_cell=SI_CELL, unknown="nothing"), drive_step=0.1)
 
 
 @functools.cache
@@ -137,13 +137,13 @@ def designed() -> xr.Dataset:
 @functools.cache
 def mapped() -> xr.Dataset:
     options = {"noise_factors": [0.1, 1.0], "replicates": 1, "drive_step": 0.1}
-    return tb.error_map(["II"], rig=STATED, rng=1, workers=1, **options)
+    return tb.planning.error_map(["II"], rig=STATED, rng=1, workers=1, **options)
 
 
 @functools.cache
 def rods_required() -> xr.Dataset:
     options = {"lengths": [0.1], "diameters": [1e-3], "youngs_modulus": 1e9, "elastic_strain": 0.05}
-    return tb.required_rod(plan_si(), **options)
+    return tb.planning.required_rod(plan_si(), **options)
 
 
 @functools.cache
@@ -165,8 +165,8 @@ def updated() -> tb.Stream:
 
 
 @functools.cache
-def streams() -> tb.StreamComparison:
-    made = tb.StreamComparison(families=["parabola", "circle"], rig=STATED, rng=1, particles=100)
+def streams() -> tb.comparison.StreamComparison:
+    made = tb.comparison.StreamComparison(families=["parabola", "circle"], rig=STATED, rng=1, particles=100)
     made.update(measured().isel(sample=slice(0, 10)))
     return made
 
@@ -295,11 +295,11 @@ def _load_cell_calls() -> dict[str, Call]:
         "LoadCell.refuse_other_frame": Call(tb.LoadCell(frame="fixed").refuse_other_frame, {"record": measured()}),
         "LoadCell.simulate": Call(CELL.simulate, {"loads": loads, "rng": 1, "noise_scale": 1.0, "discrepancy": None}),
         "LoadCell.squared_mahalanobis_distance": Call(CELL.squared_mahalanobis_distance, {"readings": loads}),
-        "OrnsteinUhlenbeck": Call(tb.OrnsteinUhlenbeck, {"moment": 0.1, "force": 0.1, "time": 100.0}),
-        "RandomWalk": Call(tb.RandomWalk, {"moment": 0.1, "force": 0.1}),
+        "OrnsteinUhlenbeck": Call(tb.load_cell.OrnsteinUhlenbeck, {"moment": 0.1, "force": 0.1, "time": 100.0}),
+        "RandomWalk": Call(tb.load_cell.RandomWalk, {"moment": 0.1, "force": 0.1}),
         "discrepancy.Course.along": Call(Course.along, {"coordinate": np.arange(4.0), "sweeps": [np.arange(4)]}),
         "discrepancy.Discrepancy": Call(Discrepancy, dict(vars(discrepancy))),
-        "zero_load": Call(tb.zero_load, zero),
+        "zero_load": Call(tb.load_cell.zero_load, zero),
     }
 
 
@@ -397,12 +397,14 @@ def _record_calls(folder: Path) -> dict[str, Call]:
         ),
         "read_record": Call(tb.read_record, {**reading, "path": file, "columns": None}),
         "write_record": Call(tb.write_record, {"record": ideal(), "path": folder / "out.csv"}),
-        "in_frame": Call(tb.in_frame, {"record": measured(), "frame": "turning"}),
+        "in_frame": Call(tb.record.in_frame, {"record": measured(), "frame": "turning"}),
         "inspect_record": Call(
             tb.inspect_record,
             {"record": measured(), "rig": STATED, "false_alarm": 1e-3, "progress": None},
         ),
-        "check_units_and_signs": Call(tb.check_units_and_signs, {"measured": measured(), "load_cell": CELL}),
+        "check_units_and_signs": Call(
+            tb.diagnostics.check_units_and_signs, {"measured": measured(), "load_cell": CELL}
+        ),
         "read_result": Call(tb.read_result, {"path": posterior_file}),
         "write_result": Call(tb.write_result, {"result": posterior(), "path": folder / "out.nc"}),
         "to_arviz": Call(tb.to_arviz, {"posterior": posterior()}),
@@ -516,16 +518,17 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
         "Stream.save": Call(updated().save, {"path": folder / "other.nc"}),
         "Stream.resume": Call(tb.Stream.resume, {**kept, "path": file, "record": None}),
         "StreamComparison": Call(
-            tb.StreamComparison,
+            tb.comparison.StreamComparison,
             {"families": ["parabola", "circle"], "x": [0.0, 0.1], "stop": None, **kept},
         ),
         "StreamComparison.update": Call(
-            tb.StreamComparison(families=["parabola", "circle"], **kept).update, {"samples": rest}
+            tb.comparison.StreamComparison(families=["parabola", "circle"], **kept).update, {"samples": rest}
         ),
         "StreamComparison.posterior": Call(streams().posterior, {"family": "circle"}),
         "StreamComparison.save": Call(streams().save, {"path": folder / "other.nc"}),
         "StreamComparison.resume": Call(
-            tb.StreamComparison.resume, {**kept, "families": ["parabola", "circle"], "path": both, "record": None}
+            tb.comparison.StreamComparison.resume,
+            {**kept, "families": ["parabola", "circle"], "path": both, "record": None},
         ),
         "reconstruct": Call(
             tb.reconstruct,
@@ -542,13 +545,17 @@ def _summary_calls() -> dict[str, Call]:
     x = [0.0, 0.1]
     return {
         "contour_band": Call(tb.contour_band, {"posterior": posterior(), "x": x, "probability": 0.9}),
-        "normal_band": Call(tb.normal_band, {"posterior": posterior(), "x": x, "probability": 0.9, "reference": None}),
-        "predictive_interval": Call(tb.predictive_interval, {"posterior": posterior(), "probability": 0.9}),
+        "normal_band": Call(
+            tb.uncertainty.normal_band, {"posterior": posterior(), "x": x, "probability": 0.9, "reference": None}
+        ),
+        "predictive_interval": Call(tb.uncertainty.predictive_interval, {"posterior": posterior(), "probability": 0.9}),
         "gap": Call(tb.gap, {"posterior": posterior(), "probability": 0.9, "without_events": posterior()}),
-        "implied_contacts": Call(tb.implied_contacts, {"posterior": posterior(), "draws": 5}),
-        "contact_moments": Call(tb.contact_moments, {"posterior": contacts_drawn()}),
-        "contact_region": Call(tb.contact_region, {"posterior": contacts_drawn(), "sample": 20, "probability": 0.9}),
-        "check_record": Call(tb.check_record, {"posterior": posterior(), "false_alarm": 1e-3}),
+        "implied_contacts": Call(tb.uncertainty.implied_contacts, {"posterior": posterior(), "draws": 5}),
+        "contact_moments": Call(tb.uncertainty.contact_moments, {"posterior": contacts_drawn()}),
+        "contact_region": Call(
+            tb.uncertainty.contact_region, {"posterior": contacts_drawn(), "sample": 20, "probability": 0.9}
+        ),
+        "check_record": Call(tb.diagnostics.check_record, {"posterior": posterior(), "false_alarm": 1e-3}),
         "verdicts": Call(tb.verdicts, {"posterior": posterior(), "contacts": contacts(), "trust": None}),
         "trust": Call(
             tb.trust,
@@ -578,7 +585,7 @@ def _planning_calls() -> dict[str, Call]:
     driven = {"drive": None, "base": (0.0, 0.0), "direction": "both", "drive_angles": None}
     calibration = {"rig": STATED, **sampled, **driven, "truth": None, "misspecification": None}
     return {
-        "Plan": Call(tb.Plan, {**rig, **sweep, "contour": PARABOLA}),
+        "Plan": Call(tb.planning.Plan, {**rig, **sweep, "contour": PARABOLA}),
         "Plan.reconstruct": Call(plan().reconstruct, {"record": measured(), "method": "raw"}),
         "Plan.with_noise": Call(plan().with_noise, {"factor": 2.0}),
         "Plan.certain": Call(plan().certain, {"record": ideal()}),
@@ -613,7 +620,7 @@ def _planning_calls() -> dict[str, Call]:
             },
         ),
         "error_map": Call(
-            tb.error_map,
+            tb.planning.error_map,
             {
                 **rig,
                 **tasks,
@@ -630,10 +637,10 @@ def _planning_calls() -> dict[str, Call]:
             },
         ),
         "required_noise": Call(
-            tb.required_noise, {"plan": plan(), "band_width": 0.01, "where": "everywhere", "probability": 0.9}
+            tb.planning.required_noise, {"plan": plan(), "band_width": 0.01, "where": "everywhere", "probability": 0.9}
         ),
         "required_rod": Call(
-            tb.required_rod,
+            tb.planning.required_rod,
             {
                 "plan": plan_si(),
                 "lengths": [0.1],
@@ -646,7 +653,7 @@ def _planning_calls() -> dict[str, Call]:
             },
         ),
         "rest_of_sweep": Call(
-            tb.rest_of_sweep,
+            tb.planning.rest_of_sweep,
             {
                 "posterior": made,
                 "drive_angles": measured().drive_angle[10:20].values,
@@ -657,9 +664,9 @@ def _planning_calls() -> dict[str, Call]:
             },
         ),
         "calibrate": Call(tb.calibrate, {**calibration, **tasks, "replicates": 1}),
-        "calibration_replicate": Call(tb.calibration_replicate, {**calibration, "number": 0, "out": None}),
+        "calibration_replicate": Call(tb.calibration.calibration_replicate, {**calibration, "number": 0, "out": None}),
         "Misspecification": Call(
-            tb.Misspecification, {"base_shift": (0.0, 0.0), "flat_spot": (0.1, 2.0), "family": "circle"}
+            tb.calibration.Misspecification, {"base_shift": (0.0, 0.0), "flat_spot": (0.1, 2.0), "family": "circle"}
         ),
     }
 
@@ -735,7 +742,7 @@ def _figure_calls(folder: Path) -> dict[str, Call]:
             p.predictive,
             {
                 "record": measured(),
-                "predicted": tb.predictive_interval(posterior()),
+                "predicted": tb.uncertainty.predictive_interval(posterior()),
                 "axes": None,
                 "residuals": None,
                 "label": "predicted",

@@ -36,7 +36,7 @@ def drawn(posterior: xr.DataTree, band: xr.Dataset) -> Axes:
 
 
 def planned() -> tuple[xr.DataTree, xr.Dataset, xr.Dataset]:
-    plan = tb.Plan(tb.contours.paper_profile("II", q=0.5))
-    needed: xr.Dataset = tb.required_noise(plan, 0.005)
+    plan = tb.planning.Plan(tb.contours.paper_profile("II", q=0.5))
+    needed: xr.Dataset = tb.planning.required_noise(plan, 0.005)
     found: xr.Dataset = tb.design("parabola", draws=4, rng=1)
     return tb.sensitivity(rng=1), needed, found

@@ -12,13 +12,13 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, StudyError
-from tactile_bayes.planning import error_map as module
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.error_cell import CellOutcome
-from tactile_bayes.planning.error_map import CELLS, error_map
+from tactile_bayes.planning.error_map import CELLS, _identity, error_map
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.tasks import open_results_store
 
 SMALL = {
     "contours": ["II"],
@@ -65,14 +65,13 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         error_map(**SMALL, out=tmp_path, progress=kill)
     rows = json.loads((tmp_path / "cells.json").read_text(encoding="utf-8"))["cells"]
     assert [row["number"] for row in rows] == [0]
-    made, seen = [], []
+    made, seen, original = [], [], error_map.__globals__["error_cell"]
 
     def counted(task):
         made.append(task[1])
         return original(task)
 
-    original = module.error_cell
-    monkeypatch.setattr(module, "error_cell", counted)
+    monkeypatch.setitem(error_map.__globals__, "error_cell", counted)
     found = error_map(**SMALL, out=tmp_path, progress=seen.append)
     assert made == [1]
     assert [(p.done, p.wanted, p.made) for p in seen] == [(2, 2, 1)]
@@ -98,7 +97,7 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
 )
 def test_the_folder_of_another_study_is_refused(tmp_path_factory, other):
     folder = tmp_path_factory.mktemp("study")
-    with module.open_results_store(module._identity(task_of(SMALL)), folder, CELLS) as store:
+    with open_results_store(_identity(task_of(SMALL)), folder, CELLS) as store:
         store.outcomes[0] = CellOutcome({"gap_width": 0.1}, "ok")
     before = (folder / "cells.json").read_bytes()
     with refused(StudyError, "another experiment", "there", "here"):
@@ -115,16 +114,16 @@ def task_of(options):
         return {number: CellOutcome({}, "not made") for number in range(count)}
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "keep_outcomes", keep)
+        patch.setitem(error_map.__globals__, "keep_outcomes", keep)
         error_map(**options)
     return kept["task"]
 
 
 def test_an_outcome_comes_back_from_its_row(tmp_path):
     outcome = CellOutcome({"gap_width": 0.1 + 0.2, "posterior_gap_width": np.nan}, "ok")
-    with module.open_results_store({}, tmp_path, CELLS) as store:
+    with open_results_store({}, tmp_path, CELLS) as store:
         store.outcomes[0] = outcome
-    with module.open_results_store({}, tmp_path, CELLS) as store:
+    with open_results_store({}, tmp_path, CELLS) as store:
         back = store.outcomes[0]
     assert back.message == "ok"
     assert back.numbers["gap_width"] == 0.1 + 0.2

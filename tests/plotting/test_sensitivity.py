@@ -8,8 +8,9 @@ from matplotlib.colors import same_color
 
 from helpers.pictures import labels, texts
 from helpers.refusals import refused
-from tactile_bayes import LoadCell, Rig, Rod, error_map, plotting, sensitivity
+from tactile_bayes import LoadCell, Rig, Rod, plotting, sensitivity
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.planning import error_map
 from tactile_bayes.plotting.sweep_plans import METHOD_COLOURS, READING_COLOURS
 
 ROD = Rod(0.1, 1e-5)

@@ -20,7 +20,7 @@ from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.nuisances import belongs, stated_values
-from tactile_bayes.random_numbers import Seed, child, seed_words
+from tactile_bayes.numerics.random_numbers import Seed, child, seed_words
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import STANDARD
 from tactile_bayes.rig.rig import DEFAULT

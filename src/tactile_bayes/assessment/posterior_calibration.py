@@ -38,8 +38,8 @@ from tactile_bayes.inference.ensembles.proposal import flattened
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.contour_start import Walk
 from tactile_bayes.inference.stored_experiment import points_of, predicted_points
+from tactile_bayes.numerics.random_numbers import Seed, child, seed_words, words
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.random_numbers import Seed, child, seed_words, words
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.tasks import TaskProgress, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band

@@ -29,7 +29,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import contour_draws, read_result
 from tactile_bayes.inference.stored_experiment import experiment_of
-from tactile_bayes.random_numbers import Rng, seed_sequence, seed_words
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.tasks import TaskProgress
 from tactile_bayes.tasks.workers import check_pool

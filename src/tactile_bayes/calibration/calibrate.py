@@ -30,7 +30,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.random_numbers import Rng, seed_sequence
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Carried, Drive, drives_of, record_template
 from tactile_bayes.tasks import ResultsStore, TaskProgress, keep_outcomes, open_results_store

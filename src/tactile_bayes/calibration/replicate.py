@@ -19,7 +19,7 @@ from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.random_numbers import child
+from tactile_bayes.numerics.random_numbers import child
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of

@@ -18,7 +18,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.random_numbers import Seed, seed_words
+from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record import bases_of, rod_of
 from tactile_bayes.rig.rig import Rig
 

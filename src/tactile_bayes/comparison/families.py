@@ -31,8 +31,8 @@ from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.parameters.matched_priors import matched_priors
 from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
+from tactile_bayes.numerics.random_numbers import Rng, spawn
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.random_numbers import Rng, spawn
 from tactile_bayes.record import record_hash, rod_of
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.uncertainty.rod_reach import reach_attributes

@@ -13,7 +13,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, sample
 from tactile_bayes.inference.starts.contour_start import walk_of
-from tactile_bayes.random_numbers import Seed, spawn
+from tactile_bayes.numerics.random_numbers import Seed, spawn
 
 __all__ = ["PredictedSamples", "predicted_samples"]
 

@@ -21,7 +21,7 @@ from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.streams.stream import LEVELS, Stream
 from tactile_bayes.inference.streams.stream_state import read_tree
-from tactile_bayes.random_numbers import Rng, seed_sequence
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.record import rod_of, validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig.rig import Rig, rig_of

@@ -26,7 +26,7 @@ from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.parameters.rig_prior import rig_prior
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
-from tactile_bayes.random_numbers import Rng, Seed, seed_sequence, spawn
+from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
 from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rig.rig import Rig, expanded, rig_of
 

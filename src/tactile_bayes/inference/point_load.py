@@ -42,7 +42,7 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, scatter_walkers
 from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.mechanics.clamped_rod import base_curvature
-from tactile_bayes.random_numbers import Rng, Seed, seed_sequence, spawn
+from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
 
 __all__ = ["default_priors", "infer_point_load"]
 

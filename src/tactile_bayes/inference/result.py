@@ -18,7 +18,7 @@ from tactile_bayes.checks import check_kind, check_path
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings
-from tactile_bayes.random_numbers import Seed, seed_words
+from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
 from tactile_bayes.tasks.documents import read_json
 

@@ -21,7 +21,7 @@ from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.likelihood import approximations, checked_noise_scale, log_density_left_out, log_likelihood
 from tactile_bayes.load_cell.measurement import corrected, measured, stated_entries
 from tactile_bayes.load_cell.zero_load import found_cell
-from tactile_bayes.random_numbers import Rng, generator
+from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.record import CHANNELS, frame_of, validate
 
 __all__ = ["LoadCell"]

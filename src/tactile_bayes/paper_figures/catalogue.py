@@ -10,13 +10,13 @@ import numpy as np
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.numerics.random_numbers import Rng, seed_words
 from tactile_bayes.paper_figures.choice import Choice, Direction, Profile, choice_of
 from tactile_bayes.paper_figures.contact_kinds import draw_contact_kinds
 from tactile_bayes.paper_figures.deformed_rods import draw_deformed_rods
 from tactile_bayes.paper_figures.observable_curves import draw_observable_curves
 from tactile_bayes.paper_figures.reconstructed_points import draw_reconstructed_points
 from tactile_bayes.plotting.style import PAGE_WIDTH
-from tactile_bayes.random_numbers import Rng, seed_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -182,7 +182,11 @@ def caption(number: int, **options: Any) -> str:
     distances = ", ".join(f"{q:g}" for q in choice.distances)
     noise = ""
     if number == 11:
-        noise = ", without noise" if choice.seed is None else f", measured with noise (seed {seed_words(choice.seed)})"
+        noise = (
+            ", without noise"
+            if choice.load_cell is None or choice.seed is None
+            else f", measured with noise (seed {seed_words(choice.seed)})"
+        )
     along = "drive angle" if choice.drive is None else "travel of the base"
     return f"{entry.words.format(along=along)}, {_sweep_in_words(entry, choice)}{noise}, q = {distances} L."
 

@@ -18,9 +18,9 @@ from tactile_bayes.checks import (
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ContourError, ParameterError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.plotting.axes import AxesArray
 from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
-from tactile_bayes.random_numbers import Rng, seed_sequence
 from tactile_bayes.sweep import Carried, Scan, scan
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Choice:
     load_cell : LoadCell or None
         Load cell that measures the records of reconstructed points.
     seed : SeedSequence or None
-        Seed of its noise; None without a load cell.
+        Seed of its noise.
     width : float
         Width of the figure [inches].
     """
@@ -123,7 +123,7 @@ def choice_of(
     check_optional("load_cell", load_cell, LoadCell, "give a LoadCell")
     if load_cell is not None and rng is None:
         raise ParameterError("the load cell has noise: give rng, like rng=1")
-    seed = None if load_cell is None or rng is None else seed_sequence(rng)
+    seed = None if rng is None else seed_sequence(rng)
     if drive_step is not None:
         check_positive("drive_step", drive_step)
     check_optional("drive", drive, Carried, "the paper's rotations have none: give a Translation or a Motion")

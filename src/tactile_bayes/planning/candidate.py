@@ -15,10 +15,10 @@ from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.numerics.differences import central_slopes
+from tactile_bayes.numerics.random_numbers import Seed, words
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge
 from tactile_bayes.planning.record_information import COARSE_STEP, parameter_scales, reading_slopes, record_information
-from tactile_bayes.random_numbers import Seed, words
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Carried, Drive, Rotation
 from tactile_bayes.uncertainty.quantiles import central_levels

@@ -27,6 +27,7 @@ from tactile_bayes.checks import (
 from tactile_bayes.errors import ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.family import Family, family_of
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, words
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import (
@@ -36,7 +37,6 @@ from tactile_bayes.planning.knowledge import (
     known_from_posterior,
     known_from_prior,
 )
-from tactile_bayes.random_numbers import Rng, seed_sequence, seed_words, words
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive, Rotation, drives_of
 from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store

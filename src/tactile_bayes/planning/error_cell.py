@@ -17,11 +17,11 @@ from tactile_bayes.errors import ContourError, InferenceError, ReachError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.numerics.random_numbers import Seed, child
 from tactile_bayes.planning.amplification import METHODS, amplification
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, record_information
-from tactile_bayes.random_numbers import Seed, child
 from tactile_bayes.uncertainty.band import contour_band
 
 __all__ = ["CellOutcome", "MapCell", "MapTask", "error_cell"]

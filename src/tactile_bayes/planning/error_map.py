@@ -28,12 +28,12 @@ from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.planning.amplification import METHODS
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
 from tactile_bayes.planning.knowledge import unmeasured
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
 

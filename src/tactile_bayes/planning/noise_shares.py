@@ -14,9 +14,9 @@ from scipy import stats
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence, seed_words
 from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.random_numbers import Rng, generator, seed_sequence, seed_words
 from tactile_bayes.record import carried_sweeps, travels_of
 
 __all__ = ["noise_shares"]

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 from tactile_bayes.checks import check_numbers, check_probability, check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.result import record_of
+from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import known_from_posterior
 from tactile_bayes.planning.record_information import COARSE_STEP, reading_slopes, record_information
-from tactile_bayes.random_numbers import Rng, generator
 from tactile_bayes.record import carried_sweeps
 from tactile_bayes.sweep import Rotation, record_template
 

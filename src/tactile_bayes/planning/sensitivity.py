@@ -19,6 +19,7 @@ from tactile_bayes.checks import (
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.family_parameters import enlarged
 from tactile_bayes.planning.information import information
@@ -26,7 +27,6 @@ from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise
 from tactile_bayes.planning.sensitivity_summary import sensitivity_summary
-from tactile_bayes.random_numbers import Rng, seed_sequence
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive
 from tactile_bayes.tasks import TaskProgress

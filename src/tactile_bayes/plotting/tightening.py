@@ -78,7 +78,8 @@ def tightening(
 
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, implied_contacts, infer_contour, reconstruct, scan
+    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, reconstruct, scan
+    >>> from tactile_bayes.uncertainty import implied_contacts
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)

@@ -12,7 +12,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError, RecordWarning, TactileBayesError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.random_numbers import Rng
+from tactile_bayes.numerics.random_numbers import Rng
 from tactile_bayes.record import CHANNELS, MEASURED, read_record, rod_of, write_record
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR

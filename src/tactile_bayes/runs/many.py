@@ -21,7 +21,7 @@ from tactile_bayes.checks import check_function, check_path, check_probability, 
 from tactile_bayes.errors import ParameterError, TactileBayesError
 from tactile_bayes.inference.ensembles import SamplerSettings, settings_of
 from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.random_numbers import Rng, seed_sequence, seed_words
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.record import read_record
 from tactile_bayes.record.bag import is_bag
 from tactile_bayes.rig.rig import Rig, rig_of

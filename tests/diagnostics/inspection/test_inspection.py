@@ -108,7 +108,7 @@ def test_nothing_is_said_of_a_good_record(record):
         tb.LoadCell(force_noise=0.05, moment_noise=0.02, force_resolution=0.05, moment_resolution=0.02),
         tb.LoadCell(force_noise=0.02, moment_noise=0.01, force_resolution=0.1, moment_resolution=0.05),
         tb.LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=3e-3, frame="turning"),
-        tb.LoadCell(force_noise=0.05, moment_noise=0.02, drift=tb.RandomWalk(moment=2e-3, force=5e-3)),
+        tb.LoadCell(force_noise=0.05, moment_noise=0.02, drift=tb.load_cell.RandomWalk(moment=2e-3, force=5e-3)),
         tb.LoadCell(force_noise=0.05, moment_noise=0.02, gain=FAINT),
     ],
     ids=["usual", "poor", "steps", "coarse", "turning", "drift", "faint"],
@@ -162,7 +162,7 @@ def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
         moment_noise=1e-4,
         gain=((1.0, 0.0, 0.0), (0.0, -0.2, 0.01), (0.0, 0.0, 0.2)),  # the sign that is wrong
         correlation=(0.0, 0.0, 0.5),
-        drift=tb.RandomWalk(force=1e-5),
+        drift=tb.load_cell.RandomWalk(force=1e-5),
         force_range=0.12,
         drive_angle_offset=0.02,
     )
@@ -176,7 +176,7 @@ def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
 def test_a_wrong_frame_an_exchange_and_a_sign_that_is_suspected_are_named(record):
     exchanged = changed(record, force_x=record.force_y, force_y=record.force_x)
     assert correction(exchanged) == "force_x and force_y were exchanged."
-    as_fixed = tb.in_frame(record, "turning").assign_attrs(load_cell_frame="fixed")
+    as_fixed = tb.record.in_frame(record, "turning").assign_attrs(load_cell_frame="fixed")
     assert 'the load cell turned with the drive (frame = "turning" under [load_cell]' in correction(as_fixed)
     upside_down = changed(record, force_y=-record.force_y)
     assert correction(upside_down) == "force_y had the other sign."
@@ -343,7 +343,9 @@ def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
 
 
 def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal):
-    cell = tb.LoadCell(force_noise=1e-3, moment_noise=2.5e-4, drift=tb.OrnsteinUhlenbeck(force=6e-3, time=5.0))
+    cell = tb.LoadCell(
+        force_noise=1e-3, moment_noise=2.5e-4, drift=tb.load_cell.OrnsteinUhlenbeck(force=6e-3, time=5.0)
+    )
     measured = cell.measure(ideal, rng=1)
     assert words(measured) == NOTHING  # as it is stated
     assert any(sentence.startswith("The noise is not white: ") for sentence in words(bare(measured)))

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tactile_bayes import LoadCell, SamplerSettings, Translation, infer_contacts, infer_contour, scan, zero_load
+from tactile_bayes import LoadCell, SamplerSettings, Translation, infer_contacts, infer_contour, scan
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.record_likelihood import shortening
 from tactile_bayes.inference.record_likelihood.shortening import MOST_SAMPLES, shortened, thinned
+from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.drift import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.load_cell.likelihood import log_likelihood

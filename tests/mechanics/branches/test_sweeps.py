@@ -273,7 +273,7 @@ import sys
 import tactile_bayes as tb
 sys.stderr.isatty = lambda: True
 for _ in range(2):
-    tb.elastica.wrench_from_contact(0.2, 0.6, 0.1)
+    tb.mechanics.elastica.wrench_from_contact(0.2, 0.6, 0.1)
 print("done")
 """
 

@@ -31,7 +31,7 @@ from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.shortening import thinned
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
-from tactile_bayes.random_numbers import Rng, seed_sequence, seed_words, spawn
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, spawn
 from tactile_bayes.reconstruction import contacts_of, samples_of
 from tactile_bayes.record import CHANNELS, frame_of, record_hash, validate, with_rod
 from tactile_bayes.record.schema import column_attributes

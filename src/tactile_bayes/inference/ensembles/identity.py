@@ -12,7 +12,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
-from tactile_bayes.random_numbers import Seed, whole_seed
+from tactile_bayes.numerics.random_numbers import Seed, whole_seed
 
 __all__ = ["changes", "identity_of_run"]
 

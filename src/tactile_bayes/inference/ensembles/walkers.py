@@ -13,7 +13,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
 from tactile_bayes.inference.ensembles.target import LogProbability
-from tactile_bayes.random_numbers import Seed, spawn
+from tactile_bayes.numerics.random_numbers import Seed, spawn
 
 __all__ = ["RandomState", "checked_start", "first_random_state", "scatter_walkers"]
 

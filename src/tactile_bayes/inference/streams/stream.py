@@ -33,8 +33,8 @@ from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, WIDER, Particles, effective_number
 from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, tree_of
+from tactile_bayes.numerics.random_numbers import Rng, child, seed_sequence, whole_seed
 from tactile_bayes.numerics.selection import resampled
-from tactile_bayes.random_numbers import Rng, child, seed_sequence, whole_seed
 from tactile_bayes.record import carried_sweeps, validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig.rig import Rig, rig_of

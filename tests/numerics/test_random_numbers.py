@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.helpers.contour_posteriors import BRIEF, CELL, measured
 
 import tactile_bayes as tb
+from helpers.contour_posteriors import BRIEF, CELL, measured
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.random_numbers import child, generator, seed_sequence, seed_words, spawn, words
+from tactile_bayes.numerics.random_numbers import child, generator, seed_sequence, seed_words, spawn, words
 
 FEW = replace(BRIEF, max_steps=2, block_steps=2)
 STATED = tb.Rig(load_cell=CELL, unknown="nothing")
