@@ -33,7 +33,6 @@ __all__ = [
     "check_pivots",
     "check_positive",
     "check_probability",
-    "check_seed",
     "check_switch",
     "check_whole_number",
     "refused",
@@ -241,11 +240,6 @@ def check_whole_number(name: str, value: Any, least: int, correction: str = "", 
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
         raise refused(name, value, correction or f"give a whole number from {least} up, at most {most:g}")
     return int(value)
-
-
-def check_seed(value: Any, correction: str = "") -> int:
-    """Return a whole number from 0 up, the seed of random numbers."""
-    return check_whole_number("seed", value, 0, correction, most=math.inf)
 
 
 def check_choice(name: str, value: Any, choices: Collection[str], correction: str = "") -> str:

@@ -33,7 +33,7 @@ SI = Rod(length=0.1, flexural_rigidity=1e-5)
 
 def experiment(family=FAMILY, *, unknown="nothing", load_cell=QUIET, rod=None, drive_angles=ANGLES, **options):
     rig = Rig(rod=rod, load_cell=load_cell, unknown=unknown)
-    return experiment_of(family, rig, seed=1, drive_angles=drive_angles, **options)
+    return experiment_of(family, rig, rng=1, drive_angles=drive_angles, **options)
 
 
 def simulated(seed=0, **options):

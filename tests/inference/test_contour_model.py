@@ -24,7 +24,7 @@ def upright():
         Translation(base=(side * -0.5, 0.0), heading=0.0 if side > 0 else np.pi, drive_angle=0.5 * np.pi, travel=1.0)
         for side in (1, -1)
     ]
-    return CELL.measure(scan(Circle(0.3, q=0.8), drive=drives, drive_step=0.05).record, seed=1)
+    return CELL.measure(scan(Circle(0.3, q=0.8), drive=drives, drive_step=0.05).record, rng=1)
 
 
 def test_friction_that_excludes_every_path_is_named_with_the_way_out(upright, monkeypatch):

@@ -446,8 +446,8 @@ def posterior_ratios(factor, seed):
     """
     louder = DOUBLE.with_noise(factor)
     plan = replace(louder, rig=louder.rig.with_unknown(friction=0.0))
-    measured = plan.cell.measure(plan.scan.record, seed=seed)
-    posterior = tb.infer_contour(measured, rig=plan.rig, seed=seed, settings=SETTINGS)
+    measured = plan.cell.measure(plan.scan.record, rng=seed)
+    posterior = tb.infer_contour(measured, rig=plan.rig, rng=seed, settings=SETTINGS)
     bounds = information(plan).bound_with_priors
     draws = posterior["posterior"].to_dataset()
     # The posterior is as wide as the noise that it finds, which is off by some 3 % in a record of 600 readings.

@@ -22,7 +22,6 @@ from tactile_bayes.checks import (
     check_numbers,
     check_optional,
     check_path,
-    check_seed,
     check_switch,
     check_whole_number,
     refused,
@@ -31,6 +30,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Carried, Drive, drives_of, record_template
 from tactile_bayes.tasks import ResultsStore, TaskProgress, keep_outcomes, open_results_store
@@ -52,7 +52,7 @@ def calibrate(
     family: Family | str = "parabola",
     rig: Rig | None = None,
     *,
-    seed: int,
+    rng: Rng,
     replicates: int = 200,
     drive: Drive | Sequence[Drive] | None = None,
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
@@ -84,7 +84,7 @@ def calibrate(
     rig : Rig, optional
         As in `infer_contour`; what is unknown of it is drawn from the same priors. Its load cell, with noise, is by
         default one of force_noise 0.05 EI/L² and moment_noise 0.02 EI/L, and its rod the dimensionless one.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of all random numbers; the results, except the seconds, do not depend on the number of workers.
     replicates : int
         Number of replicates; each takes some two seconds on one core.
@@ -165,7 +165,7 @@ def calibrate(
     --------
     >>> from scipy import stats
     >>> family = Family("parabola", a=stats.uniform(0.4, 0.4))
-    >>> found = calibrate(family, Rig(unknown="nothing"), replicates=2, seed=1, workers=1)
+    >>> found = calibrate(family, Rig(unknown="nothing"), replicates=2, rng=1, workers=1)
     >>> found.quantity.values.tolist()
     ['a', 'q', 'x_c', 'noise_scale', 'log_likelihood', 'snap_off_forward', 'snap_off_backward']
     >>> found.attrs["verdict"].partition(":")[0]
@@ -175,7 +175,7 @@ def calibrate(
     experiment = experiment_of(
         family,
         rig,
-        seed=seed,
+        rng=rng,
         drive=drive,
         base=base,
         direction=direction,
@@ -233,7 +233,7 @@ def calibration_replicate(
     --------
     >>> from scipy import stats
     >>> family = Family("parabola", a=stats.uniform(0.4, 0.4))
-    >>> again = calibration_replicate(1, family, Rig(unknown="nothing"), seed=1)
+    >>> again = calibration_replicate(1, family, Rig(unknown="nothing"), rng=1)
     >>> list(again.truth), "posterior" in again.posterior
     (['a', 'q', 'x_c', 'noise_scale'], True)
     """
@@ -249,7 +249,7 @@ def experiment_of(
     family: Family | str = "parabola",
     rig: Rig | None = None,
     *,
-    seed: int,
+    rng: Rng,
     drive: Drive | Sequence[Drive] | None = None,
     base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
     direction: str = "both",
@@ -283,7 +283,7 @@ def experiment_of(
         },
         settings=settings or _SETTINGS,
         probability=probability,
-        seed=check_seed(seed),
+        seed=seed_sequence(rng),
         truth=truth,
         misspecification=misspecification or Misspecification(),
     )

@@ -73,7 +73,7 @@ def calibrate(
         "drive_angles": np.radians(np.arange(-30.0, 210.0 + 0.5 * drive_step, drive_step)),
         "truth": None if truth is None else Rig.read(truth),
         "probability": probability,
-        "seed": seed,
+        "rng": seed,
     }
     if replicate is not None:
         from tactile_bayes.calibration.calibrate import calibration_replicate

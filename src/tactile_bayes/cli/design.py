@@ -97,7 +97,7 @@ def design(
         made = design_into(
             out,
             known,
-            seed=seed,
+            rng=seed,
             bases=pivots,
             drives=drives,
             drive_steps=np.radians(steps),

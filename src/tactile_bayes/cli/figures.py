@@ -125,7 +125,7 @@ def figures(
         "drive_step": drive.step([carried or Rotation()]),
         "rods": rods,
         "load_cell": noise.load_cell,
-        "seed": seed,
+        "rng": seed,
         "width": COLUMN_WIDTH if column else PAGE_WIDTH,
     }
     numbers = list(dict.fromkeys(only or NUMBERS))

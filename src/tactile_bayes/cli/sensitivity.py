@@ -90,7 +90,7 @@ def sensitivity(
     stated, pivots = rig.stated, pivots_in(base)
     for name in profiles:
         paper_profile(name, q=0.5)  # type: ignore[arg-type]  # refuses any other
-    common: dict[str, Any] = {"rig": stated, "drive_step": math.radians(drive_step), "seed": seed}
+    common: dict[str, Any] = {"rig": stated, "drive_step": math.radians(drive_step), "rng": seed}
     material = _material(stated) if best_rod else None
     first: Any = profiles[0]
     analysis = {

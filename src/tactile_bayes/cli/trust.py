@@ -69,7 +69,7 @@ def trust(
             replicates=replicates,
             assumptions=assumptions,
             probability=probability,
-            seed=seed,
+            rng=seed,
             progress=note,
             **work.arguments,
         )

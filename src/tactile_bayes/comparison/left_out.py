@@ -11,8 +11,9 @@ from tactile_bayes.comparison.leave_one_out import left_out, left_out_from_wider
 from tactile_bayes.inference.contour import Sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, sample, spawn
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, sample
 from tactile_bayes.inference.starts.contour_start import walk_of
+from tactile_bayes.numerics.random_numbers import Seed, spawn
 
 __all__ = ["PredictedSamples", "predicted_samples"]
 

@@ -18,17 +18,7 @@ from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import (
-    Coordinates,
-    Draws,
-    Progress,
-    SamplerSettings,
-    Seed,
-    sample,
-    seed_sequence,
-    settings_of,
-    spawn,
-)
+from tactile_bayes.inference.ensembles import Coordinates, Draws, Progress, SamplerSettings, sample, settings_of
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.gauge import Gauge
@@ -36,6 +26,7 @@ from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.parameters.rig_prior import rig_prior
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
+from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
 from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import expanded
@@ -51,7 +42,7 @@ def infer_contour(
     *,
     family: Family | str = "parabola",
     rig: Rig | None = None,
-    seed: Seed,
+    rng: Rng,
     settings: SamplerSettings | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
@@ -79,8 +70,8 @@ def infer_contour(
     rig : Rig, optional
         Rod, load cell, and the unknowns of the rig, which are inferred beside the contour; by default those that the
         record states, with the unknowns of a real rig.
-    seed : int or numpy.random.SeedSequence
-        Seed of all random numbers; the same seed gives the same draws.
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
+        Random numbers. The same seed gives the same draws; a generator goes on, so that the next call has others.
     settings : SamplerSettings, optional
         Criteria of convergence, and limits of steps and time.
     checkpoint : path-like, optional
@@ -109,7 +100,7 @@ def infer_contour(
     RecordError
         If `measured` is no record.
     ParameterError
-        If the family is unknown, the seed is no whole number from 0 up, the load cell has noise on some channels, and
+        If the family is unknown, `rng` is none of these, the load cell has noise on some channels, and
         none on another, two unknowns have the same effect, or the calibration of the rig is of another rod, load cell
         or unit.
     InferenceError
@@ -148,15 +139,15 @@ def infer_contour(
     >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> rig = Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02), unknown="nothing")
-    >>> measured = rig.load_cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> measured = rig.load_cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> result = infer_contour(measured, family="parabola", rig=rig, seed=1, settings=quick)
+    >>> result = infer_contour(measured, family="parabola", rig=rig, rng=1, settings=quick)
     >>> bool(result.attrs["converged"]), list(result["posterior"].data_vars)
     (True, ['a', 'q', 'x_c', 'noise_scale'])
     """
     settings = settings_of(settings)
     experiment = Experiment(measured, rig_of(rig), family, settings.events)
-    return _posterior_of(experiment, seed, settings, checkpoint, progress, keep)
+    return _posterior_of(experiment, rng, settings, checkpoint, progress, keep)
 
 
 def calibrate_rig(
@@ -164,7 +155,7 @@ def calibrate_rig(
     *,
     contour: Contour,
     rig: Rig | None = None,
-    seed: Seed,
+    rng: Rng,
     settings: SamplerSettings | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
@@ -188,7 +179,7 @@ def calibrate_rig(
     rig : Rig, optional
         The rig so far. If it has been calibrated by another record, of this gauge or of another one, the result rests
         on both.
-    seed, settings, checkpoint, progress, keep
+    rng, settings, checkpoint, progress, keep
         As in `infer_contour`.
 
     Returns
@@ -214,14 +205,14 @@ def calibrate_rig(
     >>> from tactile_bayes.contours import Circle
     >>> from tactile_bayes.rig import NOTHING
     >>> pin, cell = Circle(r=0.2, q=0.5), LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(pin, drive_step=0.1).record, seed=1)
+    >>> measured = cell.measure(scan(pin, drive_step=0.1).record, rng=1)
     >>> rig = Rig(load_cell=cell, unknown={**NOTHING, "rigidity_scale": "default"})
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> list(calibrate_rig(measured, contour=pin, rig=rig, seed=1, settings=quick).calibration.priors)
+    >>> list(calibrate_rig(measured, contour=pin, rig=rig, rng=1, settings=quick).calibration.priors)
     ['rigidity_scale']
     """
     settings, rig = settings_of(settings), rig_of(rig)
-    posterior = rig_posterior(records, contour, rig, seed, settings, checkpoint, progress, keep)
+    posterior = rig_posterior(records, contour, rig, rng, settings, checkpoint, progress, keep)
     found = rig_prior(posterior)
     left = {name: value for name, value in expanded(rig.entries).items() if name not in found.priors}
     return replace(rig, unknown=left, calibration=found)
@@ -231,7 +222,7 @@ def rig_posterior(
     records: xr.Dataset,
     contour: Contour,
     rig: Rig,
-    seed: Seed,
+    rng: Rng,
     settings: SamplerSettings,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
@@ -241,12 +232,12 @@ def rig_posterior(
     experiment = Experiment(records, rig, events=settings.events, gauge=Gauge(contour))
     if not experiment.nuisances.names:
         raise ParameterError("nothing of the rig is unknown: say that one of its parameters is, like rigidity_scale")
-    return _posterior_of(experiment, seed, settings, checkpoint, progress, keep)
+    return _posterior_of(experiment, rng, settings, checkpoint, progress, keep)
 
 
 def _posterior_of(
     experiment: Experiment,
-    seed: Seed,
+    rng: Rng,
     settings: SamplerSettings,
     checkpoint: str | os.PathLike[str] | None,
     progress: Callable[[Progress], object] | None,
@@ -257,7 +248,7 @@ def _posterior_of(
         check_path("checkpoint", checkpoint, "give the path of a folder, or None")
     check_function("progress", progress)
     check_function("keep", keep)
-    seed_sequence(seed)
+    seed = seed_sequence(rng)
     problem = contour_problem(experiment)
     return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress, keep=keep).tree
 

@@ -17,7 +17,8 @@ import xarray as xr
 from tactile_bayes.checks import check_kind, check_path
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings
+from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
 from tactile_bayes.tasks.documents import read_json
 
@@ -34,7 +35,6 @@ __all__ = [
     "refuse_no_contour",
     "refuse_not_finite",
     "sample_stats",
-    "seed_words",
     "to_arviz",
     "write_result",
 ]
@@ -100,13 +100,6 @@ def is_streamed(attrs: Mapping[Any, Any]) -> bool:
 @cache
 def _versions() -> str:
     return json.dumps({"Python": platform.python_version(), **{name: version(name) for name in _SOFTWARE}})
-
-
-def seed_words(seed: Seed) -> str:
-    """Return a seed as text, for an attribute."""
-    if isinstance(seed, np.random.SeedSequence):
-        return f"{seed.entropy}" + (f", spawn key {seed.spawn_key}" if seed.spawn_key else "")
-    return str(seed)
 
 
 def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:

@@ -42,10 +42,10 @@ def experiment_of(posterior: xr.DataTree, family: Family | None = None, rig: Rig
     >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
     >>> quick = SamplerSettings(ensembles=2, walkers=20, max_steps=20)
     >>> narrow = Family("parabola", q=stats.uniform(0.4, 0.2))
-    >>> tree = infer_contour(measured, family=narrow, rig=Rig(unknown="nothing"), seed=1, settings=quick)
+    >>> tree = infer_contour(measured, family=narrow, rig=Rig(unknown="nothing"), rng=1, settings=quick)
     >>> experiment_of(tree).family
     Family('parabola', q=uniform(0.4, 0.2))
     """

@@ -20,7 +20,6 @@ from tactile_bayes.checks import (
     check_numbers,
     check_optional,
     check_probability,
-    check_seed,
     check_switch,
     check_whole_number,
     refused,
@@ -28,6 +27,7 @@ from tactile_bayes.checks import (
 from tactile_bayes.errors import ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.family import Family, family_of
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, words
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import (
@@ -62,7 +62,7 @@ def design(
     known: xr.DataTree | str | Family = "parabola",
     rig: Rig | None = None,
     *,
-    seed: int,
+    rng: Rng,
     bases: Sequence[tuple[float, float]] | None = None,
     drives: Sequence[Drive | Sequence[Drive]] | None = None,
     drive_steps: Sequence[float] = (float(np.radians(2.0)),),
@@ -89,7 +89,7 @@ def design(
     rig : Rig, optional
         As in `Plan`, if a family is given; a posterior has its own. Pivots are where they are planned: shifts of them
         are left out, of a posterior, too.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of all random numbers.
     bases : sequence of (float, float), optional
         Pivots to choose from [length]; by default eleven from half a rod's length to the left of the pivot so far to
@@ -167,22 +167,22 @@ def design(
     --------
     >>> from scipy import stats
     >>> known = Family("parabola", a=stats.lognorm(0.3, scale=0.6), q=stats.uniform(0.4, 0.2), x_c=stats.norm(0, 0.05))
-    >>> found = design(known, bases=[(0.0, 0.0), (0.0, -0.3)], draws=4, seed=1)
+    >>> found = design(known, bases=[(0.0, 0.0), (0.0, -0.3)], draws=4, rng=1)
     >>> bool(found.width[1] > found.width[0])  # farther away
     True
     """
     check_choice("criterion", criterion, _CRITERIA)
     check_whole_number("draws", draws, 2)
     check_switch("nested", nested)
-    check_seed(seed)
+    seed = seed_sequence(rng)
     check_probability("probability", probability)
-    rng = np.random.default_rng([int(seed), 1])
+    draws_from = np.random.default_rng([*words(seed), 1])
     if isinstance(known, str | Family):
-        knowledge = known_from_prior(rig_of(rig), family_of(known), draws=int(draws), rng=rng)
+        knowledge = known_from_prior(rig_of(rig), family_of(known), draws=int(draws), rng=draws_from)
     elif rig is not None:
         raise ParameterError("a rig and a posterior, which has its own: leave one of the two")
     else:
-        knowledge = known_from_posterior(known, draws=int(draws), rng=rng)
+        knowledge = known_from_posterior(known, draws=int(draws), rng=draws_from)
     correction = "give angles in radians, from 1e-5 to 0.5"
     several = drive_steps if np.iterable(drive_steps) else [drive_steps]
     steps = check_numbers("drive_steps", several, correction, shape=(None,), least=1e-5, most=0.5)
@@ -191,7 +191,7 @@ def design(
     choices += [tuple(drives_of(drive, (0.0, 0.0))) for drive in _several(drives)]
     candidates = tuple(Candidate(choice, float(step)) for choice, step in product(choices, steps))
     x = np.linspace(*_span(span, knowledge), _GRID_POINTS)
-    question = Question(knowledge, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
+    question = Question(knowledge, candidates, x, float(probability), _NESTED if nested else 0, seed)
     with open_results_store(_identity(question), out, CANDIDATES) as store:
         found = keep_outcomes(
             store, expected_of, question, len(candidates), workers=workers, scheduler=scheduler, progress=progress
@@ -308,7 +308,7 @@ def _identity(question: Question) -> dict[str, str]:
         "span": json.dumps([float(question.x[0]), float(question.x[-1])]),
         "probability": repr(question.probability),
         "nested": repr(question.nested),
-        "seed": repr(question.seed),
+        "seed": seed_words(question.seed),
         **{f"version of {name}": version(name) for name in _LIBRARIES},
     }
 

@@ -21,7 +21,6 @@ from tactile_bayes.checks import (
     check_number,
     check_numbers,
     check_probability,
-    check_seed,
     check_whole_number,
     refused,
 )
@@ -29,6 +28,7 @@ from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.planning.amplification import METHODS
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
@@ -57,7 +57,7 @@ def error_map(
     contours: Mapping[str, Contour] | Sequence[str] = ("II",),
     rig: Rig | None = None,
     *,
-    seed: int,
+    rng: Rng,
     distances: Sequence[float] = (0.5,),
     noise_factors: Sequence[float] = (0.1, 0.3, 1.0, 3.0),
     base_x: float = 0.0,
@@ -81,7 +81,7 @@ def error_map(
         scaled to the rod's length.
     rig, family
         As in `Plan`; a family is that of all contours.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of all random numbers; the results do not depend on the number of workers.
     distances : sequence of float
         Heights of the lowest point of each contour above the pivot [rod lengths].
@@ -143,7 +143,7 @@ def error_map(
 
     Examples
     --------
-    >>> found = error_map(["II"], noise_factors=[0.1, 1.0], replicates=2, seed=1, workers=1)
+    >>> found = error_map(["II"], noise_factors=[0.1, 1.0], replicates=2, rng=1, workers=1)
     >>> found.rms_across.sel(reconstruction="constrained").values.ravel().round(4) < 0.02
     array([ True,  True])
     """
@@ -155,7 +155,6 @@ def error_map(
     counts["posterior_replicates"] = posterior_replicates, 1
     for name, (count, least) in counts.items():
         check_whole_number(name, count, least)
-    check_seed(seed)
     check_probability("probability", probability)
     cells = tuple(
         MapCell(name, distance * rod.length, factor)
@@ -171,7 +170,7 @@ def error_map(
         int(replicates),
         {int(number): min(int(posterior_replicates), int(replicates)) for number in chosen},
         float(probability),
-        int(seed),
+        seed_sequence(rng),
     )
     with open_results_store(_identity(task), out, CELLS) as store:
         kept = keep_outcomes(
@@ -213,7 +212,7 @@ def _identity(task: MapTask) -> dict[str, str]:
         "replicates": repr(task.replicates),
         "posteriors": json.dumps(dict(task.posteriors)),
         "probability": repr(task.probability),
-        "seed": repr(task.seed),
+        "seed": seed_words(task.seed),
         **{f"version of {name}": version(name) for name in _LIBRARIES},
     }
 
@@ -256,7 +255,7 @@ def _labelled(
             },
             "reconstruction": list(METHODS),
         },
-        attrs={"replicates": task.replicates, "probability": task.probability, "seed": task.seed},
+        attrs={"replicates": task.replicates, "probability": task.probability, "seed": seed_words(task.seed)},
     )
 
 
