@@ -392,7 +392,7 @@ def test_an_angle_of_another_turn_is_refused_with_the_number_to_subtract(tmp_pat
         columns = rig.columns | {"drive_angle": rig.pick(["", "0+"]) + rig.columns["drive_angle"]}
         record, _ = rig.read(rig.content, tmp_path, columns)
         assert isinstance(record, RecordError)
-        advice = re.search(r"columns=\{'drive_angle': '([^']*)'\}", str(record))[1]
+        advice = re.search(r"file=\{'drive_angle': '([^']*)'\}", str(record))[1]
         record, _ = rig.read(rig.content, tmp_path, {**columns, "drive_angle": advice})
         whole = 2.0 * np.pi * np.round((record["drive_angle"] - np.radians(rig.values["drive_angle"])) / (2.0 * np.pi))
         np.testing.assert_allclose(record["drive_angle"] - whole, np.radians(rig.values["drive_angle"]), atol=1e-9)

@@ -84,8 +84,6 @@ def test_one_value_for_all_samples(target, text, origin):
 @pytest.mark.parametrize(
     ("target", "text", "message"),
     [
-        ("force", "Fx", "columns: 'force' is no column of a record: did you mean 'force_x'?"),
-        ("Q", "Fx", "columns: 'Q' is no column of a record"),
         ("force_x", "0.5", "'0.5' is given for 'force_x', which is measured"),
         ("sweep", "-Fx", "'-Fx' is given for 'sweep', which has no unit, factor, sign or zero"),
         ("sweep", "2*Fx", "'2*Fx' is given for 'sweep', which has no unit, factor, sign or zero"),

@@ -105,6 +105,7 @@ def test_a_unit_of_another_quantity_is_refused():
         make_record(frame().rename(columns={"Mz (N mm)": "Mz (mN)"}), RIG)
 
 
-def test_an_entry_of_the_file_that_is_no_column_is_refused_at_once():
-    with refused(ParameterError, "'force_X'", "'force_x'"):
-        Rig(file={"force_X": "Fx"})
+@pytest.mark.parametrize(("name", "hint"), [("force", "did you mean 'force_x'?"), ("Q", "choose from sweep")])
+def test_an_entry_of_the_file_that_is_no_column_is_refused_at_once(name, hint):
+    with refused(ParameterError, f"columns: {name!r} is no column of a record", hint):
+        Rig(file={name: "Fx"})

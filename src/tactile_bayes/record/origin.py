@@ -16,7 +16,7 @@ import xarray as xr
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.quantity import OTHER_UNITS, accepted_units, converted, unit_of, units_disagree
-from tactile_bayes.record.schema import COLUMNS, DIRECTIONS, MEASURED, Column, Kind, column_of
+from tactile_bayes.record.schema import DIRECTIONS, MEASURED, Column, Kind, column_of
 from tactile_bayes.record.spelling import look_alikes, nearest, plain
 from tactile_bayes.record.storable import storable
 from tactile_bayes.record.table import Cells, Source, Table
@@ -224,11 +224,7 @@ def _cells(target: str, origin: Origin, found: Cells, is_shared: bool, source: S
 
 
 def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
-    column = column_of(target)
-    if column is None:
-        near = nearest(target, COLUMNS)
-        hint = f"did you mean {near!r}?" if near else f"choose from {', '.join(MEASURED)}"
-        raise ParameterError(f"columns: {target!r} is no column of a record: {hint}")
+    column = _column(target)
     text = text.strip()
     readings = list(_readings(text))
     if plain(text) != text:
