@@ -272,23 +272,7 @@ def sampled(
     walk: Walk | None = None,
     with_prior: bool = True,
 ) -> Sampled:
-    """Return the posterior of a problem.
-
-    Parameters
-    ----------
-    problem : ContourProblem
-    seed, settings, checkpoint, progress, keep
-        As in `infer_contour`.
-    walk : Walk, optional
-        Start and coordinates of the walkers, in place of those from a search for the optimum.
-    with_prior : bool
-        Whether the result has a group of draws from the prior.
-
-    Raises
-    ------
-    InferenceError, ReachError
-        As in `infer_contour`.
-    """
+    """Return the posterior of a problem."""
     seeds = spawn(seed, 4)
     deadline = Deadline.after(settings.max_seconds)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
