@@ -16,7 +16,7 @@ from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, swept
 from tactile_bayes.diagnostics.inspection import Inspection
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.mechanics import elastica
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import FileFormat, Rig
 
 PARABOLA = tb.contours.Parabola(0.5, 0.5)
 STATED = Rig(load_cell=CELL, unknown="nothing")
@@ -464,6 +464,8 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
             tb.Rig,
             {"rod": None, "load_cell": CELL, "unknown": {"lever": 0.0}, "calibration": None, "file": {}},
         ),
+        "FileFormat": Call(FileFormat, {"columns": {"force_x": "Fx[mN]"}, "split_sweeps": False, "missing": ()}),
+        "FileFormat.of": Call(FileFormat.of, {"table": {"force_x": "Fx[mN]"}}),
         "Rig.is_named": Call(STATED.is_named, {"name": "lever_x"}),
         "Rig.of": Call(tb.Rig.of, {"posterior": posterior()}),
         "Rig.of_tables": Call(tb.Rig.of_tables, {"tables": STATED.tables, "folder": folder}),
