@@ -25,7 +25,6 @@ from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.deadline import Deadline
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, settings_of
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
@@ -201,16 +200,14 @@ def compare_families(
     for name, problem in sorted(problems.items(), key=lambda item: item[0] != SHAPE_FREE.name):
         best = max((one.evidence.log_evidence[_USUAL] for one in tried.values() if one.evidence), default=-np.inf)
         of_family = spawn(seeds[name], 4)
-        deadline = Deadline.after(settings.max_seconds)
         with threadpool_limits(1):
-            walk = walk_of(problem.model, of_family[0], settings, deadline)
+            walk = walk_of(problem.model, of_family[0], settings)
             ceiling = _ceiling(problem.model, walk)
-        if ceiling < best - GIVEN_UP and not deadline.has_passed:
+        if ceiling < best - GIVEN_UP:
             tried[name] = _Tried(ceiling)
             continue
         watch = None if progress is None else functools.partial(progress, name)
-        limited = replace(settings, max_seconds=deadline.seconds_left)
-        found = sampled(problem, seed=of_family[1], settings=limited, progress=watch, walk=walk)
+        found = sampled(problem, seed=of_family[1], settings=settings, progress=watch, walk=walk)
         found.draws.refuse_interrupted(name)
         try:
             evidence = contour_evidence(problem.model, found, np.random.default_rng(of_family[2]))
