@@ -55,6 +55,8 @@ SENSIBLE = {
     "rng": lambda value: (
         (type(value) is int and value >= 0) or isinstance(value, (np.random.Generator, np.random.SeedSequence))
     ),
+    "paper_figures.figure(rng)": lambda value: value is None or SENSIBLE["rng"](value),
+    "paper_figures.caption(rng)": lambda value: value is None or SENSIBLE["rng"](value),
     "workers": lambda value: value is None or (type(value) is int and value > 0),
     "rod": a_kind(tb.Rod),
     "load_cell": a_kind(tb.LoadCell),

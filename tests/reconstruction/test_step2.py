@@ -6,6 +6,7 @@ import pytest
 from hypothesis import example, given, settings
 from scipy.stats import binomtest
 
+import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
@@ -271,3 +272,18 @@ def test_a_rod_that_is_given_holds_against_the_one_stated():
 def test_a_rod_in_si_does_not_fit_a_dimensionless_record(swept):
     with refused(ParameterError, "dimensionless", WIRE):
         reconstruct(swept, rig=Rig(rod=WIRE))
+
+
+def test_a_carried_rod_that_slides_the_other_way_is_found():
+    """Its flank slides against the sense of its side; the posterior of contacts has the same sense."""
+    drive = tb.Motion([-1.2, 1.2], [-0.36735194, 0.06182908], [0.52707784, 1.35185622])
+    rig = Rig(load_cell=LoadCell(force_noise=1e-4, moment_noise=1e-4), unknown={"friction": 0.0343})
+    record = tb.scan(Parabola(0.15874053, 0.28976189, 0.19207482), rig, drive=drive, drive_step=0.08).record
+    lying = np.flatnonzero(record.truth_contact_phase.values == "tangential")
+    assert lying.size
+    measured = rig.load_cell.measure(record, rng=1)
+    contacts = reconstruct(measured, rig=rig, method="constrained")
+    drawn = tb.infer_contacts(measured, rig, rng=1, draws=400)["posterior"].mean(("chain", "draw"))
+    for found in (contacts, drawn):
+        off = np.hypot(found.contact_x - record.truth_contact_x, found.contact_y - record.truth_contact_y)
+        assert float(off[lying].max()) < 2e-3

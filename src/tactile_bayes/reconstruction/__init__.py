@@ -12,7 +12,7 @@ from tactile_bayes.reconstruction.sides import (
     sides_and_doubts,
     with_sides,
 )
-from tactile_bayes.reconstruction.step2 import contacts_of, reconstruct
+from tactile_bayes.reconstruction.step2 import contacts_of, reconstruct, with_likelier_senses
 
 __all__ = [
     "AXIAL_ALARM",
@@ -29,5 +29,6 @@ __all__ = [
     "samples_of",
     "side_of",
     "sides_and_doubts",
+    "with_likelier_senses",
     "with_sides",
 ]

@@ -46,7 +46,7 @@ def _of_arcs(samples: Samples, friction: float) -> tuple[Floats, Floats]:
     moment, force_x, force_y = reading.loads.T
     cos, sin = np.cos(reading.drive_angle), np.sin(reading.drive_angle)
     force = np.hypot(force_x, force_y)
-    drag = friction / np.hypot(1.0, friction)
+    drag = samples.sense * friction / np.hypot(1.0, friction)
     moment_variance = reading.covariance[:, 0, 0]
     if stem:
         moment = moment - lever_of_stem(stem, reading.drive_angle, force_x, force_y)

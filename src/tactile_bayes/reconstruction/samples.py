@@ -42,10 +42,12 @@ class Samples(NamedTuple):
     """True if a channel is at the end of its range."""
     has_noise: bool
     """True if any noise level is known."""
+    sense: Floats
+    """+1, or −1 where the contact slides the other way than on the side of a rotation, shape (n,)."""
 
     def friction_angles(self, friction: float) -> Floats:
         """Return the friction angles with which the centreline touches, shape (n,)."""
-        return np.full(self.side.size, self.rod.surface.friction_angle(float(np.arctan(friction))))
+        return self.sense * self.rod.surface.friction_angle(float(np.arctan(friction)))
 
     def take(self, where: Index) -> Samples:
         """Select samples."""
@@ -55,6 +57,7 @@ class Samples(NamedTuple):
             rods=self.rods.take(where),
             loaded=self.loaded[where],
             cut_off=self.cut_off[where],
+            sense=self.sense[where],
         )
 
 
@@ -120,7 +123,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         side[:, None] * signs * leaning,
         np.broadcast_to(covariance, (angle.size, 3, 3)),
     )
-    return Samples(rod, reading, side, rod.mirrored(side), loaded, cut_off, has_noise)
+    return Samples(rod, reading, side, rod.mirrored(side), loaded, cut_off, has_noise, np.ones(angle.size))
 
 
 def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> Flags:

@@ -22,7 +22,7 @@ from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_acr
 from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
 from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_doubts, with_sides
-from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
+from tactile_bayes.record import CHANNELS, COLUMNS, carried_sweeps, present_channels, validate, with_rod
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
@@ -176,6 +176,7 @@ def contacts_of(found: Corrected, method: Literal["raw", "constrained"]) -> xr.D
         raise refused("suspension_compliance", compliance, correction)
     measured, doubtful = _with_likelier_sides(measured, cell, compliance, friction)
     samples = samples_of(measured, cell, compliance)
+    samples = with_likelier_senses(samples, measured, friction)
     estimate = _METHODS[method](samples, samples.friction_angles(friction))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
     contacts = kept.assign(_variables(estimate, samples, measured)).assign_attrs(
@@ -205,17 +206,34 @@ def _with_likelier_sides(
     for sweep in doubtful:
         stated = side_of(measured, sweep)
         part = measured.isel(sample=np.flatnonzero(measured.sweep.values == sweep))
-        misfits = []
-        for side in (stated, OTHER_SIDE[stated]):
-            samples = samples_of(with_sides(part, {sweep: side}), cell, suspension_compliance)
-            if not are_weighed(samples):
-                break
-            found = constrained_estimate(samples, samples.friction_angles(friction)).misfit
-            none = np.nan if found is None else found
-            misfits.append(float(np.minimum(np.nan_to_num(none, nan=_NO_CONTACT), _NO_CONTACT)[samples.loaded].sum()))
-        fits_better = len(misfits) == 2 and misfits[1] < misfits[0] - _TWENTY_TO_ONE
-        taken[sweep] = OTHER_SIDE[stated] if fits_better else stated
+        both = [
+            samples_of(with_sides(part, {sweep: side}), cell, suspension_compliance)
+            for side in (stated, OTHER_SIDE[stated])
+        ]
+        taken[sweep] = OTHER_SIDE[stated] if _fits_better(both[1], both[0], friction) else stated
     return with_sides(measured, sides | taken), taken
+
+
+def with_likelier_senses(samples: Samples, measured: xr.Dataset, friction: float) -> Samples:
+    """Return samples whose carried sweeps slide the other way if they fit clearly better so; a sweep has one sense."""
+    sense = samples.sense.copy()
+    for sweep in carried_sweeps(measured) if friction else ():
+        rows = np.flatnonzero(measured.sweep.values == sweep)
+        part = samples.take(rows)
+        sense[rows] *= -1.0 if _fits_better(part._replace(sense=-part.sense), part, friction) else 1.0
+    return samples._replace(sense=sense)
+
+
+def _fits_better(one: Samples, other: Samples, friction: float) -> bool:
+    """Return whether the misfit of samples is clearly smaller than that of others; False without a noise level."""
+    if not (are_weighed(one) and are_weighed(other)):
+        return False
+    misfits = []
+    for samples in (one, other):
+        found = constrained_estimate(samples, samples.friction_angles(friction)).misfit
+        none = np.nan if found is None else found
+        misfits.append(float(np.minimum(np.nan_to_num(none, nan=_NO_CONTACT), _NO_CONTACT)[samples.loaded].sum()))
+    return misfits[0] < misfits[1] - _TWENTY_TO_ONE
 
 
 def _in_channels(measured: xr.Dataset, cell: LoadCell) -> xr.Dataset:

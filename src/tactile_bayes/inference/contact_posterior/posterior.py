@@ -32,7 +32,7 @@ from tactile_bayes.inference.record_likelihood.shortening import thinned
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, spawn
-from tactile_bayes.reconstruction import contacts_of, samples_of
+from tactile_bayes.reconstruction import contacts_of, samples_of, with_likelier_senses
 from tactile_bayes.record import CHANNELS, frame_of, record_hash, validate, with_rod
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig.corrected import Corrected, corrected
@@ -161,7 +161,7 @@ def infer_contacts(
     if compliance:
         raise ParameterError("infer_contacts knows no compliant suspension: say that suspension_compliance is 0")
     measured, cell = thinned(measured, cell)
-    density, loaded = _density(measured, cell, float(np.arctan(friction)), prior)
+    density, loaded = _density(measured, cell, friction, prior)
     if not loaded.size:
         raise InferenceError(NO_LOAD)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
@@ -190,9 +190,11 @@ def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -
     check_choice("method", method, ("auto", "importance", "emcee"))
 
 
-def _density(measured: xr.Dataset, cell: LoadCell, delta: float, prior: ContactPrior) -> tuple[ContactDensity, Index]:
+def _density(
+    measured: xr.Dataset, cell: LoadCell, friction: float, prior: ContactPrior
+) -> tuple[ContactDensity, Index]:
     """Return the density of the loaded samples, and their numbers."""
-    samples = samples_of(measured, cell)
+    samples = with_likelier_senses(samples_of(measured, cell), measured, friction)
     if cell.degrees_of_freedom <= 2.0:  # proposals take a covariance
         about = samples_of(measured, replace(cell, degrees_of_freedom=np.inf))
         samples = samples._replace(reading=about.reading)
@@ -204,7 +206,11 @@ def _density(measured: xr.Dataset, cell: LoadCell, delta: float, prior: ContactP
     base = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
     turning = frame_of(measured) == "turning"
     loaded = np.flatnonzero(samples.loaded & ~samples.cut_off)
-    delta = rod.surface.friction_angle(delta)
+    senses = np.unique(samples.sense[loaded])
+    if senses.size > 1:
+        raise ParameterError("the rod slides along the object both ways, in different sweeps: give them one by one")
+    sense = float(senses[0]) if senses.size else 1.0
+    delta = sense * rod.surface.friction_angle(float(np.arctan(friction)))
     return ContactDensity(samples, readings, base, turning=turning, delta=delta, prior=prior).take(loaded), loaded
 
 
