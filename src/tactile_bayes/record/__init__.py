@@ -5,6 +5,7 @@ from tactile_bayes.record.files import read_record, write_record
 from tactile_bayes.record.frame import frame_of, in_frame, turned
 from tactile_bayes.record.growing import GrowingRecord, Growth
 from tactile_bayes.record.identity import record_hash
+from tactile_bayes.record.points import read_points
 from tactile_bayes.record.positions import means_of_positions, positions_of
 from tactile_bayes.record.schema import (
     CHANNELS,
@@ -43,6 +44,7 @@ __all__ = [
     "means_of_positions",
     "positions_of",
     "present_channels",
+    "read_points",
     "read_record",
     "record_hash",
     "rod_of",
