@@ -89,7 +89,7 @@ class Polyline:
         for at in np.ndindex(found.shape):
             over = (left <= positions[at]) & (positions[at] <= right)
             if over.any() and np.isfinite(heights[at]):
-                found[at] = _nearest_height(starts[over], along[over], positions[at], heights[at])
+                found[at] = _nearest_height(starts[over], along[over], float(positions[at]), float(heights[at]))
         return found
 
     @cached_property
@@ -114,5 +114,5 @@ def _nearest_height(starts: Floats, along: Floats, x: float, near: float) -> flo
     """Return the height of segments over x that is nearest to a given one; a vertical segment has all of its own."""
     steep = along[:, 0] == 0.0
     share = np.where(steep, near - starts[:, 1], x - starts[:, 0]) / np.where(steep, along[:, 1], along[:, 0])
-    heights = starts[:, 1] + np.clip(share, 0.0, 1.0) * along[:, 1]
-    return float(heights[np.argmin(np.abs(heights - near))])
+    heights = np.asarray(starts[:, 1] + np.clip(share, 0.0, 1.0) * along[:, 1])
+    return float(np.take(heights, np.argmin(np.abs(heights - near))))

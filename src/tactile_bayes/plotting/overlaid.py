@@ -73,15 +73,15 @@ def overlaid(
         raise ParameterError("there are no bands: give at least one, by the name of its run")
     for band in bands.values():
         check_dataset(band, {"x", "lower", "median", "upper"}, "band", "contour_band")
-    for found in (contacts or {}).values():
-        check_dataset(found, {"contact_x", "contact_y"}, "dataset of contact points", "reconstruct")
+    for points in (contacts or {}).values():
+        check_dataset(points, {"contact_x", "contact_y"}, "dataset of contact points", "reconstruct")
     ax = single_axes() if ax is None else ax
     first = next(iter(bands))
     reference = (overlay or Overlay.of_band(first, bands[first])) if enlarged else None
     for (name, band), colour in zip(bands.items(), cycle(BASES), strict=False):
         x, base = band["x"].values, _height(reference, band)
-        edges = (band[edge].values - base for edge in ("lower", "upper"))
-        ax.fill_between(x, *edges, color=colour, alpha=0.3, linewidth=0.5, zorder=1.5)
+        lower, upper = band["lower"].values - base, band["upper"].values - base
+        ax.fill_between(x, lower, upper, color=colour, alpha=0.3, linewidth=0.5, zorder=1.5)
         ax.plot(x, band["median"].values - base, color=colour, linewidth=1.0, label=name)
         if contacts and name in contacts and not enlarged:
             _draw_contacts(ax, contacts[name], x, colour)
@@ -89,7 +89,8 @@ def overlaid(
     limits = [*ax.get_xlim(), *ax.get_ylim()]
     if overlay is not None:
         for piece in overlay.polyline.pieces if reference is None else [np.array([limits[:2], [0.0, 0.0]]).T]:
-            ax.plot(*piece.T, **TRUTH, label=overlay.name, scalex=False, scaley=False)
+            ax.plot(*piece.T, **TRUTH, label=overlay.name)
+    ax.set(xlim=limits[:2], ylim=limits[2:])  # those of the bands: a drawing may be much larger
     if reference is None:
         finish_map(ax, attrs)
         return ax
