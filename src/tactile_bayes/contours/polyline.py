@@ -97,7 +97,8 @@ class Polyline:
         """Starts and extents of all segments, shape (n, 2), and whether their start and end are free."""
         ends = np.array([[piece[0], piece[-1]] for piece in self.pieces])
         extent = float(np.ptp(np.concatenate(self.pieces), axis=0).max())
-        apart = cKDTree(ends.reshape(-1, 2)).query(ends.reshape(-1, 2), k=2)[0][:, 1].reshape(-1, 2)
+        nearest_two, _ = cKDTree(ends.reshape(-1, 2)).query(ends.reshape(-1, 2), k=2)
+        apart = np.asarray(nearest_two)[:, 1].reshape(-1, 2)
         starts, along, free = [], [], []
         for piece, is_free in zip(self.pieces, apart > _JOINED * extent, strict=True):
             kept = piece[np.r_[True, np.any(np.diff(piece, axis=0) != 0.0, axis=1)]]

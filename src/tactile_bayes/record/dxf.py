@@ -21,6 +21,9 @@ _METRES = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}
 _COARSENESS = 1e-5
 """Largest distance of a curve from its segments, as a share of its size."""
 
+_BEZIERS = 64
+"""Number of Bézier curves for an arc, which then is off by 1e-9 of its radius; a single one by 3e-4."""
+
 
 def curves_in(path: Path) -> tuple[list[Floats], float]:
     """Return the curves of a drawing as polylines, shape (n, 2) each, and the size of its unit in metres, 0 for none.
@@ -66,7 +69,8 @@ def _points_of(curve: Any) -> Floats | None:
         return None
     if curve.dxftype() == "POLYLINE" and not (curve.is_2d_polyline or curve.is_3d_polyline):
         return None
-    way = path.make_path(curve)
+    way = path.make_path(curve, segments=_BEZIERS)
     size = float(np.ptp([(point.x, point.y) for point in way.control_vertices()], axis=0).max())
-    points = np.array([(point.x, point.y) for point in way.flattening(max(_COARSENESS * size, 1e-300))])
+    flat = curve if curve.dxftype() == "SPLINE" else way  # a path holds it coarsely
+    points = np.array([(point.x, point.y) for point in flat.flattening(max(_COARSENESS * size, 1e-300))])
     return points if len(points) > 1 and size > 0.0 else None

@@ -14,7 +14,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.found_rig import found_rig
 from tactile_bayes.record import bases_of, carried_sweeps
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
-from tactile_bayes.report.overlay import put_overlay
+from tactile_bayes.report.overlay import put_overlay, put_overlay_band
 from tactile_bayes.report.wording import Shown, percent, shown_as, spread
 from tactile_bayes.uncertainty.overlay import Overlay
 
@@ -108,7 +108,7 @@ def contour_figure(findings: ContourFindings) -> ContourFigure:
     entries.append(("key-place js-only", "place along x, chosen below or beside"))
 
     off = np.stack([lower - median, upper - median])
-    other = _overlay_offset(findings)
+    other = None if findings.overlay is None else findings.overlay.polyline.height(x, median) - median
     fine = shown_as("contact_x", attrs, off)
     labels = overview.x_label, f"y − median{fine.bracketed}"
     shown = off if other is None else np.stack([*off, np.clip(other, *(_MOST_OFF * np.nanmax(np.abs(off)) * _SIGNS))])
@@ -117,7 +117,8 @@ def contour_figure(findings: ContourFindings) -> ContourFigure:
         detail.stretch(*ends, "gap")
     detail.area(x, off[0], off[1], "band")
     detail.path(x, np.zeros_like(x), "median")
-    if other is not None:
+    if findings.overlay is not None and other is not None:
+        put_overlay_band(detail, findings.overlay, x, median)
         detail.path(x, other, "overlay")
     rule = {"y1": detail.y.end, "y2": detail.y.start, "x1": -20, "x2": -20}
     detail.put(element("line", id="band-rule", class_="rule js-only", **rule))
@@ -148,14 +149,6 @@ def contour_figure(findings: ContourFindings) -> ContourFigure:
         [rows[i] for i in chosen],
         unit,
     )
-
-
-def _overlay_offset(findings: ContourFindings) -> Floats | None:
-    """Return the heights of the overlay above the median."""
-    if findings.overlay is None:
-        return None
-    median = findings.band["median"].values
-    return findings.overlay.polyline.height(findings.band["x"].values, median) - median
 
 
 def _put_contacts(overview: Plot, findings: ContourFindings, x: Floats) -> list[tuple[str, str]]:

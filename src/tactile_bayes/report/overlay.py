@@ -10,7 +10,7 @@ from tactile_bayes.report.drawing import Plot
 from tactile_bayes.report.wording import Shown, Table, percent, shown_as
 from tactile_bayes.uncertainty.overlay import Distance, Overlay, overlay_distance
 
-__all__ = ["DISTANCE_HEADS", "distance_cells", "note_of", "overlay_table", "put_overlay"]
+__all__ = ["DISTANCE_HEADS", "distance_cells", "note_of", "overlay_table", "put_overlay", "put_overlay_band"]
 
 DISTANCE_HEADS = ["rms distance{}", "largest{}", "inside the band"]
 """Heads of `distance_cells`, with places for the unit."""
@@ -24,6 +24,15 @@ def put_overlay(plot: Plot, overlay: Overlay) -> None:
     for piece in overlay.polyline.pieces:
         x, y = _thinned(plot, piece).T
         plot.path(x, y, "overlay")
+
+
+def put_overlay_band(plot: Plot, overlay: Overlay, x: Floats, base: Floats) -> None:
+    """Put the band of another run into a drawing in which y is measured from a contour of heights base at x."""
+    if overlay.band is not None:
+        edges = (overlay.band[part].values for part in ("lower", "upper"))
+        ends = {"left": np.nan, "right": np.nan}
+        lower, upper = (np.interp(x, overlay.band["x"].values, edge, **ends) - base for edge in edges)
+        plot.area(x, lower, upper, "overlay-band")
 
 
 def _thinned(plot: Plot, piece: Floats) -> Floats:
@@ -56,8 +65,8 @@ def overlay_table(band: xr.Dataset, overlay: Overlay) -> Table:
 def note_of(overlay: Overlay, band: xr.Dataset) -> list[str]:
     """Return how the overlay is to be read: its frame, its unit, and whether it covers anything."""
     said = [
-        f"{overlay.name} is drawn in the laboratory frame of the record. Its distance is that of the median, normal to it "
-        "and where both are; “inside the band” is the share of positions x at which it is in the pointwise band."
+        f"{overlay.name} is drawn in the laboratory frame of the record. Distances are of the median, normal to it and "
+        "where both are; “inside the band” is the share of positions x at which it is in the pointwise band."
     ]
     if overlay.is_unit_assumed:
         unit = "metres" if band["x"].attrs.get("units") == "m" else "rod lengths"

@@ -48,6 +48,7 @@ class _Found:
 
     @classmethod
     def of(cls, folder: Path) -> _Found:
+        """Return the results in a folder."""
         posterior = contour_posterior(posterior_in(folder))
         probability = probability_of(posterior)
         contacts = contact_points(record_of(posterior), posterior)
@@ -187,14 +188,14 @@ def _table(
                 link,
                 each.verdict,
                 str(each.posterior.attrs["family"]),
-                *(_interval(each.numbers, *column) for column in columns),
                 fine.text(width[path], 3),
-                f"{float(each.posterior['sample_stats'].attrs['seconds']):.3g}",
                 *(["–"] * len(DISTANCE_HEADS) if is_own else distance_cells(away[path], near)),
+                *(_interval(each.numbers, *column) for column in columns),
+                f"{float(each.posterior['sample_stats'].attrs['seconds']):.3g}",
             ]
         )
-    heads = ["run", "verdict", "family", *(f"{name} [{unit}]" if unit != "1" else name for name, unit in columns)]
-    heads += [f"band{fine.bracketed}", "sampling [s]", *(head.format(near.bracketed) for head in DISTANCE_HEADS)]
+    heads = ["run", "verdict", "family", f"band{fine.bracketed}", *(h.format(near.bracketed) for h in DISTANCE_HEADS)]
+    heads += [*(f"{name} [{unit}]" if unit != "1" else name for name, unit in columns), "sampling [s]"]
     caption = (
         "Estimates are medians with central intervals, widths of bands medians over x; distances are those of the "
         f"median contour from {reference.name}"
@@ -209,7 +210,7 @@ def _interval(numbers: xr.Dataset, name: str, unit: str) -> str:
     row = numbers.sel(quantity=name)
     middle, low, high = (float(row[part]) for part in ("median", "lower", "upper"))
     texts = spread([middle, low, high], high - low)
-    return "{} ({} to {})".format(*texts)
+    return Markup("{} <br>{} to {}").format(*texts)
 
 
 def _address(folder: Path, out: Path) -> str:
