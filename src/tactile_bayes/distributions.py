@@ -23,6 +23,7 @@ from tactile_bayes.errors import ParameterError
 
 __all__ = [
     "KINDS",
+    "UNWRITTEN",
     "Distribution",
     "Kind",
     "all_in_words",
@@ -34,8 +35,10 @@ __all__ = [
     "log_density_of",
     "numbers_of",
     "refuse_unknown_names",
+    "stated_text",
     "support_of",
     "table_of_distribution",
+    "text_or_unwritten",
 ]
 
 _TRIED = 16
@@ -43,6 +46,9 @@ _TRIED = 16
 
 _NARROWEST = 64.0 * float(np.finfo(float).eps)
 """Range of draws over their size up to which they count as one number."""
+
+UNWRITTEN = "not written"
+"""Text of what has a distribution that is none of SciPy's."""
 
 _ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
 
@@ -129,30 +135,7 @@ _NAMES["loguniform"] = "log_uniform"
 def distribution_of_table(
     value: Any, name: str, number: Callable[[Any], float | None] = as_number
 ) -> float | Distribution:
-    """Return what a value of a table states: a number, or a frozen distribution.
-
-    Parameters
-    ----------
-    value : Any
-        A number; { KIND = [numbers] } with a kind of `KINDS`, for a single number { KIND = number }; or
-        { NAME = { argument = number } } with any continuous distribution of `scipy.stats` and its arguments.
-    name : str
-        What it is a value of, for messages.
-    number : callable
-        Return a number of the table; None if it is none.
-
-    Raises
-    ------
-    ParameterError
-        If it states neither.
-
-    Examples
-    --------
-    >>> distribution_of_table(0.3, "friction")
-    0.3
-    >>> in_words(distribution_of_table({"half_normal": 0.3}, "friction"))
-    'halfnorm(0, 0.3)'
-    """
+    """Return what a value of a table states: a number, or a frozen distribution."""
     hint = (
         f"give a number, or a distribution like {{ normal = [0.0, 0.1] }} (there are {', '.join(KINDS)}, and those of "
         "scipy.stats by name, like { beta = { a = 2.0, b = 3.0 } })"
@@ -195,18 +178,7 @@ def _of_scipy(
 
 
 def table_of_distribution(value: float | Distribution) -> Any:
-    """Return the value of a table that states a number or a distribution, as `distribution_of_table` takes it.
-
-    Raises
-    ------
-    ParameterError
-        If a distribution is none of SciPy with numbers.
-
-    Examples
-    --------
-    >>> table_of_distribution(stats.lognorm(s=0.5, scale=2.0)), table_of_distribution(0.3)
-    ({'log_normal': [2.0, 0.5]}, 0.3)
-    """
+    """Return the value of a table that states a number or a distribution, as `distribution_of_table` takes it."""
     plain = as_number(value)
     if plain is not None:
         return plain
@@ -223,6 +195,23 @@ def table_of_distribution(value: float | Distribution) -> Any:
 
 _USUAL = {("loc", 0.0), ("scale", 1.0)}
 """Numbers of a distribution that need no mention."""
+
+
+def text_or_unwritten(text: Callable[[], str]) -> str:
+    """Return a text, or "not written" if a distribution in it is none of SciPy's."""
+    try:
+        return text()
+    except ParameterError:
+        return UNWRITTEN
+
+
+def stated_text(attrs: Mapping[Any, Any], entry: str) -> str:
+    """Return the text of `text_or_unwritten` in the attributes of a posterior, or refuse one that is not written."""
+    text = attrs.get(entry, UNWRITTEN)
+    if not isinstance(text, str) or text == UNWRITTEN:
+        what = entry.partition("_")[0]
+        raise ParameterError(f"the posterior does not state its {what}, as a distribution of it is none of SciPy's")
+    return text
 
 
 def is_finite_number(value: Any) -> bool:
@@ -286,13 +275,7 @@ class _Newer:
 
 
 def check_distribution(parameter: str, distribution: Any) -> None:
-    """Refuse what is no distribution, or has no density.
-
-    Raises
-    ------
-    ParameterError
-        If it is none; the message names the parameter.
-    """
+    """Refuse what is no distribution, or has no density."""
     if not isinstance(distribution, Distribution) or isinstance(distribution, stats.rv_continuous):
         correction = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
         raise ParameterError(f"the prior of {parameter} is {shown(distribution)}: {correction}")
@@ -332,13 +315,7 @@ def _no_width(value: float) -> str:
 
 
 def refuse_unknown_names(given: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
-    """Refuse distributions by names that are no parameters.
-
-    Raises
-    ------
-    ParameterError
-        If there are such names.
-    """
+    """Refuse distributions by names that are no parameters."""
     unknown = sorted(set(given) - set(names))
     if unknown:
         raise ParameterError(
@@ -351,11 +328,6 @@ def numbers_of(distribution: Any) -> dict[str, Any]:
     """Return shapes, loc and scale of a frozen distribution of scipy.stats by name, however they were given.
 
     {} for an object of another kind.
-
-    Examples
-    --------
-    >>> numbers_of(stats.lognorm(0.5, scale=2.0))
-    {'s': 0.5, 'loc': 0, 'scale': 2.0}
     """
     of_scipy = getattr(distribution, "dist", None)
     if not isinstance(of_scipy, stats.rv_continuous):
@@ -372,13 +344,7 @@ def support_of(distribution: Distribution) -> tuple[float, float]:
 
 
 def in_words(distribution: Distribution) -> str:
-    """Return a distribution as text, the same however its numbers were given: its identity.
-
-    Examples
-    --------
-    >>> in_words(stats.norm(scale=0.1)), in_words(stats.lognorm(0.5, scale=2.0))
-    ('norm(0, 0.1)', 'lognorm(s=0.5, scale=2)')
-    """
+    """Return a distribution as text, the same however its numbers were given: its identity."""
     of_scipy = getattr(distribution, "dist", None)
     if isinstance(of_scipy, stats.rv_histogram):
         counts, edges = of_scipy._histogram  # type: ignore[attr-defined]

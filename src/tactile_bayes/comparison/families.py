@@ -233,13 +233,7 @@ def _ceiling(model: ContourModel, walk: Walk) -> float:
 
 
 def checked_families(families: Sequence[Family | str]) -> list[Family]:
-    """Return the families that are to be compared.
-
-    Raises
-    ------
-    ParameterError
-        If they are fewer than two different ones, or unknown.
-    """
+    """Return the families that are to be compared."""
     if isinstance(families, str | Family):
         raise ParameterError(f"families is {families!r}: give several, like ['parabola', {families!r}]")
     listed: Any = families.tolist() if isinstance(families, np.ndarray) else families

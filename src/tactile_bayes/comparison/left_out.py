@@ -41,11 +41,6 @@ def predicted_samples(
     There the record without a sample allows contours that would have been touched later, or let go earlier, of which
     the posterior has none: these samples are predicted from a posterior that is inferred again without any of them,
     weighted by the likelihood of all of them except one.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If an interrupt ends the sampling without these samples.
     """
     model = problem.model
     logs = _densities(model, sampled.draws)

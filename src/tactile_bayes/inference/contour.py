@@ -28,7 +28,8 @@ from tactile_bayes.inference.result import provenance
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
 from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
 from tactile_bayes.reconstruction import CONTACT_SIDES
-from tactile_bayes.rig.rig import Rig, expanded, rig_of
+from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.rig.unknown import expanded
 
 __all__ = ["Sampled", "calibrate_rig", "contours_of", "infer_contour", "rig_posterior", "sampled"]
 
@@ -271,23 +272,7 @@ def sampled(
     walk: Walk | None = None,
     with_prior: bool = True,
 ) -> Sampled:
-    """Return the posterior of a problem.
-
-    Parameters
-    ----------
-    problem : ContourProblem
-    seed, settings, checkpoint, progress, keep
-        As in `infer_contour`.
-    walk : Walk, optional
-        Start and coordinates of the walkers, in place of those from a search for the optimum.
-    with_prior : bool
-        Whether the result has a group of draws from the prior.
-
-    Raises
-    ------
-    InferenceError, ReachError
-        As in `infer_contour`.
-    """
+    """Return the posterior of a problem."""
     seeds = spawn(seed, 4)
     deadline = Deadline.after(settings.max_seconds)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another

@@ -92,23 +92,6 @@ def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -
     ``compliance``       half-normal(R/4) [mm]                  the suspension is stiffer than the rod
     ``noise_sd``         log-uniform, 1e-6 to 1 full scale      only that there is some noise is known
     ===================  =====================================  ====================================================
-
-    Parameters
-    ----------
-    axial, lateral : array_like
-        Probe points [mm].
-    full_scale : float
-        A reading that the sensor hardly exceeds [units of the reading].
-
-    Returns
-    -------
-    dict of str to frozen scipy.stats distribution
-
-    Examples
-    --------
-    >>> priors = default_priors([10.0, 40.0], [5.0, 30.0], full_scale=1000.0)
-    >>> priors["clamp_axial"].std()
-    np.float64(12.5)
     """
     scale = _reach(np.asarray(axial, dtype=float), np.asarray(lateral, dtype=float)) / 4.0
     return {

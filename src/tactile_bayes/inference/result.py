@@ -103,13 +103,7 @@ def _versions() -> str:
 
 
 def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
-    """Return the posterior group of a result, or the dataset if it is one already.
-
-    Raises
-    ------
-    InferenceError
-        If the tree has no such group, or a draw of a parameter is not a finite number.
-    """
+    """Return the posterior group of a result, or the dataset if it is one already."""
     draws = result if isinstance(result, xr.Dataset) else _posterior_group(result)
     for name, values in draws.data_vars.items():
         if set(values.dims) == {"chain", "draw"} and values.dtype.kind == "f":
@@ -298,13 +292,7 @@ def to_arviz(posterior: xr.DataTree) -> Any:
 
 
 def known_of(attrs: Mapping[Any, Any]) -> dict[str, float]:
-    """Return the known parameters that a posterior's attributes state: of the contour, and of the rig if not as stated.
-
-    Raises
-    ------
-    InferenceError
-        If they do not state them.
-    """
+    """Return the known parameters that attributes state: of the contour, and of the rig if not as stated."""
     if "known" not in attrs:
         raise InferenceError("the posterior does not state what was known: infer it again")
     known: dict[str, float] = read_json(attrs["known"], "known")

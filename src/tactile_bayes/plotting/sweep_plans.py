@@ -255,13 +255,7 @@ def noise_shares(
 
 
 def _of_sweep(found: xr.Dataset, sweep: int) -> xr.Dataset:
-    """Return the samples of a sweep in the order of the drive angle.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such sweep.
-    """
+    """Return the samples of a sweep in the order of the drive angle."""
     numbers = found["sweep"].values
     is_number = isinstance(sweep, int | np.integer) and not isinstance(sweep, bool)
     here = np.flatnonzero(numbers == sweep) if is_number else np.arange(0)

@@ -46,38 +46,6 @@ def run_tasks(
     A process that dies (killed, out of memory) is replaced, and its task is repeated. The result of a task must not
     depend on where or when it is computed. Each task runs on one thread. Processes end with the
     iterator, and with this process, however it ends; only this process receives Ctrl-C.
-
-    Parameters
-    ----------
-    function : callable
-        Function of one task; for processes and clusters a function of a module, not a local one.
-    tasks : sequence
-        Tasks; small objects, since they are sent to other processes.
-    workers : int, optional
-        Number of processes on this machine; by default one for each core that this process may use. With 1 all tasks
-        run in this process. Each process begins by importing the script that is run: code that starts processes
-        belongs under `if __name__ == "__main__":`.
-    scheduler : str, optional
-        Address of a Dask scheduler, such as "tcp://10.0.0.1:8786", in place of `workers`. Its workers need this
-        package in the same version; tasks wait as long as there are no workers.
-
-    Yields
-    ------
-    (task, result)
-
-    Raises
-    ------
-    ParameterError
-        If `workers` is not a positive number; if a scheduler is given and Dask is not installed, or the scheduler does
-        not answer in ten seconds.
-    TaskError
-        If processes die repeatedly over a task, or cannot start, or the scheduler is lost. An exception of a task
-        itself is raised here too.
-
-    Examples
-    --------
-    >>> sorted(run_tasks(abs, [-1, 2], workers=1))
-    [(-1, 1), (2, 2)]
     """
     check_pool(workers, scheduler)
     if scheduler is not None:

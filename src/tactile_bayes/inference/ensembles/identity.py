@@ -32,13 +32,7 @@ def identity_of_run(
     settings: SamplerSettings,
     coordinates: Coordinates,
 ) -> dict[str, str]:
-    """Return all that determines the draws: the caller's identity of the log-probability, and the sampler's entries.
-
-    Raises
-    ------
-    ParameterError
-        If the caller's identity holds anything but strings, or a name of the sampler.
-    """
+    """Return all that determines the draws: the caller's identity of the log-probability, and the sampler's entries."""
     chains, walkers, _ = start.shape
     entries = {} if identity is None else dict(identity)
     rest = {

@@ -131,7 +131,7 @@ def sample(
     Examples
     --------
     >>> start = np.random.default_rng(1).normal(size=(4, 32, 1))
-    >>> draws = sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], rng=2)
+    >>> draws = sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], seed=2)
     >>> draws.converged, draws.samples.shape[0]
     (True, 4)
     """

@@ -44,15 +44,7 @@ def first_random_state(seed: np.random.SeedSequence) -> RandomState:
 
 
 def checked_start(start: ArrayLike, names: Sequence[str], settings: SamplerSettings) -> Floats:
-    """Return starting points, shape (ensembles, walkers, parameters), and refuse unsuitable ones.
-
-    Raises
-    ------
-    ParameterError
-        If the shape does not agree with names and settings, or there are too few walkers.
-    InferenceError
-        If a number is not finite, or the walkers of an ensemble lie in a plane.
-    """
+    """Return starting points, shape (ensembles, walkers, parameters), and refuse unsuitable ones."""
     points = np.array(start, dtype=float)
     if points.ndim != 3 or points.shape[0] != settings.ensembles or points.shape[2] != len(names):
         raise ParameterError(
@@ -87,38 +79,7 @@ def scatter_walkers(
 ) -> Floats:
     """Return starting points for `sample`: random points, redrawn until each has a finite log-probability.
 
-    Parameters
-    ----------
-    log_probability : callable
-        The target, as for `sample`.
-    draw : callable
-        Function from a random generator and n to n points (n, parameters), scattered more widely than the posterior:
-        draws from the prior, or from a widened normal approximation.
-    parameters : int
-        Number of parameters.
-    seed : int or numpy.random.SeedSequence
-        Seed, from which each ensemble has its own stream.
-    settings : SamplerSettings, optional
-        Numbers of ensembles and walkers.
-    max_rounds : int
-        Largest mean number of points drawn for each walker.
-
-    Returns
-    -------
-    ndarray, shape (ensembles, walkers, parameters)
-
-    Raises
-    ------
-    InferenceError
-        If too few points lie inside the support.
-
-    Examples
-    --------
-    >>> def log_probability(x):
-    ...     return np.where(x[:, 0] > 0, -x[:, 0], -np.inf)
-    >>> start = scatter_walkers(log_probability, lambda rng, n: rng.normal(size=(n, 1)), parameters=1, rng=1)
-    >>> start.shape, bool(np.all(start > 0))
-    ((4, 48, 1), True)
+    Returns shape (ensembles, walkers, parameters).
     """
     settings = SamplerSettings() if settings is None else settings
     walkers = settings.walkers_for(parameters)

@@ -433,13 +433,7 @@ def _weighted_quantiles(values: Floats, weights: Floats) -> Floats:
 
 
 def _continued(record: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
-    """Return a record with new samples behind its own.
-
-    Raises
-    ------
-    RecordError
-        If the new samples do not continue the record.
-    """
+    """Return a record with new samples behind its own."""
     new = validate(samples)
     for name in sorted({*record.attrs, *new.attrs}, key=str):
         one, other = record.attrs.get(name), new.attrs.get(name)
