@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_mapping, check_optional
+from tactile_bayes.checks import check_mapping, check_optional, check_switch
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import check_dataset, check_drawing, single_axes
 from tactile_bayes.plotting.labels import LABELS, set_unit
@@ -66,6 +66,7 @@ def overlaid(
     '$y$ − one [$L$]'
     """
     check_drawing(ax)
+    check_switch("enlarged", enlarged)
     check_optional("overlay", overlay, Overlay, "give what read_overlay returned")
     for name, found in (("bands", bands), ("contacts", contacts)):
         check_mapping(name, found, "give datasets by the name of the run")

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_kind, check_path
+from tactile_bayes.checks import check_kind, check_optional, check_path, check_switch
 from tactile_bayes.contours.polyline import Polyline
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import read_result
@@ -46,6 +46,12 @@ class Overlay:
     polyline: Polyline
     band: xr.Dataset | None = None
     is_unit_assumed: bool = False
+
+    def __post_init__(self) -> None:
+        check_kind("name", self.name, str, "give a text")
+        check_kind("polyline", self.polyline, Polyline, "give a Polyline")
+        check_optional("band", self.band, xr.Dataset, "give what contour_band returned")
+        check_switch("is_unit_assumed", self.is_unit_assumed)
 
     @classmethod
     def of_band(cls, name: str, band: xr.Dataset) -> Overlay:
