@@ -582,6 +582,7 @@ def required():
     """Values of required parameters, by name."""
     contours = [{"family": "parabola", "a": 0.6, "q": 0.5}]
     return {
+        "bands": {},
         "axial": np.linspace(0.1, 0.2, 12),
         "contour": tb.contours.Circle(0.5, 0.5),
         "families": ["parabola", "circle"],
@@ -590,9 +591,11 @@ def required():
         "known": "parabola",
         "lateral": np.linspace(0.01, 0.02, 12),
         "measured": measured(),
+        "name": "part",
         "number": 0,
         "parameters": {"r": 0.5, "q": 0.5},
         "path": pathlib.Path(__file__).parents[1] / "data" / "synthetic" / "rig.csv",
+        "polyline": tb.contours.Polyline([[(0.0, 0.0), (1.0, 0.0)]]),
         "posterior": posterior_with_prior(),
         "predicted": [[[0.1, 0.1, 0.1]]],
         "reading": np.linspace(1.0, 2.0, 12),

@@ -63,7 +63,7 @@ def test_json_for_scripts(folder, tmp_path, monkeypatch):
     out = tmp_path / "page.html"
 
     def write(run, path, **options):
-        assert run == folder
+        assert run == [folder]
         path.write_text("a page", encoding="utf-8")
         return path
 

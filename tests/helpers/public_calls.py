@@ -255,6 +255,9 @@ def _contour_calls() -> dict[str, Call]:
             },
         ),
         "contours.from_points": Call(c.from_points, {"x": at, "y": 0.5 + 0.5 * at**2, "scatter": None}),
+        "contours.Polyline": Call(c.Polyline, {"pieces": [[(0.0, 0.0), (1.0, 0.0)]]}),
+        "contours.Polyline.distance": Call(c.Polyline([[(0, 0), (1, 0)]]).distance, {"x": at, "y": at}),
+        "contours.Polyline.height": Call(c.Polyline([[(0, 0), (1, 0)]]).height, {"x": at, "near": at}),
         "contours.paper_profile": Call(c.paper_profile, {"name": "II", "q": 0.5}),
     }
     for name, contour in CONTOURS.items():
@@ -417,7 +420,7 @@ def _record_calls(folder: Path) -> dict[str, Call]:
         "datasets.verify": Call(tb.datasets.verify, {"path": _data_set(folder), "regenerate": 0, "progress": None}),
         "write_report": Call(
             tb.write_report,
-            {"run": folder, "out": folder / "report.html", "compare": None, "progress": None},
+            {"run": folder, "out": folder / "report.html", "compare": None, "overlay": None, "progress": None},
         ),
     }
 
@@ -732,6 +735,10 @@ def _figure_calls(folder: Path) -> dict[str, Call]:
         ),
         "plotting.observables": Call(
             p.observables, {"record": scanned().record, "events": scanned().events, "axes": None}
+        ),
+        "plotting.overlaid": Call(
+            p.overlaid,
+            {"bands": {"one": band()}, "contacts": {"one": contacts()}, "overlay": None, "enlarged": False, "ax": None},
         ),
         "plotting.pairs": Call(
             p.pairs, {"posterior": posterior(), "names": ["a", "q"], "truth": {"a": 0.5}, "axes": None}

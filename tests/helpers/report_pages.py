@@ -112,7 +112,7 @@ class Page(HTMLParser):
     def handle_data(self, data):
         for tag in set(self.open):
             self.texts[tag][-1] += data
-        if self.open and self.open[-1] in ("td", "th"):
+        if self.open and [tag for tag in self.open if tag != "a"][-1] in ("td", "th"):
             self.tables[-1][1][-1][-1] += data
         elif "caption" in self.open:
             caption, rows = self.tables[-1]

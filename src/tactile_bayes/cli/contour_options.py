@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tactile_bayes.contours import Contour
+    from tactile_bayes.mechanics.rods.rod import Rod
 
 __all__ = ["ContourOptions", "GaugeOptions"]
 
@@ -46,13 +47,14 @@ class ContourOptions:
     points: Annotated[
         Path | None,
         typer.Option(
-            help="In place of both, measured points of a contour: a CSV file of x and y [m, or L], which may scatter.",
+            help="In place of both, measured points of a contour, which may scatter: a CSV file of x and y, with units "
+            "in their names, like x [mm], or in m, or L; or a DXF drawing.",
             dir_okay=False,
         ),
     ] = None
 
-    def contour(self, rod_length: float) -> Contour:
-        """Return the contour that the options choose, scaled to the rod's length.
+    def contour(self, rod: Rod) -> Contour:
+        """Return the contour that the options choose, in the unit of the rod and scaled to its length.
 
         Raises
         ------
@@ -61,9 +63,12 @@ class ContourOptions:
         ContourError
             If there is no such contour.
         """
+        import numpy as np
+
         from tactile_bayes.contours import from_points, paper_profile
         from tactile_bayes.errors import ParameterError
         from tactile_bayes.planning.family_parameters import enlarged
+        from tactile_bayes.record.points import read_points
 
         of_profile = self.profile is not None or self.distance is not None
         if of_profile + (self.family is not None) + (self.points is not None) > 1:
@@ -73,11 +78,12 @@ class ContourOptions:
         if self.parameter and self.family is None:
             raise ParameterError("--parameter is for a --family: give one, like --family parabola")
         if self.points is not None:
-            return from_points(*_read_points(self.points))
+            points = read_points(self.points).in_unit("1" if rod.is_dimensionless else "m", str(self.points))
+            return from_points(*np.concatenate(points).T)
         if self.family is not None:
             return _of_family(self.family, self.parameter)
         return enlarged(
-            paper_profile(self.profile or "II", q=0.5 if self.distance is None else self.distance), rod_length
+            paper_profile(self.profile or "II", q=0.5 if self.distance is None else self.distance), rod.length
         )
 
 
@@ -126,41 +132,3 @@ def _of_family(name: str, options: Sequence[str] | None) -> Contour:
         like = " ".join(f"--parameter {parameter}=..." for parameter in absent)
         raise ParameterError(f"--family {name} takes {', '.join(family.parameters)}: give {like} as well")
     return family.contour(values)
-
-
-def _read_points(path: Path) -> tuple[list[float], list[float]]:
-    """Read the columns x and y of a file, or its first two; the first line may hold their names."""
-    import csv
-
-    from tactile_bayes.errors import ParameterError
-
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        lines = [line for line in file if line.strip() and not line.lstrip().startswith("#")]
-    sample = "".join(lines[:2])
-    delimiter = next((mark for mark in ";\t," if mark in sample), " ")
-    rows = [
-        [cell.strip() for cell in row]
-        for row in csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
-    ]
-    places = (0, 1)
-    if rows and _pair(rows[0], places, delimiter) is None:
-        names = [name.lower().partition("[")[0].strip() for name in rows[0]]
-        if "x" in names and "y" in names:
-            places = (names.index("x"), names.index("y"))
-        rows = rows[1:]
-    pairs: list[Any] = [_pair(row, places, delimiter) for row in rows]
-    if not pairs:
-        raise ParameterError(f"{path}: there are no points in it: give lines of x and y, like 0.1,0.52")
-    if None in pairs:
-        bad = rows[pairs.index(None)]
-        raise ParameterError(f"{path}: {delimiter.join(bad)!r} is no point: give x and y, like 0.1,0.52")
-    return [x for x, _ in pairs], [y for _, y in pairs]
-
-
-def _pair(row: Sequence[str], places: tuple[int, int], delimiter: str) -> tuple[float, float] | None:
-    cells = [row[place] if place < len(row) else "" for place in places]
-    try:
-        one, two = (float(cell if delimiter == "," else cell.replace(",", ".")) for cell in cells)
-    except ValueError:
-        return None
-    return one, two

@@ -1,4 +1,4 @@
-"""The command `report`: the results of a run as one page."""
+"""The command `report`: the results of a run, or of several, as one page."""
 
 from __future__ import annotations
 
@@ -17,11 +17,16 @@ __all__ = ["report"]
 def report(
     *,
     run: Annotated[
-        Path, typer.Argument(help="Folder of a run of infer."), Reads(("posterior.nc", "trust.nc", "comparison.nc"))
+        list[Path],
+        typer.Argument(help="Folder of a run of infer; or a folder of several, or several: then side by side."),
+        Reads(("posterior.nc", "trust.nc", "comparison.nc", "runs.nc", "*/posterior.nc")),
     ],
     out: Annotated[
         Path | None,
-        typer.Option(help="File for the page; report.html in that folder if left out.", dir_okay=False),
+        typer.Option(
+            help="File for the page; report.html in that folder if left out, which only one folder allows.",
+            dir_okay=False,
+        ),
         Writes(),
     ] = None,
     compare: Annotated[
@@ -29,13 +34,24 @@ def report(
         typer.Option(help="Folder of a run of compare on the same record; the run's own if left out.", file_okay=False),
         Reads(("comparison.nc",)),
     ] = None,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(
+            help="Another run, or a true contour, to lay over it, with the distance in the table: a folder of infer, a "
+            "CSV file of x and y with units in their names, like x [mm], or a DXF drawing, in the laboratory frame."
+        ),
+        Reads(("posterior.nc",)),
+    ] = None,
     output: Output,
 ) -> Answer:
-    """Write a page on a run: its results, how far to trust them, the readings, and how to reproduce it."""
+    """Write a page on a run: its results, how far to trust them, the readings, and how to reproduce it.
+
+    Of several runs the page shows the results side by side, and the contours over each other.
+    """
     with step_bar(output.is_silent) as show:
         from tactile_bayes.report import write_report
 
-        path = write_report(run, out, compare=compare, progress=show)
+        path = write_report(run, out, compare=compare, overlay=overlay, progress=show)
     size = path.stat().st_size
     words = str(path) if output.quiet else f"{path} ({size / 1e3:.0f} kB): open it in a browser; it needs no network."
     return Answer([words], lambda: {"report": path, "bytes": size})

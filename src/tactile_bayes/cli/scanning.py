@@ -66,7 +66,7 @@ def scan(
         rod = stated.known_rod
         drives = drive.drives([] if drive.carry and not base else pivots_in(base))
         made = sweep(
-            choice.contour(rod.length),
+            choice.contour(rod),
             stated,
             drive=drives,
             direction=direction,

@@ -8,6 +8,7 @@ from tactile_bayes.contours.oval import Circle, Ellipse
 from tactile_bayes.contours.paper import paper_profile
 from tactile_bayes.contours.parabola import Parabola
 from tactile_bayes.contours.points import MeasuredContour, from_points
+from tactile_bayes.contours.polyline import Polyline
 from tactile_bayes.contours.power_law import PowerLaw
 from tactile_bayes.contours.shape_free import ShapeFree
 from tactile_bayes.contours.smooth import Smooth
@@ -21,6 +22,7 @@ __all__ = [
     "Locus",
     "MeasuredContour",
     "Parabola",
+    "Polyline",
     "PowerLaw",
     "ShapeFree",
     "Single",

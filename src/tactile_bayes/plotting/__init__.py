@@ -15,6 +15,7 @@ from tactile_bayes.plotting.error_lines import error_map
 from tactile_bayes.plotting.family_bars import families
 from tactile_bayes.plotting.inspection_panels import inspection
 from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.overlaid import overlaid
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.reach_map import posterior_contours, prior_contours
 from tactile_bayes.plotting.records import observables, predictive
@@ -43,6 +44,7 @@ __all__ = [
     "inspection",
     "noise_shares",
     "observables",
+    "overlaid",
     "pairs",
     "posterior_contours",
     "predictive",

@@ -3,6 +3,7 @@
 from tactile_bayes.record.files import write_record
 from tactile_bayes.record.frame import frame_of, in_frame, turned
 from tactile_bayes.record.identity import record_hash
+from tactile_bayes.record.points import read_points
 from tactile_bayes.record.positions import means_of_positions, positions_of
 from tactile_bayes.record.schema import (
     CHANNELS,
@@ -38,6 +39,7 @@ __all__ = [
     "means_of_positions",
     "positions_of",
     "present_channels",
+    "read_points",
     "record_hash",
     "rod_of",
     "rows_of_sweeps",

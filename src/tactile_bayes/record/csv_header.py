@@ -20,7 +20,17 @@ from tactile_bayes.record.spelling import visible
 from tactile_bayes.record.table import Source
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["FORMAT", "KINDS", "Header", "cells_in", "column_line", "header_line", "lines_below", "read_header"]
+__all__ = [
+    "FORMAT",
+    "KINDS",
+    "Header",
+    "cells_in",
+    "column_described",
+    "column_line",
+    "header_line",
+    "lines_below",
+    "read_header",
+]
 
 FORMAT = 1
 KINDS = {"i": "integer", "f": "number", "U": "text", "O": "text"}
@@ -228,6 +238,12 @@ def _unquoted(text: str) -> str:
         return str(read_json(text, "the text")) if re.fullmatch(_QUOTED, text) else text
     except ParameterError:
         return text
+
+
+def column_described(line: str) -> tuple[str, str] | None:
+    """Return the name and the unit that a commented line states of a column, if it does."""
+    match = _COLUMN_LINE.fullmatch(_unpadded(line[1:])) if line.startswith("#") else None
+    return (_unquoted(match["name"]), _unquoted(match["units"])) if match and match["units"] is not None else None
 
 
 def lines_below(file: BinaryIO) -> list[str]:

@@ -30,6 +30,7 @@ __all__ = [
     "meant_kinds",
     "origins_of",
     "renamed",
+    "stem_and_unit",
     "with_origin",
 ]
 
@@ -123,7 +124,7 @@ def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source)
     names = list(names)
     origins = {target: _origin(target, str(text), names, source) for target, text in columns.items()}
     for name in names:
-        stem, unit = _stem_and_unit(name)
+        stem, unit = stem_and_unit(name)
         if stem in MEASURED and unit is not None and stem not in names and stem not in origins:
             origins[stem] = Origin(name, unit)
     used = {origin.column for origin in origins.values()}
@@ -138,7 +139,7 @@ def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source)
 def any_meant(columns: Mapping[str, str], names: Iterable[str]) -> bool:
     """Return whether any of these columns belongs to a record, by its own name or by a given origin."""
     names = list(names)
-    if any(_stem_and_unit(name)[0] in MEASURED for name in names):
+    if any(stem_and_unit(name)[0] in MEASURED for name in names):
         return True
     texts = [plain(str(text)).strip() for text in columns.values()]
     named = [text for text in texts if not (_VALUE.fullmatch(text) or text in DIRECTIONS)]
@@ -188,7 +189,7 @@ def renamed(table: Table, columns: Mapping[str, str]) -> Table:
 def _of_file(origin: Origin, unit: Any) -> str:
     """Return an origin as text for an attribute, with the unit of the file, and as a name that `read_record` takes."""
     assert origin.column is not None
-    is_stated = origin.unit is None or _stem_and_unit(origin.column)[1] is not None
+    is_stated = origin.unit is None or stem_and_unit(origin.column)[1] is not None
     column = origin.column if is_stated else f"{origin.column}[{origin.unit}]"
     return json.dumps(asdict(replace(origin, column=column, unit=unit)))
 
@@ -282,7 +283,7 @@ def found_column(text: str, names: list[str]) -> str | None:
     """Find the column that a text names, regardless of blanks; a unit in its name may be left out."""
     if text in names:
         return text
-    for form in (str, lambda name: _stem_and_unit(name)[0]):
+    for form in (str, lambda name: stem_and_unit(name)[0]):
         same = [name for name in names if _compact(form(name)) == _compact(text)]
         if len(same) == 1:
             return same[0]
@@ -307,7 +308,7 @@ def _checked(target: str, column: Column, origin: Origin, is_whole: bool, text: 
     if not 0.0 < origin.factor < math.inf:
         raise ParameterError(f"columns: {text!r} is given for {target!r}: give a factor above zero, like 1e-3*Fx[N]")
     assert origin.column is not None
-    _, in_name = _stem_and_unit(origin.column)
+    _, in_name = stem_and_unit(origin.column)
     if in_name is None:
         in_name = _ending(origin.column, column)
     if origin.unit is None:
@@ -335,7 +336,7 @@ def _ending(name: str, column: Column) -> str | None:
     return ending if is_unit and ending != name else None
 
 
-def _stem_and_unit(name: str) -> tuple[str, str | None]:
+def stem_and_unit(name: str) -> tuple[str, str | None]:
     """Split a name into stem and unit; any content of square brackets counts as a unit."""
     match = _UNIT_IN_NAME.fullmatch(name)
     if match is None:

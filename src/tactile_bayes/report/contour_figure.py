@@ -14,13 +14,18 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.found_rig import found_rig
 from tactile_bayes.record import bases_of, carried_sweeps
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
+from tactile_bayes.report.overlay import put_overlay, put_overlay_band
 from tactile_bayes.report.wording import Shown, percent, shown_as, spread
+from tactile_bayes.uncertainty.overlay import Overlay
 
 __all__ = ["ContourFigure", "ContourFindings", "contour_figure", "gap_ends"]
 
 _DETAIL_HEIGHT = 230.0
 
 _TABLED = 21
+
+_MOST_OFF, _SIGNS = 5.0, np.array([-1.0, 1.0])
+"""Half widths of the band to which an overlay extends the enlarged drawing, which it may leave."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,8 @@ class ContourFindings:
         The gap; None if there are sweeps in one direction only.
     probability : float
         Probability of bands and intervals.
+    overlay : Overlay or None
+        Another contour, laid over it.
     """
 
     posterior: xr.DataTree
@@ -49,6 +56,7 @@ class ContourFindings:
     band: xr.Dataset
     edges: xr.Dataset | None
     probability: float
+    overlay: Overlay | None
 
 
 class ContourFigure(NamedTuple):
@@ -89,6 +97,9 @@ def contour_figure(findings: ContourFindings) -> ContourFigure:
     overview.area(x, lower, upper, "band")
     overview.path(x, median, "median")
     entries += _put_contacts(overview, findings, x)
+    if findings.overlay is not None:
+        put_overlay(overview, findings.overlay)
+        entries.append(("key-overlay", findings.overlay.name))
     overview.put_pivots(bases)
     word = "base, at the beginning" if carried_sweeps(findings.record) else "pivot" if len(bases) == 1 else "pivots"
     entries.append(("key-pivot", word))
@@ -97,13 +108,18 @@ def contour_figure(findings: ContourFindings) -> ContourFigure:
     entries.append(("key-place js-only", "place along x, chosen below or beside"))
 
     off = np.stack([lower - median, upper - median])
+    other = None if findings.overlay is None else findings.overlay.polyline.height(x, median) - median
     fine = shown_as("contact_x", attrs, off)
     labels = overview.x_label, f"y − median{fine.bracketed}"
-    detail = Plot.around(x, off, labels, _DETAIL_HEIGHT, (unit.power, fine.power))
+    shown = off if other is None else np.stack([*off, np.clip(other, *(_MOST_OFF * np.nanmax(np.abs(off)) * _SIGNS))])
+    detail = Plot.around(x, shown, labels, _DETAIL_HEIGHT, (unit.power, fine.power))
     if ends:
         detail.stretch(*ends, "gap")
     detail.area(x, off[0], off[1], "band")
     detail.path(x, np.zeros_like(x), "median")
+    if findings.overlay is not None and other is not None:
+        put_overlay_band(detail, findings.overlay, x, median)
+        detail.path(x, other, "overlay")
     rule = {"y1": detail.y.end, "y2": detail.y.start, "x1": -20, "x2": -20}
     detail.put(element("line", id="band-rule", class_="rule js-only", **rule))
 

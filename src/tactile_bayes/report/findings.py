@@ -22,10 +22,11 @@ from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.report.contour_figure import ContourFindings
 from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.overlay import read_overlay
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
-__all__ = ["FINDING_STEPS", "Findings", "findings_of"]
+__all__ = ["FINDING_STEPS", "Findings", "contour_posterior", "findings_of", "probability_of"]
 
 FINDING_STEPS = 4
 """Number of steps that `findings_of` reports: posterior, contacts, check, and all the rest."""
@@ -80,7 +81,10 @@ class Findings(ContourFindings):
 
 
 def findings_of(
-    run: Path, compare: Path | None = None, progress: Callable[[int], object] = lambda done: None
+    run: Path,
+    compare: Path | None = None,
+    progress: Callable[[int], object] = lambda done: None,
+    overlay: Path | None = None,
 ) -> Findings:
     """Read a run, and compute the content of its report.
 
@@ -95,6 +99,8 @@ def findings_of(
         Folder of a comparison of families; by default `run`, if it holds a comparison that states its record.
     progress : callable
         Called with the number of steps done, of `FINDING_STEPS`.
+    overlay : Path, optional
+        Folder of another run, or file of points, as `read_overlay` takes it.
 
     Raises
     ------
@@ -103,11 +109,12 @@ def findings_of(
     """
     path = posterior_in(run)
     content = path.read_bytes()
-    posterior = _contour_posterior(path)
+    posterior = contour_posterior(path)
     record = record_of(posterior)
     comparison = _comparison_in(run, compare, str(posterior.attrs["data_sha256"]))
     trust = _trust_in(run, posterior)
-    probability = float(posterior.attrs.get("probability", _USUAL))
+    probability = probability_of(posterior)
+    other = None if overlay is None else read_overlay(overlay, posterior, probability)
     progress(1)
     contacts = contact_points(record, posterior)
     progress(2)
@@ -136,12 +143,18 @@ def findings_of(
         posterior_sha256=hashlib.sha256(content).hexdigest(),
         record_sha256=record_hash(record),
         probability=probability,
+        overlay=other,
     )
     progress(FINDING_STEPS)
     return found
 
 
-def _contour_posterior(path: Path) -> xr.DataTree:
+def probability_of(posterior: xr.DataTree) -> float:
+    """Return the probability of bands and intervals of a run."""
+    return float(posterior.attrs.get("probability", _USUAL))
+
+
+def contour_posterior(path: Path) -> xr.DataTree:
     """Read a result of `infer_contour`, and refuse anything else."""
     posterior = read_result(path)
     lacks = [name for name in _GROUPS if name not in posterior.children]

@@ -14,6 +14,7 @@ from tactile_bayes.report.contour_figure import contour_figure, gap_ends
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.frames import motion_of
 from tactile_bayes.report.meanings import FORMULAS, is_direction, meaning_of
+from tactile_bayes.report.overlay import note_of, overlay_table
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
 from tactile_bayes.report.trust import check_messages, check_table, contacts_messages, convergence, trust_tables
@@ -48,6 +49,8 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "band_table": Table(
             f"The band at some positions{contour.unit.bracketed}", ["x", "lower", "median", "upper"], contour.rows, 0
         ),
+        "overlay": findings.overlay and overlay_table(findings.band, findings.overlay),
+        "overlay_notes": [] if findings.overlay is None else note_of(findings.overlay, findings.band),
         "gap": _gap_messages(findings),
         "shapes": _shapes(findings.comparison),
         "parameters": _parameters(findings, mute=True),

@@ -6,7 +6,7 @@ import base64
 import hashlib
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,11 @@ from typing import Any
 from markupsafe import Markup
 
 from tactile_bayes.checks import check_function, check_path
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.report.findings import FINDING_STEPS, findings_of
 from tactile_bayes.report.page import page_of
+from tactile_bayes.report.runs_page import folders_of, runs_page_of
+from tactile_bayes.runs.names import MANY
 from tactile_bayes.tasks import refuse_replacing, write_atomically
 
 __all__ = ["rendered", "write_report"]
@@ -24,26 +27,33 @@ _ESCAPES = {code: f"\\u{code:04x}" for code in (ord("<"), ord(">"), ord("&"), 0x
 
 
 def write_report(
-    run: str | os.PathLike[str],
+    run: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
     out: str | os.PathLike[str] | None = None,
     *,
     compare: str | os.PathLike[str] | None = None,
+    overlay: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Path:
-    """Write the report of a run: one HTML page that needs no network and no other file.
+    """Write the report of a run, or of several: one HTML page that needs no network and no other file.
 
-    It states the results, how far to trust them, the readings, and how to reproduce the run. A slider moves the rod
-    along the most probable contour through the samples of the record.
+    That of a run states the results, how far to trust them, the readings, and how to reproduce the run. A slider moves
+    the rod along the most probable contour through the samples of the record. That of several shows their results side
+    by side, and their contours over each other.
 
     Parameters
     ----------
-    run : path-like
-        Folder that `tactile-bayes infer` has written, of which posterior.nc is read.
+    run : path-like or sequence of path-like
+        Folder that `tactile-bayes infer` has written, of which posterior.nc is read; or a folder of such folders, as it
+        writes for many records; or several.
     out : path-like, optional
-        File for the page; by default report.html in that folder. An existing file is replaced.
+        File for the page; by default report.html in that folder. An existing file is replaced. For several folders it
+        must be given.
     compare : path-like, optional
         Folder of `tactile-bayes compare` for the same record, whose probabilities of shapes the report then states; by
-        default `run`, if it holds a comparison that states its record.
+        default `run`, if it holds a comparison that states its record. For one run alone.
+    overlay : path-like, optional
+        Folder of another run, or points of a contour in the laboratory frame of the record, CSV or DXF
+        (`tactile_bayes.record.read_points`): it is drawn over the contour, and its distance is in a table.
     progress : callable, optional
         Called with the number of steps done and their total.
 
@@ -57,22 +67,40 @@ def write_report(
     InferenceError
         If the folder holds no posterior of a contour, or a named folder no comparison of its record.
     ParameterError
-        If the page would replace one of these files.
+        If the page would replace one of these files, the overlay cannot be read, or the page of several folders has no
+        path.
     OSError
         If the page cannot be written.
     """
-    folder = check_path("run", run, "give the folder of a run")
-    path = folder / "report.html" if out is None else check_path("out", out, "give a path, like 'report.html', or None")
+    given = [run] if isinstance(run, str | os.PathLike) or not isinstance(run, Sequence) else list(run)
+    folders = [check_path("run", each, "give the folder of a run, of several, or a list of them") for each in given]
+    if not folders:
+        raise ParameterError("there are no runs: give the folder of one")
+    if out is None and len(folders) > 1:
+        raise ParameterError("the page of several folders has no place of its own: give out, like 'report.html'")
+    path = folders[0] / "report.html" if out is None else check_path("out", out, "give a path, like 'report.html'")
     check_function("progress", progress)
-    compare = None if compare is None else check_path("compare", compare)
-    sources = [folder / "posterior.nc", folder / "trust.nc", (compare or folder) / "comparison.nc"]
+    compared = None if compare is None else check_path("compare", compare)
+    other = None if overlay is None else check_path("overlay", overlay)
+    runs = folders_of(folders)
+    one = folders[0] if list(runs) == folders[:1] else None
+    if one is None and compared is not None:
+        raise ParameterError("compare is for one run: leave it out, or report on the runs one by one")
+    sources = [each / name for each in (*runs, *folders) for name in ("posterior.nc", "trust.nc", MANY[1])]
+    sources += [(compared or folders[0]) / "comparison.nc"]
+    sources += [] if other is None else [other / "posterior.nc" if other.is_dir() else other]
     refuse_replacing([path], [source for source in sources if source.exists()])
+    count = (FINDING_STEPS if one is not None else len(runs)) + 1
     report = progress or (lambda done, count: None)
-    findings = findings_of(folder, compare, lambda done: report(done, FINDING_STEPS + 1))
-    text = _rendered(page_of(findings, folder.resolve().name))
+    if one is not None:
+        findings = findings_of(one, compared, lambda done: report(done, count), other)
+        text = _rendered(page_of(findings, one.resolve().name))
+    else:
+        name = ", ".join(folder.resolve().name for folder in folders)
+        text = rendered("runs.html.jinja", **runs_page_of(runs, path, name, other, lambda done: report(done, count)))
     with write_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    report(FINDING_STEPS + 1, FINDING_STEPS + 1)
+    report(count, count)
     return path
 
 

@@ -1,0 +1,125 @@
+"""Files of points: polylines in CSV or DXF, and their unit of length."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import check_path
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.csv_header import column_described
+from tactile_bayes.record.dxf import curves_in
+from tactile_bayes.record.encoding import not_utf8
+from tactile_bayes.record.origin import stem_and_unit
+from tactile_bayes.record.quantity import accepted_units, unit_of
+
+__all__ = ["Points", "read_points"]
+
+_CALLED = {"m": "a unit of length", "1": "rod lengths"}
+
+
+class Points(NamedTuple):
+    """Points of a file."""
+
+    pieces: list[Floats]
+    """Shape (n, 2) each, in their order, in metres if the file states a unit of length."""
+    unit: str
+    """"m", "1" for rod lengths, or "" if the file states none."""
+
+    def in_unit(self, unit: str, name: str) -> list[Floats]:
+        """Return the pieces in "m" or "1", as which numbers without a unit are taken; the name is for the message.
+
+        Raises
+        ------
+        ParameterError
+            If the file states the other one.
+        """
+        if self.unit not in ("", unit):
+            raise ParameterError(f"{name} is in {_CALLED[self.unit]}, and {_CALLED[unit]} are wanted: convert it")
+        return self.pieces
+
+
+def read_points(path: str | os.PathLike[str]) -> Points:
+    """Read the points of a contour.
+
+    Parameters
+    ----------
+    path : path-like
+        A CSV file with columns x and y, or with two columns, and a line for each point. A unit is stated in the names,
+        "x [mm]", or in lines "# column x: number [mm]"; "L" stands for rod lengths. Or a DXF drawing, of which the
+        lines, polylines, arcs, circles, ellipses and splines in model space are read, on layers that are shown; this
+        takes the package ezdxf.
+
+    Returns
+    -------
+    Points
+
+    Raises
+    ------
+    ParameterError
+        If there are no points, a line is no point, or a unit is none of length.
+    OSError
+        If the file cannot be read.
+    """
+    file = check_path("path", path, "give a path, like 'points.csv' or 'part.dxf'")
+    if file.suffix.lower() == ".dxf":
+        pieces, scale = curves_in(file)
+        return Points([scale * piece for piece in pieces], "m") if scale else Points(pieces, "")
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise ParameterError(f"{path}: {not_utf8(error)}") from error
+    described = dict(filter(None, map(column_described, lines)))
+    names, rows = _table_of([line for line in lines if line.strip() and not line.lstrip().startswith("#")], path)
+    scales = [_scale(described.get(name) or stem_and_unit(name)[1] or "", path) for name in names]
+    if len({unit for _, unit in scales}) > 1:
+        raise ParameterError(f"{path}: {names[0]!r} and {names[1]!r} state different units: write x [mm],y [mm]")
+    return Points([rows * [scale for scale, _ in scales]], scales[0][1])
+
+
+def _scale(unit: str, path: object) -> tuple[float, str]:
+    """Return the size of a unit of length, and the unit of what is multiplied by it."""
+    if unit in ("", "1", "L"):
+        return 1.0, "1" if unit else ""
+    found, metre = unit_of(unit), unit_of("m")
+    if found is None or metre is None or found.dimension != metre.dimension:
+        raise ParameterError(f"{path}: points are in [{unit}]: give {accepted_units('m')}, or L for rod lengths")
+    return float(found.scale), "m"
+
+
+def _table_of(lines: Sequence[str], path: object) -> tuple[list[str], Floats]:
+    """Return the names of x and y, and their numbers, shape (n, 2); the first line may hold names."""
+    sample = "".join(lines[:2])
+    delimiter = next((mark for mark in ";\t," if mark in sample), " ")
+    rows = [
+        [cell.strip() for cell in row]
+        for row in csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
+    ]
+    names, places = ["x", "y"], (0, 1)
+    if rows and _pair(rows[0], places, delimiter) is None:
+        stems = [stem_and_unit(name)[0].lower() for name in rows[0]]
+        if "x" in stems and "y" in stems:
+            places = (stems.index("x"), stems.index("y"))
+        elif len(stems) > 2:
+            raise ParameterError(f"{path}: none of its columns are x and y ({', '.join(rows[0])}): name them so")
+        names = [rows[0][place] if place < len(rows[0]) else "" for place in places]
+        rows = rows[1:]
+    pairs = [_pair(row, places, delimiter) for row in rows]
+    if None in pairs:
+        bad = rows[pairs.index(None)]
+        raise ParameterError(f"{path}: {delimiter.join(bad)!r} is no point: give x and y, like 0.1,0.52")
+    if not pairs:
+        raise ParameterError(f"{path}: there are no points in it: give lines of x and y, like 0.1,0.52")
+    return names, np.array(pairs, dtype=float)
+
+
+def _pair(row: Sequence[str], places: tuple[int, int], delimiter: str) -> tuple[float, float] | None:
+    cells = [row[place] if place < len(row) else "" for place in places]
+    one, two = (number_in(cell if delimiter == "," else cell.replace(",", ".")) for cell in cells)
+    return (one, two) if one is not None and two is not None and np.isfinite([one, two]).all() else None
