@@ -20,7 +20,7 @@ from tactile_bayes.errors import ClearanceWarning, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.parameters.nuisances import deviating, stated_values
+from tactile_bayes.inference.parameters.nuisances import deviating
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import CERTAIN
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -31,6 +31,7 @@ from tactile_bayes.record import CHANNELS, validate, with_rod
 from tactile_bayes.rig.corrected import Corrected
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.sweep import Drive, Scan, scan
 from tactile_bayes.sweep.scanning import drives_of
 

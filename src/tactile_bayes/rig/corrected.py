@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -14,11 +14,9 @@ from tactile_bayes.load_cell.averaged_cell import AveragedCell
 from tactile_bayes.load_cell.blocks import are_blocks, elapsed_in
 from tactile_bayes.record import CHANNELS, base_of_sample, rod_of, to_si, with_rod
 from tactile_bayes.rig.parameters import GROUPS
-from tactile_bayes.rig.rig import rod_with
+from tactile_bayes.rig.rig import cell_with, rod_with
 
 __all__ = ["Corrected", "corrected"]
-
-_CHANNEL_NAMES = ("moment", "force_x", "force_y")
 
 
 class Corrected(NamedTuple):
@@ -58,27 +56,15 @@ def corrected(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float
         Parameters of the rig by name, known ones and inferred ones, in the record's units; others have no effect.
     """
 
-    def by_channel(kind: str, default: float) -> np.ndarray[Any, np.dtype[np.float64]]:
-        return np.array([rig.get(f"{channel}_{kind}", default) for channel in _CHANNEL_NAMES])
-
-    gain: Any = np.array(load_cell.gain) * by_channel("gain", 1.0) * rig.get("rigidity_scale", 1.0)
-    quadratic, cubic = (
-        rig.get(name, v) for name, v in zip(GROUPS["moment_curve"], load_cell.moment_curve, strict=True)
-    )
-    bias = np.array(load_cell.bias) + by_channel("bias", 0.0)
     averaged = AveragedCell.of(load_cell, measured["block_readings"].values) if are_blocks(measured) else load_cell
-    cell = replace(
-        averaged,
-        gain=gain,
-        lever=(load_cell.lever[0] + rig.get("lever_x", 0.0), load_cell.lever[1] + rig.get("lever_y", 0.0)),
-        moment_curve=(quadratic, cubic),
-        bias=tuple(bias.tolist()),
-        drive_angle_offset=load_cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
-        drive_angle_backlash=load_cell.drive_angle_backlash + rig.get("backlash", 0.0),
-    )
+    cell = cell_with(averaged, rig)
+    stiffer = rig.get("rigidity_scale", 1.0)
+    if stiffer != 1.0:
+        cell = replace(cell, gain=(stiffer * np.array(cell.gain)).tolist())
     fraction = elapsed_in(measured)
     columns = {
-        name: measured[name] - drift * fraction for name, drift in zip(CHANNELS, by_channel("drift", 0.0), strict=True)
+        name: measured[name] - drift * fraction
+        for name, drift in zip(CHANNELS, (rig.get(each, 0.0) for each in GROUPS["drift"]), strict=True)
     }
     bases, of_sample = base_of_sample(measured)
     for number in range(1, len(bases) + 1):

@@ -24,7 +24,9 @@ from tactile_bayes.rig.rig_prior import RigPrior
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["DEFAULT", "NOTHING", "Rig", "Unknown", "expanded", "rig_of", "rod_with"]
+    from tactile_bayes.random_numbers import Rng
+
+__all__ = ["DEFAULT", "NOTHING", "Rig", "Unknown", "cell_with", "expanded", "of_pivots", "rig_of", "rod_with"]
 
 Unknown = float | Distribution | Literal["default"]
 """What is said of a parameter: a number if it is known, a distribution, or "default" for its default distribution."""
@@ -161,6 +163,36 @@ class Rig:
         """Return the rig of which something else is said about some parameters."""
         return replace(self, unknown={**self.entries, **said})
 
+    def draw(self, rng: Rng, *, pivots: int = 1) -> Rig:
+        """Draw a rig of numbers: each unknown has a value, and is known.
+
+        Parameters
+        ----------
+        rng : int, SeedSequence or Generator
+        pivots : int
+            Number of pivots of its records, the shifts of which are drawn if they are unknown.
+
+        Returns
+        -------
+        Rig
+            With the rod and the load cell of the data sheets, and numbers for what `scan` and `measure` apply.
+
+        Raises
+        ------
+        ParameterError
+            If a discrepancy is unknown, or a noise that the load cell does not state, or a distribution has no
+            quantiles.
+
+        Examples
+        --------
+        >>> drawn = Rig(unknown={"lever": 0.0}).draw(rng=1)
+        >>> drawn.distributions, drawn.known["lever_x"], round(drawn.known["rigidity_scale"], 4)
+        ({}, 0.0, 1.0015)
+        """
+        from tactile_bayes.rig.drawn import drawn_rig
+
+        return drawn_rig(self, rng, pivots)
+
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Rig:
         """Read a rig from a TOML file; see docs/formats.md.
@@ -248,6 +280,37 @@ def expanded(unknown: Mapping[str, Unknown]) -> dict[str, Unknown]:
     """
     of_groups = {member: value for name, value in unknown.items() if name in GROUPS for member in GROUPS[name]}
     return {**of_groups, **{name: value for name, value in unknown.items() if name not in GROUPS}}
+
+
+def of_pivots(said: Mapping[str, Unknown], pivots: int) -> dict[str, Unknown]:
+    """Return what is said of each parameter, with the shifts of so many pivots in place of their group."""
+    every: dict[str, Unknown] = {}
+    for name, value in said.items():
+        if name in _BASES:
+            shifts = (f"base_{k}_{axis}" for k in range(2, pivots + 1) for axis in (name[5:] or "xy"))
+            every = dict.fromkeys(shifts, value) | every
+        else:
+            every[name] = value
+    return {n: v for n, v in every.items() if (shift := BASE.fullmatch(n)) is None or int(shift[1]) <= pivots}
+
+
+def cell_with(cell: LoadCell, rig: Mapping[str, float]) -> LoadCell:
+    """Return a load cell with the errors that parameters by name give it; drift and noise have no effect."""
+    gain = np.array(cell.gain) * [rig.get(name, 1.0) for name in GROUPS["gain"]]
+    bias, lever = (
+        np.add(stated, [rig.get(name, 0.0) for name in GROUPS[what]]).tolist()
+        for what, stated in (("bias", cell.bias), ("lever", cell.lever))
+    )
+    curve = (rig.get(name, v) for name, v in zip(GROUPS["moment_curve"], cell.moment_curve, strict=True))
+    return replace(
+        cell,
+        gain=gain.tolist(),
+        bias=bias,
+        lever=lever,
+        moment_curve=(next(curve), next(curve)),
+        drive_angle_offset=cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
+        drive_angle_backlash=cell.drive_angle_backlash + rig.get("backlash", 0.0),
+    )
 
 
 def _checked(unknown: Any) -> dict[str, Unknown]:
