@@ -20,6 +20,7 @@ def corrupted_loads(
     rng: Draws,
     noise_scale: ArrayLike = 1.0,
     discrepancy: Discrepancy | None = None,
+    zeros: ArrayLike = 0.0,
 ) -> Floats:
     """Simulate readings of loads: lever, gain and bias, drift, noise and discrepancy, then the range, then the steps.
 
@@ -35,6 +36,8 @@ def corrupted_loads(
         Factor on the white noise of each channel.
     discrepancy : Discrepancy, optional
         Discrepancy of the model, whose arrays have the shape of the loads. It is drawn last.
+    zeros : array_like, broadcastable to the shape of the loads
+        Readings without load in addition to the bias.
 
     Returns
     -------
@@ -43,7 +46,7 @@ def corrupted_loads(
     noise = rng.standard_normal(loads.shape)
     if any(sheet.correlation):
         noise = noise @ np.linalg.cholesky(sheet.correlation_matrix).T
-    readings = np.array(sheet.expected(loads))
+    readings = sheet.expected(loads) + np.asarray(zeros)
     if any(sheet.bias_uncertainty):
         readings += np.array(sheet.bias_uncertainty) * rng.standard_normal((*loads.shape[:-2], 1, 3))
     if sheet.drift is not None:

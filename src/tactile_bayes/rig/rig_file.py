@@ -59,7 +59,7 @@ ROD_UNITS = {
 }
 TABLES = {
     "rod": (*ROD_UNITS, "rigidity_profile", "shape"),
-    "load_cell": (*LOAD_CELL_UNITS, *SEVERAL, "frame"),
+    "load_cell": ("frame", *LOAD_CELL_UNITS, *SEVERAL),
     "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), "split_sweeps", "missing"),
     "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
     "calibration": ("parameters", "correlation", "error", "source", "stated"),
