@@ -193,6 +193,41 @@ class Rig:
 
         return drawn_rig(self, rng, pivots)
 
+    def measure(self, record: xr.Dataset, *, rng: Rng) -> xr.Dataset:
+        """Return the record of this rig, from `scan`, as its load cell and its encoder read it.
+
+        The deviations that are numbers act: lever, gains, curve, zeros and drifts of the load cell, the factor on its
+        noise, and offset and backlash of the encoder. The record states rod, load cell and pivots of the data sheets,
+        as one from a laboratory does, and the truth in columns that begin with "truth_".
+
+        Parameters
+        ----------
+        record : xr.Dataset
+            An ideal record, in the units of the load cell.
+        rng : int, SeedSequence or Generator
+
+        Returns
+        -------
+        xr.Dataset
+
+        Raises
+        ------
+        RecordError, ParameterError
+            As in `LoadCell.measure`.
+
+        Examples
+        --------
+        >>> from tactile_bayes import scan
+        >>> from tactile_bayes.contours import paper_profile
+        >>> drawn = Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02)).draw(rng=1)
+        >>> record = drawn.measure(scan(paper_profile("II", q=0.5), drawn).record, rng=1)
+        >>> record.attrs["units"], record.attrs["load_cell_force_noise"]
+        ('dimensionless', 0.05)
+        """
+        from tactile_bayes.rig.measured import measured_by
+
+        return measured_by(self, record, rng)
+
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Rig:
         """Read a rig from a TOML file; see docs/formats.md.

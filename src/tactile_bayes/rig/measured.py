@@ -1,0 +1,42 @@
+"""The readings of a rig: an ideal record as its load cell and its encoder read it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.blocks import elapsed_in
+from tactile_bayes.load_cell.measurement import measured
+from tactile_bayes.random_numbers import Rng, generator
+from tactile_bayes.record import base_of_sample, frame_of, make_record, present_channels
+from tactile_bayes.record.attributes import without_rod
+from tactile_bayes.record.schema import CHANNELS
+from tactile_bayes.rig.parameters import GROUPS
+from tactile_bayes.rig.rig import Rig, cell_with
+
+__all__ = ["measured_by"]
+
+_NOISES = ("force_noise", "moment_noise", "relative_noise")
+
+
+def measured_by(rig: Rig, record: xr.Dataset, rng: Rng) -> xr.Dataset:
+    """Return an ideal record of a rig as the rig reads it; see `Rig.measure`."""
+    known, stated = rig.known, rig.load_cell or LoadCell()
+    louder = known.get("noise_scale", 1.0)
+    built = replace(cell_with(stated, known), **{name: louder * getattr(stated, name) for name in _NOISES})
+    drift = np.array([known.get(name, 0.0) for name in GROUPS["drift"]])
+    made = measured(built, record, generator(rng), elapsed_in(record)[:, None] * drift)
+    columns: dict[str, Any] = {str(name): made[name].values for name in made.data_vars}
+    pivots, of_sample = base_of_sample(made)
+    for axis in "xy":
+        shifts = np.array([known.get(f"base_{k}_{axis}", 0.0) for k in range(1, len(pivots) + 1)])
+        if shifts.any():
+            columns[f"base_{axis}"] = columns[f"base_{axis}"] - shifts[of_sample]
+    attrs = {n: v for n, v in without_rod(made.attrs).items() if not str(n).startswith(("load_cell_", "units"))}
+    attrs |= {f"load_cell_{name}": value for name, value in stated.entries().items() if name != "frame"}
+    missing = [name for name in CHANNELS if name not in present_channels(made)]
+    return make_record(columns, rod=rig.rod, attrs=attrs, missing=missing, load_cell_frame=frame_of(made))
