@@ -81,7 +81,8 @@ def deviations_of_table(
         raise SpecificationError(f'unknown is {said!r}: give a table [unknown], or "nothing"')
     rig = Rig(unknown=_checked(given), calibration=calibration)
     own = of_pivots(expanded(given), pivots)  # type: ignore[arg-type]
-    uncertain = [of for of, entry in _OF_CELL.items() if entry.replace("bias", "bias_uncertainty") in load_cell]
+    channels = zip(GROUPS["bias"], CHANNELS, strict=True)
+    uncertain = [name for name, channel in channels if f"bias_uncertainty_{channel}" in load_cell]
     every: dict[str, Any] = {name: own.get(name, Variation(DEFAULT)) for name in unknown_of(rig, pivots, uncertain)}
     if not turns_back and not rig.is_named("backlash"):
         del every["backlash"]

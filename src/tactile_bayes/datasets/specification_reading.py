@@ -93,7 +93,11 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
     """
     folder = Path()
     if isinstance(source, Mapping):
-        text, where = toml_of(_with_rig(source, folder)), "specification"
+        where = "specification"
+        try:
+            text = toml_of(_with_rig(source, folder))
+        except ParameterError as error:
+            raise SpecificationError(f"{where}: {error}") from error
     else:
         path = check_path("the specification", source, "give a file, like 'study.toml', or its content as a mapping")
         where, folder = str(path), path.parent

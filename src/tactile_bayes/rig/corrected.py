@@ -60,7 +60,9 @@ def corrected(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float
     cell = cell_with(averaged, rig)
     stiffer = rig.get("rigidity_scale", 1.0)
     if stiffer != 1.0:
-        cell = replace(cell, gain=(stiffer * np.array(cell.gain)).tolist())
+        quadratic, cubic = cell.moment_curve  # of the moment as it is, stiffer than the one that Step 2 takes
+        curve = (stiffer * quadratic, stiffer**2 * cubic)
+        cell = replace(cell, gain=(stiffer * np.array(cell.gain)).tolist(), moment_curve=curve)
     fraction = elapsed_in(measured)
     columns = {
         name: measured[name] - drift * fraction

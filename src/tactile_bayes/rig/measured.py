@@ -16,7 +16,7 @@ from tactile_bayes.record import base_of_sample, frame_of, make_record, present_
 from tactile_bayes.record.attributes import without_rod
 from tactile_bayes.record.schema import CHANNELS
 from tactile_bayes.rig.parameters import GROUPS
-from tactile_bayes.rig.rig import Rig, cell_with
+from tactile_bayes.rig.rig import Rig, cell_with, of_pivots
 
 __all__ = ["measured_by"]
 
@@ -32,8 +32,9 @@ def measured_by(rig: Rig, record: xr.Dataset, rng: Rng) -> xr.Dataset:
     made = measured(built, record, generator(rng), elapsed_in(record)[:, None] * drift)
     columns: dict[str, Any] = {str(name): made[name].values for name in made.data_vars}
     pivots, of_sample = base_of_sample(made)
+    shifted: dict[str, Any] = {**of_pivots(rig.known, len(pivots))}
     for axis in "xy":
-        shifts = np.array([known.get(f"base_{k}_{axis}", 0.0) for k in range(1, len(pivots) + 1)])
+        shifts = np.array([shifted.get(f"base_{k}_{axis}", 0.0) for k in range(1, len(pivots) + 1)])
         if shifts.any():
             columns[f"base_{axis}"] = columns[f"base_{axis}"] - shifts[of_sample]
     attrs = {n: v for n, v in without_rod(made.attrs).items() if not str(n).startswith(("load_cell_", "units"))}
