@@ -225,7 +225,7 @@ REFUSED = [
     ({"scan": {"from_degrees": 90, "to_degrees": 10}}, ["scan.from_degrees is 90, not below to_degrees, 10"]),
     ({"scan": {"from_degrees": -400, "to_degrees": 10}}, ["scan.from_degrees is -400"]),
     ({"scan__friction": 0.2}, ["there is no key 'scan.friction'", "[unknown]"]),
-    ({"unknown": {"friction": 2.0}}, ["friction", "2.0", "0.84"]),
+    ({"unknown": {"friction": 2.0}}, ["friction", "2.0", "0.8423"]),
     ({"load_cell": [1]}, ["load_cell is [1]"]),
     ({"load_cell__noise": 1.0}, ["there is no key 'load_cell.noise'"]),
     ({"load_cell__samples": 9}, ["there is no key 'load_cell.samples'", "[scan]"]),

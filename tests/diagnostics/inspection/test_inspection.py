@@ -7,14 +7,17 @@ import pytest
 
 import tactile_bayes as tb
 from helpers.refusals import refused
+from tactile_bayes.contours import paper_profile
 from tactile_bayes.diagnostics.inspection import known_cell
 from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, stuck, uneven_steps
 from tactile_bayes.diagnostics.inspection.stretches import autocorrelation, unloaded_stretches
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import CHECK_RIG
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import rows_of_sweeps
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
+from tactile_bayes.sweep import scan
 
 COARSE = np.radians(12.0)
 OTHER_FORCE_X = 'force_x had the other sign (force_x = "-force_x" under [file] of rig.toml).'
@@ -473,3 +476,15 @@ def test_noise_between_positions_that_readings_do_not_explain_is_named(ideal):
     assert all(name in sentence for name in tb.LoadCell().standard_deviations)
     between = found.channels.position_noise.values / np.array([0.25e-3, 3e-3, 3e-3])
     assert between == pytest.approx(np.sqrt(1.05) * np.ones(3), rel=0.35)
+
+
+def test_step_2_corrects_for_known_deviations():
+    """A lever, a gain and a compliance that are known are as harmless as an ideal rig."""
+    known = {"lever": 0.1, "force_y_gain": 1.3, "suspension_compliance": 0.1, "length": 1.05}
+    rig = Rig(load_cell=LoadCell(force_noise=0.005, moment_noise=0.002), unknown={**NOTHING, **known})
+    record = rig.measure(scan(paper_profile("II", q=0.5), rig, drive_step=0.05).record, rng=1)
+    told, not_told = (
+        tb.inspect_record(record, each) for each in (rig, Rig(load_cell=rig.load_cell, unknown="nothing"))
+    )
+    assert told.statuses["ok"] > not_told.statuses["ok"]
+    assert not told.is_suspect

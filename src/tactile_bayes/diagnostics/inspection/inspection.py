@@ -98,7 +98,7 @@ def inspect_record(
         A record.
     rig : Rig, optional
         Rod and load cell, by default those that the record states, bias and noise estimated from its unloaded samples
-        where nobody states a load cell; and the deviations that are numbers, for which Step 2 corrects, as `reconstruct`.
+        where nobody states a load cell; and known deviations, for which Step 2 corrects.
     false_alarm : float
         Level of every test, in (0, 0.5): the probability of a false alarm for a record in white normal noise with
         nothing wrong, for each sweep in `zero_load`, and for all channels and samples together in the others.
