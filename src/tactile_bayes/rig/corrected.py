@@ -73,7 +73,8 @@ def corrected(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float
         at_pivot = of_sample == number - 1
         for name in ("base_x", "base_y"):
             shift = rig.get(f"base_{number}_{name[-1]}", 0.0)
-            columns[name] = columns.get(name, measured[name]) + shift * at_pivot
+            if shift:
+                columns[name] = columns.get(name, measured[name]) + shift * at_pivot
     record = measured.assign({name: values.assign_attrs(measured[name].attrs) for name, values in columns.items()})
     rod = rod_of(measured)
     if "length" in rig:

@@ -15,7 +15,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import rows_of_sweeps
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import scan
 
@@ -481,7 +481,7 @@ def test_noise_between_positions_that_readings_do_not_explain_is_named(ideal):
 def test_step_2_corrects_for_known_deviations():
     """A lever, a gain and a compliance that are known are as harmless as an ideal rig."""
     known = {"lever": 0.1, "force_y_gain": 1.3, "suspension_compliance": 0.1, "length": 1.05}
-    rig = Rig(load_cell=LoadCell(force_noise=0.005, moment_noise=0.002), unknown={**NOTHING, **known})
+    rig = Rig(load_cell=LoadCell(force_noise=0.005, moment_noise=0.002), unknown=known)
     record = rig.measure(scan(paper_profile("II", q=0.5), rig, drive_step=0.05).record, rng=1)
     told, not_told = (
         tb.inspect_record(record, each) for each in (rig, Rig(load_cell=rig.load_cell, unknown="nothing"))
