@@ -64,10 +64,8 @@ def corrected(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float
         curve = (stiffer * quadratic, stiffer**2 * cubic)
         cell = replace(cell, gain=(stiffer * np.array(cell.gain)).tolist(), moment_curve=curve)
     fraction = elapsed_in(measured)
-    columns = {
-        name: measured[name] - drift * fraction
-        for name, drift in zip(CHANNELS, (rig.get(each, 0.0) for each in GROUPS["drift"]), strict=True)
-    }
+    drifts = zip(CHANNELS, (rig.get(name, 0.0) for name in GROUPS["drift"]), strict=True)
+    columns = {name: measured[name] - drift * fraction for name, drift in drifts if drift}
     bases, of_sample = base_of_sample(measured)
     for number in range(1, len(bases) + 1):
         at_pivot = of_sample == number - 1

@@ -479,8 +479,8 @@ def test_noise_between_positions_that_readings_do_not_explain_is_named(ideal):
 
 
 def test_step_2_corrects_for_known_deviations():
-    """A lever, a gain and a compliance that are known are as harmless as an ideal rig."""
-    known = {"lever": 0.1, "force_y_gain": 1.3, "suspension_compliance": 0.1, "length": 1.05}
+    """A lever and gains that are known are as harmless as an ideal rig."""
+    known = {"lever": 0.1, "force_y_gain": 1.3, "moment_gain": 0.8}
     rig = Rig(load_cell=LoadCell(force_noise=0.005, moment_noise=0.002), unknown=known)
     record = rig.measure(scan(paper_profile("II", q=0.5), rig, drive_step=0.05).record, rng=1)
     told, not_told = (
