@@ -109,7 +109,7 @@ def options_taken(text):
         while together and last < len(lines) and option[last]:
             last += 1
         if lines[first].startswith(("#to_degrees", "#ornstein_uhlenbeck_moment", "#ornstein_uhlenbeck_time")) or (
-            "#[rod]" in lines[:first]
+            {"#[rod]", "#[unknown]"} & {*lines[:first]}
         ):
             continue
         yield lines[first], "\n".join([*lines[:first], *(line[1:] for line in lines[first:last]), *lines[last:]])

@@ -12,7 +12,7 @@ from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import CHANNELS, rod_of, turned
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import NOTHING, Rig
 
 FIRST = {
     "base": [0.9, {"uniform": [-0.1, 0.0]}],
@@ -40,9 +40,9 @@ SI = changed(
     },
     scan={
         "samples": 30,
-        "friction": 0.2,
         "translations": [{**FIRST, "base": [0.09, 0.0], "travel": 0.18}, {**SECOND, "base": [-0.09, 0], "step": 0.005}],
     },
+    unknown={**NOTHING, "friction": 0.2},
     load_cell={"frame": "turning", "drive_angle_offset": 0.01, "drive_angle_backlash": 0.004, "force_noise": 1e-5},
 )
 TURNED = changed(

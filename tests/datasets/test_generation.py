@@ -19,7 +19,7 @@ from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.datasets.specification_text import left_out
 from tactile_bayes.errors import ParameterError, SpecificationError, StrainWarning
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import NOTHING, Rig
 
 CONTACT = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
 FALSE_ALARM = 1e-4
@@ -58,9 +58,9 @@ RIGS = {
         "ellipse",
         scan={
             "samples": 30,
-            "friction": 0.3,
             "bases": [[{"uniform": [-0.2, 0.2]}, {"uniform": [-0.1, 0.1]}], [0.1, -0.1]],
         },
+        unknown={**NOTHING, "friction": 0.3},
     ),
     "arcs": drawn_from("circle", rod={"rest_curvature": {"uniform": [-0.5, 0.5]}}),
     "arcs in SI": drawn_from(
@@ -411,7 +411,7 @@ def test_what_is_hardly_ever_a_contour_is_given_up_with_the_familys_own_words():
 
 def test_sweeps_that_friction_would_hold_at_first_are_no_records():
     """In one of two directions the rod is curved toward the object, and slides outward until it is straightened."""
-    spec = drawn_from("circle", scan={"friction": 0.3}, rod={"rest_curvature": {"uniform": [0.2, 0.4]}})
+    spec = drawn_from("circle", unknown={**NOTHING, "friction": 0.3}, rod={"rest_curvature": {"uniform": [0.2, 0.4]}})
     with refused(SpecificationError, "1000 times", "held by friction", "friction = 0"):
         generate_records(read_specification(spec), 0, 1)
 
@@ -526,7 +526,7 @@ def test_records_depend_on_seed_and_index_alone():
         {"load_cell__relative_noise": 0.0},
         {"load_cell__bias_force_x": {"normal": [0.0, 0.1]}, "load_cell__force_noise": None},
         {"scan__samples": 5},
-        {"scan__friction": 0.0, "scan__bases": [[0.0, 0.0], [0.0, 0.0]]},
+        {"unknown": "nothing", "scan__bases": [[0.0, 0.0], [0.0, 0.0]]},
     ],
 )
 def test_contours_do_not_depend_on_what_else_is_drawn(change):

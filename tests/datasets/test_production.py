@@ -334,7 +334,7 @@ def test_another_data_set_is_left_alone(tmp_path):
             {"rod": {"length": 0.2, "flexural_rigidity": 2.4e-3}, "scan__bases": pivots},
             ["scan.bases", "left out there", f"{str(pivots)[:59]}…", "rod.length"],
         ),
-        ({"scan__friction": 0.1}, ["scan.friction", "left out there", "0.1 here"]),
+        ({"unknown": {"friction": 0.1}}, ["unknown.friction", "left out there", "0.1 here"]),
         ({"name": "n", "seed": 8, "records": 48, "precision": "single"}, ["1 more"]),
         ({"records": 48}, ["records is 24 there and is 48 here", "grow"]),
     ):

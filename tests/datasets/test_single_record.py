@@ -80,7 +80,7 @@ def test_readings_at_the_end_of_the_range_are_there_also_from_32_bits(limit, tmp
 
 def test_step_2_finds_the_contacts():
     """Of a record without noise, the true ones."""
-    one = record(changed(RICH, precision=None, load_cell={"frame": "turning"}, scan__friction=0.0), 4)
+    one = record(changed(RICH, precision=None, load_cell={"frame": "turning"}, unknown="nothing"), 4)
     found = tb.reconstruct(one)
     loaded = (found.status == "ok").values
     assert np.count_nonzero(loaded) > 30

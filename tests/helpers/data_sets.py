@@ -3,6 +3,8 @@
 import copy
 import hashlib
 
+from tactile_bayes.rig import NOTHING
+
 __all__ = ["PLAIN", "RICH", "changed", "hashes"]
 
 PLAIN = {
@@ -48,9 +50,9 @@ RICH = {
     "scan": {
         "bases": [[0.0, 0.0], [{"uniform": [-0.02, 0.02]}, {"normal": [-0.005, 0.001]}]],
         "samples": 20,
-        "friction": 0.2,
         "margin": 0.2,
     },
+    "unknown": {**NOTHING, "friction": 0.2},
     "load_cell": {
         "frame": "turning",
         "moment_noise": 1e-5,

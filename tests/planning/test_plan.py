@@ -164,21 +164,6 @@ def test_what_is_none_is_refused(options):
         Plan(PROFILE, **options)
 
 
-@pytest.mark.parametrize(
-    ("said", "name"),
-    [
-        ({"lever": 0.01}, "lever_x"),
-        ({"force_x_gain": 1.02}, "force_x_gain"),
-        ({"noise_scale": 2.0}, "noise_scale"),
-        ({"base_2_y": 0.01}, "base_2_y"),
-        ({"length": 1.1}, "length"),
-    ],
-)
-def test_a_number_that_the_sweeps_would_not_have_is_refused_by_name(said, name):
-    with refused(ParameterError, name, "as stated"):
-        Plan(PROFILE, Rig(unknown=said))
-
-
 def test_numbers_that_are_as_stated_are_known():
     plan = Plan(PROFILE, Rig(unknown={**NOTHING, "length": 1.0, "noise_scale": 1.0, "discrepancy": 0.0}))
     assert plan.model.names == ("a", "q", "x_c")

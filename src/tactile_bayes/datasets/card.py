@@ -62,6 +62,8 @@ def card(spec: Specification, manifest: Manifest) -> str:
     for number, one in enumerate(spec.translations, start=1):
         lines += [f"| translation {number}: {name} | {distribution.text} |" for name, distribution in one.items()]
     lines += [f"| load cell: {name} | {distribution.text} |" for name, distribution in spec.load_cell.items()]
+    off = [(name, of.text) for name, of in spec.unknown.items() if not (name == "friction" and of.kind == "constant")]
+    lines += [f"| deviation of the rig: {name} | {text} |" for name, text in off]
     drive = spec.drive
     if spec.translations:
         lines.append(f"| samples | {drive.samples}, evenly spaced from the beginning of the travel to its end |")
@@ -70,7 +72,7 @@ def card(spec: Specification, manifest: Manifest) -> str:
     else:
         lines.append(f"| drive angles | {drive.begin:.6g} to {drive.end:.6g} rad |")
     lines += [
-        f"| friction | {spec.friction:g} |",
+        *([] if spec.friction is None else [f"| friction | {spec.friction:g} |"]),
         f"| frame of the load cell | {spec.frame} |",
         "",
         *_in_turn(spec),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.sweep_frame import SweepFrame
+from tactile_bayes.datasets.deviations import as_built, drawn_deviations, is_around_the_stated, pivot_keys
 from tactile_bayes.datasets.drives import Drives, drives_of
 from tactile_bayes.datasets.measurement import measure
 from tactile_bayes.datasets.specification import Specification
@@ -91,7 +93,7 @@ _CORRECTIONS = {
     "still touched at its other end": _WIDER,
     "touched twice": "give rods that are less curved, or contours that are more so where rods touch them",
     "touched at the beginning": "begin the translations farther from the contours",
-    "held by friction": "take friction = 0, straight rods, or another heading or drive angle",
+    "held by friction": "take friction = 0 under [unknown], straight rods, or another heading or drive angle",
     "slips off at once": "give rods that are less curved, or bring contours and pivots closer to one another",
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the unloaded rod would still cut the object",
@@ -116,7 +118,7 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         If none of 1000 draws of a record is a contour that every sweep reaches.
     """
     index = np.arange(begin, end)
-    drawn = {key: np.full(index.size, np.nan) for key, _ in spec.distributions}
+    drawn = {key: np.full(index.size, np.nan) for key in spec.numbers}
     records = Records(index, np.zeros(index.size, dtype=np.intp), drawn, {}, {}, Counter())
     uniform, turns = streams(spec.seed, index, CONTOUR), _turns(spec, index)
     in_vain: list[tuple[Index, NDArray[Any]]] = []
@@ -135,8 +137,20 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         _keep(spec, records, candidates, tried, (is_good & (good_so_far == 1)).ravel())
         left, draws = left[~is_good.any(axis=1)], draws + ahead
         ahead = max(1, min(2 * ahead, max(_AT_ONCE, index.size) // max(left.size, 1), _MOST_DRAWS - draws))
-    measure(spec, index, records.drawn, records.sample, directions_of(spec, records.sweep))
+    _state_pivots(spec, records)
+    measure(spec, index, as_built(spec, records.drawn), records.sample, directions_of(spec, records.sweep))
     return records
+
+
+def _state_pivots(spec: Specification, records: Records) -> None:
+    """Write the pivots of records as they are stated, where they are shifted."""
+    for key, shift in pivot_keys(spec).items():
+        place, axis = shift[5:].split("_")
+        if shift in spec.unknown and spec.translations:
+            records.sample[f"base_{axis}"][:, int(place) - 1] -= records.drawn[f"unknown.{shift}"][:, None]
+        elif shift in spec.unknown:
+            its = [sweep for sweep, (pivot, _) in enumerate(spec.sweeps) if pivot == int(place) - 1]
+            records.sweep[f"base_{axis}"][:, its] = records.drawn[key][:, None]
 
 
 def directions_of(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
@@ -170,13 +184,16 @@ def _drawn(
         weights = np.cumsum([group.weight for group in spec.groups])
         group = np.searchsorted(weights, shares[:, 0] * weights[-1], side="right")
         group = np.minimum(group, len(spec.groups) - 1)
+    of_key = dict(zip((key for key, _ in spec.distributions), shares[:, 1:].T, strict=True))
     values = {
-        key: distribution.at(
-            shares[:, 1 + k], turns[distribution.axis or key][row] if distribution.kind == "each" else row
-        )
-        for k, (key, distribution) in enumerate(spec.distributions)
+        key: distribution.at(of_key[key], turns[distribution.axis or key][row] if distribution.kind == "each" else row)
+        for key, distribution in spec.distributions
+        if not is_around_the_stated(key, distribution)
     }
-    return _Candidates(row, group, values)
+    if "rod.youngs_modulus" in values:
+        second_moment = math.pi * values["rod.diameter"] ** 4 / 64.0
+        values["rod.flexural_rigidity"] = values["rod.youngs_modulus"] * second_moment
+    return _Candidates(row, group, values | drawn_deviations(spec, values, of_key))
 
 
 def _keep(
@@ -241,7 +258,8 @@ def _tried(spec: Specification, candidates: _Candidates) -> tuple[NDArray[Any], 
     for g in np.unique(candidates.group).tolist():
         contours, built = _built(spec, g, candidates, why)
         if contours is not None:
-            tried[g] = _swept(spec, contours, built, {key: v[built] for key, v in candidates.values.items()})
+            values = {key: v[built] for key, v in candidates.values.items()}
+            tried[g] = _swept(spec, contours, built, as_built(spec, values))
             why[built] = _judged(tried[g].paths, spec.sweep_count)
     return why, tried
 
@@ -268,20 +286,29 @@ def _built(spec: Specification, g: int, candidates: _Candidates, why: NDArray[An
 
 
 def _swept(spec: Specification, contours: Contour, candidate: Index, values: Mapping[str, Floats]) -> _Tried:
-    """Sweep along contours, given the values of all distributions."""
+    """Sweep along contours, given the numbers of rods and pivots as they are built."""
     place = np.repeat(np.arange(candidate.size), spec.sweep_count)
-    of_rod = {name: values[f"rod.{name}"][place] for name in spec.rod}
-    length, rigidity = (of_rod.get(name, np.ones(place.size)) for name in ("length", "flexural_rigidity"))
-    diameter, curvature, taper = (
-        of_rod.get(name, np.zeros(place.size)) for name in ("diameter", "rest_curvature", "taper")
-    )
+    count = candidate.size
+
+    def column(key: str, default: float = 0.0) -> Floats:
+        return values.get(key, np.full(count, default))[place]
+
+    length, rigidity = column("rod.length", 1.0), column("rod.flexural_rigidity", 1.0)
     units = ManyUnits(length, rigidity / length, rigidity / length**2)
     drives = drives_of(spec, values, length)
     paths = trace(
         SweepFrame(
-            contours.take(place), *drives[:2], length, 0.5 * diameter, drives.backward, curvature * length, taper
+            contours.take(place),
+            *drives[:2],
+            length,
+            0.5 * column("rod.diameter"),
+            drives.backward,
+            column("rod.rest_curvature") * length,
+            column("rod.taper"),
+            column("rod.stem") / length,
         ),
-        friction_angle=float(np.arctan(spec.friction)),
+        friction_angle=np.arctan(column("unknown.friction")),
+        suspension_compliance=column("unknown.suspension_compliance") * units.moment_unit,
         profile=profile_of() if spec.has_taper else None,
         drive_angles=drives.way,
         relative=drives.way.ndim == 1,

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.datasets.deviations import drifts_of
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.streams import NOISE, Together, streams
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.blocks import elapsed
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
 from tactile_bayes.record import CHANNELS, turned
 
@@ -40,15 +42,18 @@ _HARMLESS: dict[str, tuple[str, int | None]] = {
 def measure(
     spec: Specification,
     index: Index,
-    drawn: Mapping[str, Floats],
+    built: Mapping[str, Floats],
     sample: dict[str, NDArray[Any]],
     backward: NDArray[np.int8],
 ) -> None:
-    """Add the readings of the load cell to the true values; directions are 0 forward and 1 backward."""
-    cells, cell_of, scale = _cells(spec, drawn, index.size)
+    """Add the readings of load cells as they are built to the true values; directions are 0 forward, 1 backward."""
+    columns = {key.removeprefix("load_cell."): v for key, v in built.items() if key.startswith("load_cell.")}
+    cells, cell_of, scale = _cells(columns, index.size)
+    scale *= built.get("unknown.noise_scale", np.ones(index.size))[:, None]
+    drifts = drifts_of(built, index.size)
     noise = streams(spec.seed, index, NOISE)
     direction = np.array(["forward", "backward"])[np.broadcast_to(backward, (index.size, spec.sweep_count))][..., None]
-    encoder = any(name.startswith("drive_angle") for name in spec.load_cell)
+    encoder = any(name.startswith("drive_angle") for name in columns)
     if encoder:
         sample["truth_drive_angle"] = sample["drive_angle"].copy()
     sample |= {name: np.empty_like(sample["drive_angle"]) for name in CHANNELS}
@@ -63,24 +68,26 @@ def measure(
             cell, some = cells[number], rows[its]
             rng = Together([noise[i] for i in some])
             in_a_row = loads[its].reshape(its.size, -1, 3)
-            readings = corrupted_loads(cell, in_a_row, rng, scale[some]).reshape(its.size, *loads.shape[1:])
+            zeros = 0.0 if drifts is None else drifts[some, None] * elapsed(in_a_row.shape[1])[:, None]
+            readings = corrupted_loads(cell, in_a_row, rng, scale[some], zeros=zeros)
+            readings = readings.reshape(its.size, *loads.shape[1:])
             for k, name in enumerate(CHANNELS):
                 sample[name][some] = readings[..., k]
             if encoder:
                 sample["drive_angle"][some] = corrupted_angles(cell, sample["drive_angle"][some], direction[some], rng)
 
 
-def _cells(spec: Specification, drawn: Mapping[str, Floats], count: int) -> tuple[list[LoadCell], Index, Floats]:
-    """Return load cells, the index of the cell of each record, and factors on the noise of its channels."""
-    columns, scale = {name: drawn[f"load_cell.{name}"] for name in spec.load_cell}, np.ones((count, 3))
+def _cells(columns: dict[str, Floats], count: int) -> tuple[list[LoadCell], Index, Floats]:
+    """Return load cells from columns of entries, the index of each record's cell, and factors on noises."""
+    scale = np.ones((count, 3))
     if not columns:
         return [LoadCell()], np.zeros(count, dtype=np.intp), scale
     is_finite = all(np.all(np.isfinite(values)) for values in columns.values())
     if is_finite and "relative_noise" not in columns:
         for k, name in enumerate(("moment_noise", "force_noise", "force_noise")):
             if name in columns:
-                scale[:, k] = drawn[f"load_cell.{name}"]
-                columns[name] = np.ones(count)
+                scale[:, k] = columns[name]
+        columns |= {name: np.ones(count) for name in ("moment_noise", "force_noise") if name in columns}
     entries, cell_of = np.unique(np.column_stack(list(columns.values())), axis=0, return_inverse=True)
     rows = [dict(zip(columns, row, strict=True)) for row in entries.tolist()]
     differ = {name for name, values in columns.items() if np.any(values != values[0])}

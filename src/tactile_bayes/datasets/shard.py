@@ -24,7 +24,8 @@ from tactile_bayes.errors import SpecificationError
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of
-from tactile_bayes.record.schema import ATTRIBUTE_UNITS
+from tactile_bayes.rig.parameters import parameter_named
+from tactile_bayes.rig.rig_file import ROD_UNITS
 from tactile_bayes.tasks import write_atomically
 
 __all__ = ["Written", "file_in", "records_as_dataset", "shard_file", "write_shard"]
@@ -115,13 +116,20 @@ def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
     for name, values in records.drawn.items():
         if name.startswith("rod."):
             entry = name.replace(".", "_")
-            unit = ATTRIBUTE_UNITS[entry] if spec.units == "SI" else _plain(ATTRIBUTE_UNITS[entry])
+            unit = ROD_UNITS[name.removeprefix("rod.")]
+            unit = unit if spec.units == "SI" else _plain(unit)
             variables[entry] = ("record", values, {"units": unit, "long_name": entry.replace("_", " ")})
         elif name.startswith("load_cell."):
             entry = name.removeprefix("load_cell.")
             unit = LOAD_CELL_UNITS[entry] if spec.units == "SI" else _plain(LOAD_CELL_UNITS[entry])
             long_name = f"load cell's {entry.replace('_', ' ')}"
             variables[f"load_cell_{entry}"] = ("record", values, {"units": unit, "long_name": long_name})
+        elif name.startswith("unknown."):
+            parameter = parameter_named(name.removeprefix("unknown."))
+            assert parameter is not None
+            unit = parameter.unit if spec.units == "SI" else _plain(parameter.unit)
+            attrs_of = {"units": unit, "long_name": parameter.meaning}
+            variables[f"truth_{parameter.name}"] = ("record", values, attrs_of)
     variables |= _of_sweeps(spec, records.sweep)
     variables |= _of_samples(spec, records.sample)
     coords: dict[str, Any] = {
@@ -132,7 +140,7 @@ def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
         "title": spec.name,
         "units": spec.units,
         "load_cell_frame": spec.frame,
-        "friction": spec.friction,
+        **({} if spec.friction is None else {"friction": spec.friction}),
         "specification_sha256": spec.sha256,
     }
     return xr.Dataset(variables, coords, attrs)

@@ -145,13 +145,13 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
     if spec.single:
         entries = {n.removeprefix("load_cell_"): v for n, v in attrs.items() if n.startswith("load_cell_")}
         _restore_limits(columns, LoadCell.from_entries(entries))
-    if spec.friction:
-        attrs["truth_friction"] = spec.friction
+    attrs |= {f"truth_{name}": float(data[f"truth_{name}"]) for name in spec.unknown}
     if not truth:
         attrs = {name: value for name, value in attrs.items() if not name.startswith("truth_")}
     rod = None
     if spec.rod:
-        rod = Rod(**{name: float(data[f"rod_{name}"]) for name in spec.rod})
+        names = ["flexural_rigidity" if name == "youngs_modulus" else name for name in spec.rod]
+        rod = Rod(**{name: float(data[f"rod_{name}"]) for name in names})
     order = [name for name in COLUMNS if name in columns] + [name for name in columns if name not in COLUMNS]
     known = {name: columns[name] for name in order if column_of(name) is not None}
     return make_record(known, Rig(rod=rod, load_cell=LoadCell(frame=spec.frame)), attrs=attrs)

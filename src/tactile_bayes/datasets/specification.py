@@ -16,6 +16,7 @@ from tactile_bayes.datasets.specification_text import meaning
 from tactile_bayes.datasets.variations import Variation
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import Frame
+from tactile_bayes.rig.rig_prior import RigPrior
 
 __all__ = ["Drive", "Group", "Specification"]
 
@@ -71,8 +72,7 @@ class Specification:
     each_group : bool
         Whether the groups are used in turn, and not drawn.
     rod : mapping of str to Variation
-        length [m], flexural_rigidity [N m²], diameter [m], rest_curvature [1/m] and taper; of a dimensionless data set
-        only diameter, rest_curvature [L, 1/L] and taper, or nothing.
+        Numbers of `Rod`, of a dimensionless data set without length and flexural_rigidity; or youngs_modulus [N/m²].
     bases : tuple of (Variation, Variation)
         Pivots (x, y) [m, or rod lengths].
     directions : tuple of str
@@ -82,10 +82,12 @@ class Specification:
         rod lengths], heading, drive_angle, and turn, the change of the drive angle on the way [rad].
     drive : Drive
         Number of samples, and drive angles of rotations.
-    friction : float
-        Coulomb's coefficient μ.
     load_cell : mapping of str to Variation
         Entries of a data sheet, in the units of the data set.
+    unknown : mapping of str to Variation
+        Deviations of the rig from what rod and load cell state, without those that are as stated.
+    calibration : RigPrior, optional
+        Joint distribution of those that a calibration has found.
     frame : {"fixed", "turning"}
         Frame of the load cell.
     single : bool
@@ -105,8 +107,9 @@ class Specification:
     directions: tuple[str, ...]
     translations: tuple[Mapping[str, Variation], ...]
     drive: Drive
-    friction: float
     load_cell: Mapping[str, Variation]
+    unknown: Mapping[str, Variation]
+    calibration: RigPrior | None
     frame: Frame
     single: bool
 
@@ -132,12 +135,18 @@ class Specification:
     @property
     def has_taper(self) -> bool:
         """True if the rod is, or may be, tapered."""
-        return self._may_have("taper")
+        return self._may_have("taper") or "taper" in self.unknown
 
     def _may_have(self, name: str) -> bool:
         """Return whether a quantity of the rod may differ from zero."""
         distribution = self.rod.get(name)
         return distribution is not None and (distribution.is_drawn or any(distribution.numbers))
+
+    @property
+    def friction(self) -> float | None:
+        """Coulomb's coefficient if it is known, None if it differs from record to record."""
+        said = self.unknown.get("friction")
+        return 0.0 if said is None else said.numbers[0] if said.kind == "constant" else None
 
     @property
     def shards(self) -> int:
@@ -167,12 +176,19 @@ class Specification:
             **{f"scan.bases[{b}]": {"[0]": x, "[1]": y} for b, (x, y) in enumerate(self.bases)},
             **{f"scan.translations[{k}].": one for k, one in enumerate(self.translations)},
             "load_cell.": self.load_cell,
+            "unknown.": self.unknown,
         }
         return tuple(
             (prefix + name, distribution)
             for prefix, distributions in tables.items()
             for name, distribution in distributions.items()
         )
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Keys of all numbers of a record: those of distributions, and a flexural rigidity that follows from others."""
+        follows = ("rod.flexural_rigidity",) if "youngs_modulus" in self.rod else ()
+        return (*(key for key, _ in self.distributions), *follows)
 
     @property
     def combinations(self) -> int:

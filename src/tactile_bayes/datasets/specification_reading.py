@@ -7,7 +7,8 @@ import os
 import re
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import replace
-from difflib import get_close_matches
+from functools import partial
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -23,6 +24,7 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
 from tactile_bayes.contours.family import ContourFamily
+from tactile_bayes.datasets.deviations import deviations_of_table
 from tactile_bayes.datasets.specification import Drive, Group, Specification
 from tactile_bayes.datasets.specification_text import DEFAULTS, SCAN, left_out, toml_of
 from tactile_bayes.datasets.variations import Variation, variation_of
@@ -31,24 +33,26 @@ from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
-from tactile_bayes.record.spelling import look_alikes
+from tactile_bayes.record.spelling import look_alikes, refuse_unknown_keys
+from tactile_bayes.rig import Rig
+from tactile_bayes.rig.rig_file import ROD_UNITS, calibration_of, entries_of_cell, keys_of, number_in
+from tactile_bayes.rig.rig_file import TABLES as OF_RIG
 from tactile_bayes.tasks.documents import LARGEST, read_toml
 
 __all__ = ["read_specification", "read_text", "rule_of"]
 
 _MOST_SHARDS = 1_000_000
-_MOST_NAMED = 8
-"""Largest number of keys that the message about an unknown key lists."""
-
 _LARGEST_SEED = 2**63 - 1
 
 _TABLES: Mapping[str, Iterable[str]] = {
-    "": ("name", "description", "records", "seed", "shard_records", "precision", "each_contour"),
-    "rod.": ("length", "flexural_rigidity", "diameter", "rest_curvature", "taper"),
-    "scan.": ("bases", "directions", "translations", "samples", "from_degrees", "to_degrees", "margin", "friction"),
-    "load_cell.": ("frame", *LOAD_CELL_UNITS),
+    "": ("name", "description", "records", "seed", "shard_records", "precision", "each_contour", "contours", "rig"),
+    "scan": ("bases", "directions", "translations", "samples", "from_degrees", "to_degrees", "margin"),
+    **{name: OF_RIG[name] for name in ("rod", "load_cell", "unknown", "calibration")},
 }
-"""Keys of each table."""
+"""Keys of each table; those of a rig are as in rig.toml."""
+
+_TRACED = ("shape", "rigidity_profile")
+"""What rig.toml states along a rod, and no data set draws."""
 
 _OF_ROTATIONS = ("bases", "directions", "from_degrees", "to_degrees", "margin")
 _OF_TRANSLATIONS = ("base", "heading", "drive_angle", "turn", "travel", "step")
@@ -66,7 +70,8 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
     Parameters
     ----------
     source : path-like or mapping
-        File, or its content as nested mappings.
+        File, or its content as nested mappings. Its `rig` is the path of a rig.toml, relative to the file, or a `Rig`,
+        in place of the tables of that rig.
 
     Returns
     -------
@@ -86,31 +91,54 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
     >>> spec.shards, spec.units
     (1, 'dimensionless')
     """
+    folder = Path()
     if isinstance(source, Mapping):
-        text, where = toml_of(source), "specification"
+        where = "specification"
+        try:
+            text = toml_of(_with_rig(source, folder))
+        except ParameterError as error:
+            raise SpecificationError(f"{where}: {error}") from error
     else:
         path = check_path("the specification", source, "give a file, like 'study.toml', or its content as a mapping")
-        where = str(path)
+        where, folder = str(path), path.parent
         try:
             with open(path, encoding="utf-8-sig") as file:
                 text = file.read(LARGEST + 1)
         except UnicodeDecodeError as error:
             raise SpecificationError(f"{where}: not a text in UTF-8: {error.reason} at byte {error.start}") from error
     try:
-        return read_text(text)
+        return read_text(text, folder)
     except SpecificationError as error:
         raise SpecificationError(f"{where}: {error}") from error
 
 
-def read_text(text: str) -> Specification:
-    """Read the specification in a TOML text; see `read_specification`."""
+def read_text(text: str, folder: Path = Path()) -> Specification:
+    """Read the specification in a TOML text, with the rig that it names; see `read_specification`."""
     try:
         table = read_toml(text)
         if not table:
             raise SpecificationError("it is empty: `tactile-bayes dataset example` prints one to start from")
+        if "rig" in table:
+            table = _with_rig(table, folder)
+            text = toml_of(table)
         return _specification(table, text)
     except ParameterError as error:
         raise SpecificationError(f"{error}{_look_alikes_at(str(error), text)}") from error
+
+
+def _with_rig(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the tables of a specification with those of the rig that it names in place of its name."""
+    own = dict(table)
+    rig = own.pop("rig", None)
+    if rig is None:
+        return own
+    if twice := [name for name in ("rod", "load_cell", "calibration") if name in own]:
+        raise SpecificationError(f"there are a rig and a table [{twice[0]}], which it states: leave one of the two")
+    if not isinstance(rig, Rig):
+        check_kind("rig", rig, str, "give the path of a rig.toml")
+        rig = Rig.read(folder / rig)
+    tables = {"unknown": {}, **rig.tables}
+    return {**own, **{name: value for name, value in tables.items() if name != "file" and name not in own}}
 
 
 def _look_alikes_at(message: str, text: str) -> str:
@@ -126,13 +154,20 @@ def rule_of(error: ContourError) -> str:
 
 
 def _specification(table: Mapping[str, Any], text: str) -> Specification:
-    _refuse_unknown(table, (*_TABLES[""], "contours", "rod", "scan", "load_cell"), "")
+    refuse_unknown_keys(table, (*_TABLES[""], *list(_TABLES)[1:]), "", _TABLES)
     said = {**DEFAULTS, **table}
     check_kind("each_contour", said["each_contour"], bool, "write true or false")
     for key in ("name", "description"):
         check_kind(key, said[key], str, "give a text")
-    scan, load_cell = _table(table, "scan"), {"frame": "fixed", **_table(table, "load_cell")}
-    frame = check_choice("load_cell.frame", load_cell.pop("frame"), FRAMES)
+    scan, said_of_cell, said_of_rod = (_table(table, name) for name in ("scan", "load_cell", "rod"))
+    frame = check_choice("load_cell.frame", said_of_cell.get("frame", "fixed"), FRAMES)
+    is_si = "length" in said_of_rod
+    rod, load_cell = _rod(said_of_rod, is_si), _load_cell(said_of_cell, is_si)
+    translations = _translations(scan)
+    bases = () if translations else _bases((SCAN | scan)["bases"])
+    directions = () if translations else _directions((SCAN | scan)["directions"])
+    calibration = calibration_of(_table(table, "calibration")) if "calibration" in table else None
+    unknown = table.get("unknown")
     found = Specification(
         text=text,
         name=said["name"],
@@ -142,13 +177,21 @@ def _specification(table: Mapping[str, Any], text: str) -> Specification:
         seed=_whole(said.get("seed"), "seed", 0, _LARGEST_SEED),
         groups=_groups(said),
         each_group=said["each_contour"],
-        rod=_rod(_table(table, "rod")),
-        bases=() if "translations" in scan else _bases((SCAN | scan)["bases"]),
-        directions=() if "translations" in scan else _directions((SCAN | scan)["directions"]),
-        translations=_translations(scan),
+        rod=rod,
+        bases=bases,
+        directions=directions,
+        translations=translations,
         drive=_drive(scan),
-        friction=_number((SCAN | scan)["friction"], "scan.friction", 0.0, 0.84),
-        load_cell=_load_cell(load_cell),
+        load_cell=load_cell,
+        unknown=deviations_of_table(
+            unknown if unknown is None or isinstance(unknown, str) else _table(table, "unknown"),
+            is_si,
+            pivots=len(translations or bases),
+            turns_back=len(directions) > 1,
+            load_cell=load_cell,
+            calibration=calibration,
+        ),
+        calibration=calibration,
         frame=cast(Frame, frame),
         single=check_choice("precision", said["precision"], ("double", "single")) == "single",
     )
@@ -183,7 +226,7 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
     _refuse_replaced(group, name, key)
     # In the order in which numbers are drawn.
     names = sorted(family.parameters, key=lambda parameter: (parameter == "x_c", parameter.startswith("right_")))
-    _refuse_unknown(group, ("family", "weight", *names), f"{key}.")
+    refuse_unknown_keys(group, ("family", "weight", *names), f"{key}.")
     values = {"weight": 1.0, **left_out(family), **group}
     missing = [parameter for parameter in names if parameter not in values]
     if missing:
@@ -228,21 +271,37 @@ def _refuse_no_contour(family: ContourFamily, distributions: Mapping[str, Variat
                 raise SpecificationError(f"{key}.{name} {verb} {number:g}: {rule_of(error)}") from error
 
 
-def _rod(rod: Mapping[str, Any]) -> dict[str, Variation]:
+def _rod(rod: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
     if not rod:
         return {}
-    if ("length" in rod) != ("flexural_rigidity" in rod):
+    for name, value in rod.items():
+        if name in _TRACED or (isinstance(value, str) and value.lstrip().startswith("{")):
+            raise SpecificationError(
+                f"rod.{name} states the course of something along the rod, and rods of data sets are straight or arcs, "
+                "uniform or tapered: give length, flexural_rigidity, rest_curvature and taper"
+            )
+    if "youngs_modulus" in rod and ("flexural_rigidity" in rod or "diameter" not in rod):
+        raise SpecificationError("rod.youngs_modulus goes with a diameter, and without flexural_rigidity")
+    if is_si != ("flexural_rigidity" in rod or "youngs_modulus" in rod):
         raise SpecificationError(
-            "rod needs length [m] and flexural_rigidity [N m²] together; without them lengths are in rod lengths"
+            "rod needs length [m] and flexural_rigidity [N m²] (or youngs_modulus and diameter) together; without them "
+            "lengths are in rod lengths"
         )
-    given = {"diameter": 0.0, **rod} if "length" in rod else rod
-    distributions = {name: variation_of(given[name], f"rod.{name}") for name in _TABLES["rod."] if name in given}
-    signed = {"rest_curvature", "taper"}
-    _refuse_negative({name: of for name, of in distributions.items() if name not in signed}, "rod.", {"diameter"})
+    given = {"diameter": 0.0, **rod} if is_si else rod
+    distributions = {
+        name: variation_of(given[name], f"rod.{name}", partial(number_in, unit=unit, name=f"rod.{name}", is_si=is_si))
+        for name, unit in ROD_UNITS.items()
+        if name in given
+    }
+    signed, may_vanish = {"rest_curvature", "taper"}, {"diameter", "stem", "rest_curvature_deviation"}
+    _refuse_negative({name: of for name, of in distributions.items() if name not in signed}, "rod.", may_vanish)
     if "taper" in distributions:
         _refuse_taper(distributions["taper"])
     try:
-        Rod(**_at_share(distributions, 0.5))
+        numbers = _at_share(distributions, 0.5)
+        if "youngs_modulus" in numbers:
+            numbers["flexural_rigidity"] = numbers.pop("youngs_modulus") * math.pi * numbers["diameter"] ** 4 / 64.0
+        Rod(**numbers)
     except ParameterError as error:
         raise SpecificationError(f"rod: {error}") from error
     return distributions
@@ -260,8 +319,11 @@ def _refuse_taper(taper: Variation) -> None:
         )
 
 
-def _load_cell(table: Mapping[str, Any]) -> dict[str, Variation]:
-    distributions = {name: variation_of(value, f"load_cell.{name}") for name, value in table.items()}
+def _load_cell(table: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
+    distributions = {
+        name: variation_of(value, key, partial(number_in, unit=LOAD_CELL_UNITS[name], name=key, is_si=is_si))
+        for name, key, value in entries_of_cell(table)
+    }
     if any(name.startswith("ornstein_uhlenbeck") for name in distributions):
         distributions.setdefault("ornstein_uhlenbeck_time", Variation("constant", (OrnsteinUhlenbeck().time,)))
     for share in (0.05, 0.5, 0.95):
@@ -331,7 +393,7 @@ def _translations(scan: Mapping[str, Any]) -> tuple[dict[str, Variation], ...]:
 
 
 def _translation(said: Mapping[str, Any], key: str) -> dict[str, Variation]:
-    _refuse_unknown(said, _OF_TRANSLATIONS, f"{key}.")
+    refuse_unknown_keys(said, _OF_TRANSLATIONS, f"{key}.")
     for name in ("base", "heading", "drive_angle"):
         if name not in said:
             raise SpecificationError(
@@ -379,7 +441,7 @@ def _table(table: Mapping[str, Any], key: str) -> dict[str, Any]:
     """Return one of the inner tables, and refuse unknown keys."""
     value = table.get(key, {})
     check_kind(key, value, dict, f"write it as a table, [{key}]")
-    _refuse_unknown(value, _TABLES[f"{key}."], f"{key}.")
+    refuse_unknown_keys(value, keys_of(key, value) if key in OF_RIG else _TABLES[key], f"{key}.", _TABLES)
     return dict(value)
 
 
@@ -392,19 +454,3 @@ def _whole(value: Any, key: str, least: int, most: int) -> int:
 
 def _number(value: Any, key: str, least: float, most: float) -> float:
     return check_number(key, value, f"give a number from {least:g} to {most:g}", least=least, most=most)
-
-
-def _refuse_unknown(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
-    known = list(known)
-    for key in table:
-        if key in known:
-            continue
-        if elsewhere := [where for where, keys in _TABLES.items() if key in keys]:
-            place = f"the table [{elsewhere[0][:-1]}]" if elsewhere[0] else "the top, above the first table"
-            hint = f"its place is {place}"
-        elif near := get_close_matches(key, known, n=1):
-            hint = f"did you mean {near[0]!r}?"
-        else:
-            more = " and others: `tactile-bayes dataset example` names all" if len(known) > _MOST_NAMED else ""
-            hint = f"there are {', '.join(known[:_MOST_NAMED])}{more}"
-        raise SpecificationError(f"there is no key {prefix + key!r}{look_alikes(key)}: {hint}")

@@ -15,7 +15,7 @@ __all__ = ["DEFAULTS", "SCAN", "UNNAMED", "differences", "left_out", "meaning", 
 
 UNNAMED = "unnamed"
 
-SCAN = {"bases": [[0.0, 0.0]], "directions": ["forward", "backward"], "samples": 180, "margin": 0.1, "friction": 0.0}
+SCAN = {"bases": [[0.0, 0.0]], "directions": ["forward", "backward"], "samples": 180, "margin": 0.1}
 DEFAULTS = {
     "name": UNNAMED,
     "description": "",
@@ -25,6 +25,7 @@ DEFAULTS = {
     "scan": SCAN,
     "load_cell": {"frame": "fixed"},
     "rod": {"diameter": 0.0},
+    "unknown": "nothing",
 }
 """Default values of keys; a specification with an explicit default is the same."""
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.checks import shown
-from tactile_bayes.distributions import KINDS, is_finite_number
+from tactile_bayes.checks import as_number, shown
+from tactile_bayes.distributions import KINDS, Distribution, distribution_of_table, in_words, support_of
 from tactile_bayes.errors import SpecificationError
 
 __all__ = ["Variation", "variation_of"]
+
+
+_WORDS = {"default": "the default of the rig", "calibrated": "as the calibration of the rig has found"}
 
 
 @dataclass(frozen=True)
@@ -22,19 +26,22 @@ class Variation:
 
     Parameters
     ----------
-    kind : {"constant", "uniform", "log_uniform", "normal", "log_normal", "half_normal", "choice", "each"}
+    kind : {"constant", "uniform", "log_uniform", "normal", "log_normal", "half_normal", "choice", "each", "scipy"}
         Constant: the number. Uniform and log_uniform: the two limits. Normal: mean and standard deviation; log_normal:
         median, and standard deviation of the natural logarithm; half_normal: the scale. Choice: one of a list with
         equal probabilities. Each: the numbers of the list in turn, in all combinations with the specification's other
-        lists, except those on the same axis, which advance in step.
+        lists, except those on the same axis, which advance in step. Scipy: a distribution of `scipy.stats`. Deviations
+        of a rig may be "default", the default distribution around what its data sheets state, or "calibrated".
     numbers : tuple of float
-        Parameters of the kind.
+        Parameters of the kind; of "scipy" the finite ends of its support.
     """
 
     kind: str
-    numbers: tuple[float, ...]
+    numbers: tuple[float, ...] = ()
     axis: str | None = None
     """Axis of a list."""
+    of: Any = None
+    """Frozen distribution of the kind "scipy"."""
 
     @property
     def is_drawn(self) -> bool:
@@ -45,8 +52,8 @@ class Variation:
         """Least possible number; for log_normal, which is always positive, the median."""
         if self.kind == "normal" and self.numbers[1]:
             return -math.inf
-        if self.kind == "half_normal":
-            return 0.0
+        if self.kind in ("half_normal", "scipy"):
+            return 0.0 if self.of is None else support_of(self.of)[0]
         return self.numbers[0] if self.kind in ("normal", "log_normal") else min(self.numbers)
 
     @property
@@ -56,6 +63,8 @@ class Variation:
             return math.inf if self.numbers[1] else self.numbers[0]
         if self.kind == "half_normal":
             return math.inf if self.numbers[0] else 0.0
+        if self.kind == "scipy":
+            return support_of(self.of)[1]
         return max(self.numbers)
 
     @property
@@ -66,7 +75,17 @@ class Variation:
             return f"one of {', '.join(numbers)}"
         if self.kind == "each":
             return f"each of {', '.join(numbers)}" + (f", on the axis {self.axis}" if self.axis else "")
+        if self.kind in _WORDS:
+            return _WORDS[self.kind]
+        if self.kind == "scipy":
+            return in_words(self.of)
         return KINDS[self.kind].text.format(*numbers) if self.kind in KINDS else numbers[0]
+
+    @property
+    def frozen(self) -> Distribution:
+        """The distribution as a frozen one of scipy.stats."""
+        found: Distribution = KINDS[self.kind].frozen(*self.numbers) if self.of is None else self.of
+        return found
 
     def at(self, share: Floats, turn: Index) -> Floats:
         """Return the quantiles at probabilities in [0, 1), for records with given positions in the list."""
@@ -76,11 +95,15 @@ class Variation:
             return np.array(self.numbers)[turn]
         if self.kind == "constant":
             return np.full(share.shape, self.numbers[0])
+        if self.kind == "scipy":
+            return np.asarray(self.of.ppf(np.maximum(share, 2.0**-54)))
         return np.asarray(KINDS[self.kind].at(*self.numbers, share))
 
 
-def variation_of(value: Any, key: str) -> Variation:
+def variation_of(value: Any, key: str, number: Callable[[Any], float | None] = as_number) -> Variation:
     """Parse the distribution that a value of a specification states; messages name it by `key`.
+
+    `number` returns a number that stands there, also as a text with a unit, or None if there is none.
 
     Raises
     ------
@@ -92,8 +115,9 @@ def variation_of(value: Any, key: str) -> Variation:
     >>> variation_of({"uniform": [0.3, 0.8]}, "contours[0].q").at(np.array([0.0, 0.5]), np.zeros(2, dtype=int))
     array([0.3 , 0.55])
     """
-    if is_finite_number(value):
-        return Variation("constant", (float(value),))
+    plain = number(value)
+    if plain is not None and math.isfinite(plain):
+        return Variation("constant", (plain,))
     kinds = (*KINDS, "choice", "each")
     hint = f"give a number, or a distribution such as {{ uniform = [0.3, 0.8] }} (distributions: {', '.join(kinds)})"
     axis = None
@@ -106,22 +130,25 @@ def variation_of(value: Any, key: str) -> Variation:
             )
     if not isinstance(value, dict) or len(value) != 1:
         raise SpecificationError(f"{key} is {value!r:.1000}: {hint}")
-    ((kind, numbers),) = value.items()
+    ((kind, stated),) = value.items()
+    if isinstance(stated, dict):
+        found = distribution_of_table(value, key, number)
+        assert not isinstance(found, float)
+        return Variation("scipy", tuple(end for end in support_of(found) if math.isfinite(end)), of=found)
     if kind not in kinds:
         raise SpecificationError(f"{key} has the distribution {shown(kind)}, which is unknown: {hint}")
-    if kind in KINDS and KINDS[kind].size == 1 and is_finite_number(numbers):
-        numbers = [numbers]
-    if not isinstance(numbers, list) or not numbers or not all(map(is_finite_number, numbers)):
-        raise SpecificationError(f"{key}.{kind} is {shown(numbers)}: give a list of finite numbers")
+    if kind in KINDS and KINDS[kind].size == 1 and not isinstance(stated, list):
+        stated = [stated]
+    numbers = [number(each) for each in stated] if isinstance(stated, list) else []
+    if not numbers or not all(each is not None and math.isfinite(each) for each in numbers):
+        raise SpecificationError(f"{key}.{kind} is {shown(stated)}: give a list of finite numbers")
     if kind in KINDS and len(numbers) != KINDS[kind].size:
         raise SpecificationError(f"{key}.{kind} has {len(numbers)} numbers: give {KINDS[kind].size}")
     if kind in KINDS and not KINDS[kind].is_possible(*numbers):
-        raise SpecificationError(f"{key}.{kind} is {shown(numbers)}: {KINDS[kind].rule}")
-    found = Variation(kind, tuple(float(number) for number in numbers), axis)
+        raise SpecificationError(f"{key}.{kind} is {shown(stated)}: {KINDS[kind].rule}")
+    made = Variation(kind, tuple(each for each in numbers if each is not None), axis)
     with np.errstate(all="ignore"):
-        ends = found.at(np.array([0.0, 1.0 - 2.0**-53]), np.zeros(2, dtype=np.intp))
+        ends = made.at(np.array([0.0, 1.0 - 2.0**-53]), np.zeros(2, dtype=np.intp))
     if not np.isfinite(ends).all():
-        raise SpecificationError(
-            f"{key}.{kind} is {shown(numbers)}: its draws may be larger than any number, narrow it"
-        )
-    return found
+        raise SpecificationError(f"{key}.{kind} is {shown(stated)}: its draws may be larger than any number, narrow it")
+    return made

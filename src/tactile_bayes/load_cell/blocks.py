@@ -19,6 +19,7 @@ __all__ = [
     "Blocks",
     "are_blocks",
     "bounds_in_blocks",
+    "elapsed",
     "elapsed_in",
 ]
 
@@ -75,7 +76,12 @@ def elapsed_in(record: xr.Dataset) -> Floats:
     """Return the position of each sample in its record, linear from the first reading (−½) to the last (½)."""
     if "blocks" in record.attrs and "block_elapsed" in record:
         return np.asarray(record["block_elapsed"].values, dtype=float)
-    return np.linspace(-0.5, 0.5, record.sizes["sample"])
+    return elapsed(record.sizes["sample"])
+
+
+def elapsed(samples: int) -> Floats:
+    """Return the position of each sample in a record, linear from the first (−½) to the last (½)."""
+    return np.linspace(-0.5, 0.5, samples)
 
 
 def bounds_in_blocks(part: Index, unloaded: Flags) -> ContactBounds:

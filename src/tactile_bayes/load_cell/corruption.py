@@ -20,15 +20,16 @@ def corrupted_loads(
     rng: Draws,
     noise_scale: ArrayLike = 1.0,
     discrepancy: Discrepancy | None = None,
+    zeros: ArrayLike = 0.0,
 ) -> Floats:
     """Simulate readings of loads: lever, gain and bias, drift, noise and discrepancy, then the range, then the steps.
 
-    Shapes: loads (..., samples, 3), noise_scale (..., 3) → (..., samples, 3).
+    Shapes: loads (..., samples, 3), noise_scale (..., 3) → (..., samples, 3); `zeros` add to the bias.
     """
     noise = rng.standard_normal(loads.shape)
     if any(sheet.correlation):
         noise = noise @ np.linalg.cholesky(sheet.correlation_matrix).T
-    readings = np.array(sheet.expected(loads))
+    readings = sheet.expected(loads) + np.asarray(zeros)
     if any(sheet.bias_uncertainty):
         readings += np.array(sheet.bias_uncertainty) * rng.standard_normal((*loads.shape[:-2], 1, 3))
     if sheet.drift is not None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
@@ -25,12 +26,12 @@ _TAKEN_OUT = tuple(
 )
 
 
-def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
-    """Measure a record with a sensor; see `LoadCell.measure`."""
+def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator, zeros: ArrayLike = 0.0) -> xr.Dataset:
+    """Measure a record with a sensor, and zeros in addition to its bias; see `LoadCell.measure`."""
     made = validate(record if sheet.frame is None else in_frame(record, sheet.frame))
     entries = _after(sheet, stated_entries(made)).entries()
     present = present_channels(made)
-    readings = corrupted_loads(sheet, np.stack([made[name].values for name in CHANNELS], axis=-1), rng)
+    readings = corrupted_loads(sheet, np.stack([made[name].values for name in CHANNELS], axis=-1), rng, zeros=zeros)
     for index, channel in enumerate(CHANNELS):
         if channel not in present:
             continue

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.contacts.contact_coordinates import (
     ARCLENGTH,
     DRIVE_ANGLE,
@@ -22,6 +23,7 @@ from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS, carried_sweeps, travels_of
 from tactile_bayes.record.frame import to_fixed_axes
+from tactile_bayes.rig.stated import cell_with
 
 __all__ = ["METHODS", "SOURCES", "Method", "amplification"]
 
@@ -104,7 +106,11 @@ def amplification(plan: Plan) -> xr.Dataset:
     surface of possible contacts.
     """
     refined = plan if plan.drive_angles is not None else _refined(plan)
-    record, rod = refined.scan.record, plan.rod
+    if plan.rig.known.get("suspension_compliance"):
+        raise ParameterError(
+            "suspension_compliance is known, and amplification is of a pivot that does not yield: leave it out"
+        )
+    record, rod = refined.scan.record, plan.rig.known_rod
     loaded = np.flatnonzero(record.truth_contact_phase.values != "none")
     chosen = record.isel(sample=loaded)
     contacts, delta = _forward(refined, record, loaded), float(np.arctan(plan.friction))
@@ -169,7 +175,8 @@ def _refined(plan: Plan) -> Plan:
 
 def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
     """Return some contacts of a record in the sweep frame."""
-    rod, cell = plan.rod, plan.cell.dimensionless(plan.rod)
+    rod = plan.rig.known_rod
+    cell = cell_with(plan.cell, plan.rig.known).dimensionless(rod)
     units = rod.load_units
     loads = np.stack([record[name].values for name in CHANNELS], axis=-1) / units
     angle = record.drive_angle.values

@@ -85,7 +85,8 @@ def error_cell(task: tuple[MapTask, int]) -> CellOutcome:
     numbers["gap_width"] = sum(stretch.end - stretch.begin for stretch in stretches(scan) if stretch.name == "gap")
     numbers |= _expected(plan, study.probability)
     seeds = child(study.seed, number).spawn(study.replicates)
-    measured = [plan.cell.measure(scan.record, rng=seed) for seed in seeds]
+    rig = replace(plan.rig, load_cell=plan.cell)
+    measured = [rig.measure(scan.record, rng=seed) for seed in seeds]
     numbers |= _reconstructed(plan, measured)
     numbers |= _inferred(
         plan, measured[: study.posteriors.get(number, 0)], study.probability, child(study.seed, number, 1)

@@ -20,7 +20,6 @@ from tactile_bayes.errors import ClearanceWarning, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.parameters.nuisances import deviating, stated_values
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import CERTAIN
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -28,9 +27,9 @@ from tactile_bayes.planning.family_parameters import family_parameters
 from tactile_bayes.planning.record_information import ReadingSlopes, reading_slopes
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, validate, with_rod
-from tactile_bayes.rig.corrected import Corrected
-from tactile_bayes.rig.parameters import GROUPS
+from tactile_bayes.rig.corrected import corrected
 from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.sweep import Drive, Scan, scan
 from tactile_bayes.sweep.scanning import drives_of
 
@@ -47,8 +46,8 @@ class Plan:
         A contour of a family with parameters, in the unit of the rod's length.
     rig : Rig, optional
         As in `infer_contour`; by default with the dimensionless rod. Its load cell has by default force_noise
-        0.05 EI/L² and moment_noise 0.02 EI/L. A friction that is known acts in the sweeps; if it is unknown, they have
-        none.
+        0.05 EI/L² and moment_noise 0.02 EI/L. Numbers that are known act in sweeps and readings; what is unknown is as
+        stated there.
     drive, base, direction, drive_step, drive_angles
         As in `scan`.
     family : Family, optional
@@ -57,8 +56,8 @@ class Plan:
     Raises
     ------
     ParameterError
-        If a channel has no noise or noise without a variance, a number that is known of the rig deviates from what rod
-        and load cell state, the contour is not of the given family, or an argument has a wrong type.
+        If a channel has no noise or noise without a variance, the contour is not of the given family, or an argument
+        has a wrong type.
 
     Examples
     --------
@@ -81,7 +80,6 @@ class Plan:
         check_single("contour", self.contour)
         drives_of(self.drive, self.base)
         check_choice("direction", self.direction, ("both", "forward", "backward"))
-        self._refuse_deviations()
         self._refuse_other_family()
         deviations = self.cell.standard_deviations
         silent = [name for name in CHANNELS if not 0.0 < deviations[name] < np.inf]
@@ -89,16 +87,6 @@ class Plan:
             raise ParameterError(
                 f"the load cell states no finite noise of {', '.join(silent)}: without it errors are "
                 "unknown; give LoadCell(force_noise=..., moment_noise=...), from its data sheet, or from_zero_load"
-            )
-
-    def _refuse_deviations(self) -> None:
-        """Refuse known numbers that the sweeps would not have."""
-        known = {n: v for n, v in self.rig.known.items() if n not in ("friction", *GROUPS["discrepancy"])}
-        if off := deviating(known, (), self.rod, self.cell):
-            name, value = next(iter(off.items()))
-            raise ParameterError(
-                f"{name} is known to be {value:g}, but a plan is of a rod and a load cell as stated: state it in one "
-                "of these, or leave it unknown"
             )
 
     def _refuse_other_family(self) -> None:
@@ -136,7 +124,7 @@ class Plan:
             warnings.filterwarnings("ignore", message=".* a turn ", category=ClearanceWarning)
             return scan(
                 self.contour,
-                Rig(rod=self.rod, unknown={"friction": self.friction}),
+                replace(self.rig, rod=self.rod),
                 drive=self.drive,
                 direction=self.direction,
                 base=self.base,
@@ -152,12 +140,12 @@ class Plan:
     def certain(self, record: xr.Dataset) -> xr.Dataset:
         """Return an ideal record as the load cell reads it without random errors."""
         certain = LoadCell(**{name: getattr(self.cell, name) for name in (*CERTAIN, "frame")})
-        return certain.measure(record, rng=0)
+        return replace(self.rig, load_cell=certain).measure(record, rng=0)
 
     def reconstruct(self, record: xr.Dataset, method: Literal["raw", "constrained"]) -> xr.Dataset:
         """Return the contact points of a record of this plan; see `tactile_bayes.reconstruct`."""
         check_choice("method", method, ("raw", "constrained"))
-        return contacts_of(Corrected(with_rod(validate(record), self.rig.rod), self.cell, self.friction), method)
+        return contacts_of(corrected(with_rod(validate(record), self.rig.rod), self.cell, self.rig.known), method)
 
     @cached_property
     def experiment(self) -> Experiment:
@@ -180,7 +168,7 @@ class Plan:
         """
         smooth = self.model.noise.of_discrepancy
         own = {**family_parameters(self.contour)[1], **dict(zip(smooth, self.model.prior_medians(smooth), strict=True))}
-        as_stated = stated_values(self.rod, self.cell)
+        as_stated = stated_values(self.rig.known_rod, self.cell)
         return np.array([own.get(name, as_stated.get(name, 0.0)) for name in self.model.names])
 
     @cached_property

@@ -39,6 +39,7 @@ _BASES: dict[str, tuple[Dimension, Fraction]] = {
     "m": ((1, 0, 0, 0), Fraction(1)),
     "N": ((0, 1, 0, 0), Fraction(1)),
     "gf": ((0, 1, 0, 0), Fraction(980665, 10**8)),
+    "Pa": ((-2, 1, 0, 0), Fraction(1)),
     "s": ((0, 0, 1, 0), Fraction(1)),
     "rad": ((0, 0, 0, 1), Fraction(1)),
     "deg": ((0, 0, 0, 1), _DEGREE),
@@ -61,6 +62,7 @@ _COMMON = {
     (0, 1, 0, 0): ("N", "kN", "mN", "µN", "gf"),
     (1, 1, 0, 0): ("N m", "N mm", "mN m", "µN m", "mN mm"),
     (2, 1, 0, 0): ("N m²", "N cm²", "N mm²", "mN mm²"),
+    (-2, 1, 0, 0): ("Pa", "MPa", "GPa", "N/m²", "N/mm²"),
     (-1, 0, 0, 0): ("1/m", "1/cm", "1/mm"),
     (0, 0, 0, 1): ("rad", "mrad", "deg", "°"),
 }

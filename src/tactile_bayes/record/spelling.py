@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import SequenceMatcher
 
-__all__ = ["is_misspelling", "look_alikes", "nearest", "plain", "plain_number", "visible"]
+from tactile_bayes.errors import ParameterError
+
+__all__ = ["is_misspelling", "look_alikes", "nearest", "plain", "plain_number", "refuse_unknown_keys", "visible"]
 
 _STAND_FOR = {
     **dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2015\u2212\ufe63\uff0d", "-"),
@@ -25,6 +27,9 @@ _FULL_WIDTH, _TO_ASCII = range(0xFF01, 0xFF5F), 0xFEE0
 _THOUSANDS = re.compile(r"(?<=[0-9])[\u00a0\u2007\u2009\u202f\u066c\u2019](?=[0-9]{3}(?![0-9]))")
 """Separators of thousands that are used for nothing else; a blank or a comma may separate columns."""
 
+_MOST_NAMED = 8
+"""Largest number of keys that the message about an unknown key lists."""
+
 _LONGEST = 200
 """Largest number of characters of a name that is compared."""
 
@@ -39,6 +44,41 @@ def nearest(name: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | 
     """
     found = max(candidates, key=lambda candidate: _likeness(name, candidate), default=None)
     return found if found is not None and _likeness(name, found) >= cutoff else None
+
+
+def refuse_unknown_keys(
+    table: Iterable[str], known: Iterable[str], prefix: str = "", tables: Mapping[str, Iterable[str]] | None = None
+) -> None:
+    """Refuse keys of a table of a file that it cannot have, with the nearest one, or the table that has it.
+
+    Parameters
+    ----------
+    table : iterable of str
+        The keys.
+    known : iterable of str
+        Those that there are.
+    prefix : str
+        Name of the table with a dot; "" for the top.
+    tables : mapping of str to iterable of str
+        Keys of the tables of the file by their names, "" for the top.
+
+    Raises
+    ------
+    ParameterError
+        If there is such a key.
+    """
+    known = list(known)
+    for key in table:
+        if key in known:
+            continue
+        if elsewhere := [where for where, keys in (tables or {}).items() if key in keys]:
+            place = f"the table [{elsewhere[0]}]" if elsewhere[0] else "the top, above the first table"
+            hint = f"its place is {place}"
+        elif near := nearest(key, known):
+            hint = f"did you mean {near!r}?"
+        else:
+            hint = f"there are {', '.join(known[:_MOST_NAMED])}{' and others' if len(known) > _MOST_NAMED else ''}"
+        raise ParameterError(f"there is no key {prefix + key!r}{look_alikes(key)}: {hint}")
 
 
 def plain(text: str) -> str:

@@ -16,7 +16,10 @@ from tactile_bayes.distributions import Distribution, in_words, stated_text, tex
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng
+from tactile_bayes.rig.drawn import drawn_numbers
 from tactile_bayes.rig.file_format import FileFormat
+from tactile_bayes.rig.measured import measured_by
 from tactile_bayes.rig.parameters import STANDARD, members
 from tactile_bayes.rig.rig_file import named_in_errors, read_tables, stated_in, tables_of, text_of, write_file
 from tactile_bayes.rig.rig_prior import RigPrior
@@ -165,6 +168,67 @@ class Rig:
     def with_unknown(self, **said: Unknown) -> Rig:
         """Return the rig of which something else is said about some parameters."""
         return replace(self, unknown={**self.entries, **said})
+
+    def draw(self, rng: Rng, *, pivots: int = 1) -> Rig:
+        """Draw a rig of numbers: each unknown has a value, and is known.
+
+        Parameters
+        ----------
+        rng : int, SeedSequence or Generator
+        pivots : int
+            Number of pivots of its records, the shifts of which are drawn if they are unknown.
+
+        Returns
+        -------
+        Rig
+            With the rod and the load cell of the data sheets, and numbers for what `scan` and `measure` apply.
+
+        Raises
+        ------
+        ParameterError
+            If a discrepancy is unknown, or a noise that the load cell does not state, or a distribution has no
+            quantiles.
+
+        Examples
+        --------
+        >>> drawn = Rig(unknown={"lever": 0.0}).draw(rng=1)
+        >>> drawn.distributions, drawn.known["lever_x"], round(drawn.known["rigidity_scale"], 4)
+        ({}, 0.0, 1.0015)
+        """
+        return replace(self, unknown=drawn_numbers(self, rng, pivots), calibration=None)
+
+    def measure(self, record: xr.Dataset, *, rng: Rng) -> xr.Dataset:
+        """Return the record of this rig, from `scan`, as its load cell and its encoder read it.
+
+        The deviations that are numbers act: lever, gains, curve, zeros and drifts of the load cell, the factor on its
+        noise, and offset and backlash of the encoder. The record states rod, load cell and pivots of the data sheets,
+        as one from a laboratory does, and the truth in columns that begin with "truth_".
+
+        Parameters
+        ----------
+        record : xr.Dataset
+            An ideal record, in the units of the load cell.
+        rng : int, SeedSequence or Generator
+
+        Returns
+        -------
+        xr.Dataset
+
+        Raises
+        ------
+        RecordError, ParameterError
+            As in `LoadCell.measure`.
+
+        Examples
+        --------
+        >>> from tactile_bayes import LoadCell, Rig, scan
+        >>> from tactile_bayes.contours import paper_profile
+        >>> drawn = Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02)).draw(rng=1)
+        >>> record = drawn.measure(scan(paper_profile("II", q=0.5), drawn).record, rng=1)
+        >>> record.attrs["units"], record.attrs["load_cell_force_noise"]
+        ('dimensionless', 0.05)
+        """
+        return measured_by(self.rod, self.load_cell or LoadCell(), self.known, record, rng)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Rig:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.plain_csv import columns_in
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED
-from tactile_bayes.record.spelling import nearest
+from tactile_bayes.record.spelling import refuse_unknown_keys
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, members, parameter_named
 from tactile_bayes.rig.rig_prior import RigPrior
@@ -30,9 +30,24 @@ from tactile_bayes.rig.unknown import NOTHING
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
-__all__ = ["file_of", "named_in_errors", "read_tables", "stated_in", "tables_of", "text_of", "write_file"]
+__all__ = [
+    "ROD_UNITS",
+    "TABLES",
+    "calibration_of",
+    "entries_of_cell",
+    "file_of",
+    "keys_of",
+    "named_in_errors",
+    "number_in",
+    "read_tables",
+    "stated_in",
+    "tables_of",
+    "text_of",
+    "unit_of_unknown",
+    "write_file",
+]
 
-_ROD_UNITS = {
+ROD_UNITS = {
     "length": "m",
     "flexural_rigidity": "N m²",
     "diameter": "m",
@@ -43,9 +58,9 @@ _ROD_UNITS = {
     "taper": "1",
     "stem": "m",
 }
-_TABLES = {
-    "rod": (*_ROD_UNITS, "rigidity_profile", "shape"),
-    "load_cell": (*LOAD_CELL_UNITS, *SEVERAL, "frame"),
+TABLES = {
+    "rod": (*ROD_UNITS, "rigidity_profile", "shape"),
+    "load_cell": ("frame", *LOAD_CELL_UNITS, *SEVERAL),
     "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), "split_sweeps", "missing"),
     "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
     "calibration": ("parameters", "correlation", "error", "source", "stated"),
@@ -113,7 +128,7 @@ def tables_of(
     tables: dict[str, Any] = {}
     if rod is not None:
         usual = {"length": 1.0, "flexural_rigidity": 1.0} if rod.is_dimensionless else {}
-        given = {name: getattr(rod, name) for name in _TABLES["rod"] if hasattr(rod, name)}
+        given = {name: getattr(rod, name) for name in TABLES["rod"] if hasattr(rod, name)}
         texts = {name: value.text if isinstance(value, Along) else value for name, value in given.items()}
         tables["rod"] = {n: v for n, v in texts.items() if v is not None and v != usual.get(n, 0.0)}
     if load_cell is not None:
@@ -137,11 +152,11 @@ def tables_of(
 
 def stated_in(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return the arguments of `Rig` that tables state; see `Rig.of_tables`."""
-    _refuse_unknown(tables, _TABLES, "the rig")
+    refuse_unknown_keys(tables, TABLES, tables=TABLES)
     for name, table in tables.items():
         if name != "unknown" or table != "nothing":
             check_kind(name, table, Mapping, f"write it as a table, [{name}]")
-            _refuse_unknown(table, _TABLES[name], f"[{name}]", is_known=parameter_named if name == "unknown" else None)
+            refuse_unknown_keys(table, keys_of(name, table), f"{name}.", TABLES)
     said = tables.get("rod")
     rod = None if said is None else _rod(said, folder)
     is_si = rod is not None and not rod.is_dimensionless
@@ -150,7 +165,7 @@ def stated_in(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         "rod": rod,
         "load_cell": None if "load_cell" not in tables else _load_cell(tables["load_cell"], is_si),
         "unknown": _unknown(tables.get("unknown", {}), is_si),
-        "calibration": None if calibration is None else _calibration(calibration),
+        "calibration": None if calibration is None else calibration_of(calibration),
         "file": tables.get("file", {}),
     }
 
@@ -160,7 +175,7 @@ def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
         name: said[name]
         if name == "rest_curvature" and str(said[name]).lstrip().startswith("{")
         else _quantity(said[name], unit, f"rod.{name}", is_si="length" in said or "shape" in said)
-        for name, unit in _ROD_UNITS.items()
+        for name, unit in ROD_UNITS.items()
         if name in said
     }
     if "rigidity_profile" in said:
@@ -186,25 +201,32 @@ def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
     return Rod(**numbers)
 
 
+def keys_of(table: str, said: Iterable[str]) -> list[str]:
+    """Return the keys that a table may have, with the shifts of pivots that it names."""
+    shifts = [key for key in said if parameter_named(key) is not None] if table == "unknown" else []
+    return [*TABLES[table], *shifts]
+
+
 def _load_cell(said: Mapping[str, Any], is_si: bool) -> LoadCell:
-    entries: dict[str, Any] = {}
+    entries: dict[str, Any] = {name: value for name, value in said.items() if name == "frame"}
+    for name, where, value in entries_of_cell(said):
+        entries[name] = _quantity(value, LOAD_CELL_UNITS[name], where, is_si)
+    return LoadCell.from_entries(entries)
+
+
+def entries_of_cell(said: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
+    """Yield the entries that a table of a load cell states, without its frame: name, key for messages, and value."""
     for name, value in said.items():
-        if name == "frame":
-            entries[name] = value
-        elif name in SEVERAL:
+        if name in SEVERAL:
             names = SEVERAL[name]
             rows = np.ravel(np.array(value, dtype=object)).tolist() if isinstance(value, list) else []
             if len(rows) != len(names):
                 raise ParameterError(
                     f"load_cell.{name} is {shown(value)}: give a list of {len(names)}, {', '.join(names)}"
                 )
-            entries |= {
-                each: _quantity(row, LOAD_CELL_UNITS[each], f"load_cell.{name}", is_si)
-                for each, row in zip(names, rows, strict=True)
-            }
-        else:
-            entries[name] = _quantity(value, LOAD_CELL_UNITS[name], f"load_cell.{name}", is_si)
-    return LoadCell.from_entries(entries)
+            yield from ((each, f"load_cell.{name}", row) for each, row in zip(names, rows, strict=True))
+        elif name != "frame":
+            yield name, f"load_cell.{name}", value
 
 
 def _unknown(said: Mapping[str, Any] | str, is_si: bool) -> Any:
@@ -212,21 +234,25 @@ def _unknown(said: Mapping[str, Any] | str, is_si: bool) -> Any:
         return said
     found = {}
     for name, value in said.items():
-        row = parameter_named(next(members(name)))
-        unit = "m" if row is None else row.unit
-        number = partial(_number_in, unit=unit, name=f"unknown.{name}", is_si=is_si)
+        number = partial(number_in, unit=unit_of_unknown(name), name=f"unknown.{name}", is_si=is_si)
         found[name] = value if value == "default" else distribution_of_table(value, f"unknown.{name}", number)
     return found
 
 
-def _calibration(said: Mapping[str, Any]) -> RigPrior:
-    absent = [name for name in _TABLES["calibration"] if name not in said]
+def unit_of_unknown(name: str) -> str:
+    """Return the SI unit of a parameter, or of those of a group."""
+    row = parameter_named(next(members(name)))
+    return "m" if row is None else row.unit
+
+
+def calibration_of(said: Mapping[str, Any]) -> RigPrior:
+    absent = [name for name in TABLES["calibration"] if name not in said]
     if absent:
         raise ParameterError(f"[calibration] has no {', '.join(absent)}: calibrate the rig again")
     for name, kind in (("parameters", Mapping), ("stated", Mapping), ("source", str)):
         check_kind(f"calibration.{name}", said[name], kind, "calibrate the rig again")
     error = check_number("calibration.error", said["error"], "calibrate the rig again", least=0.0)
-    _refuse_unknown(said["parameters"], PARAMETERS, "[calibration.parameters]")
+    refuse_unknown_keys(said["parameters"], PARAMETERS, "calibration.parameters.")
     priors: dict[str, Any] = {}
     for name, value in said["parameters"].items():
         found = distribution_of_table(value, f"calibration.parameters.{name}")
@@ -243,7 +269,7 @@ def _calibration(said: Mapping[str, Any]) -> RigPrior:
 
 def _quantity(value: Any, unit: str, name: str, is_si: bool) -> float:
     """Return a number in a unit, from a number, or a text with another unit of the kind."""
-    number = _number_in(value, unit=unit, name=name, is_si=is_si)
+    number = number_in(value, unit=unit, name=name, is_si=is_si)
     if number is None:
         raise ParameterError(
             f'{name} is {shown(value)}: give a number [{unit}], or a text with a unit, like "1.5 {unit}"'
@@ -251,8 +277,8 @@ def _quantity(value: Any, unit: str, name: str, is_si: bool) -> float:
     return number
 
 
-def _number_in(value: Any, *, unit: str, name: str, is_si: bool) -> float | None:
-    """Return `_quantity`, or None for what is neither a number nor a text with a unit."""
+def number_in(value: Any, *, unit: str, name: str, is_si: bool) -> float | None:
+    """Return a number in a unit as `_quantity` does, or None for what is neither a number nor a text with a unit."""
     match = _NUMBER.match(value.strip()) if isinstance(value, str) else None
     if match is None:
         return as_number(value)
@@ -268,21 +294,3 @@ def _number_in(value: Any, *, unit: str, name: str, is_si: bool) -> float | None
             "number in units of the rod (L, EI/L, EI/L²)"
         )
     return float(converted(float(match[0]), stated, wanted))
-
-
-def _refuse_unknown(
-    table: Mapping[str, Any], known: Iterable[str], where: str, is_known: Callable[[str], Any] | None = None
-) -> None:
-    known = list(known)
-    for key in table:
-        if key in known or (is_known is not None and is_known(key) is not None):
-            continue
-        elsewhere = [name for name, keys in _TABLES.items() if key in keys]
-        near = nearest(key, known)
-        if elsewhere:
-            hint = f"its place is the table [{elsewhere[0]}]"
-        elif near:
-            hint = f"did you mean {near!r}?"
-        else:
-            hint = f"there are {', '.join(known)}"
-        raise ParameterError(f"{where} has no entry {key!r}: {hint}")

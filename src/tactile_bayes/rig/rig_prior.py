@@ -79,7 +79,11 @@ class RigPrior:
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Draw points, shape (count, parameters)."""
-        scores = rng.standard_normal((count, len(self.priors))) @ np.linalg.cholesky(self.correlation).T
+        return self.at(rng.standard_normal((count, len(self.priors))))
+
+    def at(self, normal: Floats) -> Floats:
+        """Return the points that independent standard normal numbers stand for, shape (n, parameters)."""
+        scores = normal @ np.linalg.cholesky(self.correlation).T
         columns = [_at_scores(prior, z) for prior, z in zip(self.priors.values(), scores.T, strict=True)]
         return np.stack(columns, axis=1)
 

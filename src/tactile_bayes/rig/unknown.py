@@ -15,7 +15,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, STANDARD, members, parameter_named
 
-__all__ = ["DEFAULT", "NOTHING", "Unknown", "checked_unknown", "expanded"]
+__all__ = ["DEFAULT", "NOTHING", "Unknown", "checked_unknown", "expanded", "of_pivots"]
 
 Unknown = float | Distribution | Literal["default"]
 """What is said of a parameter: a number if it is known, a distribution, or "default" for its default distribution."""
@@ -41,6 +41,18 @@ def expanded(unknown: Mapping[str, Unknown]) -> dict[str, Unknown]:
     """
     of_groups = {member: value for name, value in unknown.items() if name in GROUPS for member in GROUPS[name]}
     return {**of_groups, **{name: value for name, value in unknown.items() if name not in GROUPS}}
+
+
+def of_pivots(said: Mapping[str, Unknown], pivots: int) -> dict[str, Unknown]:
+    """Return what is said of each parameter, with the shifts of so many pivots in place of their group."""
+    every: dict[str, Unknown] = {}
+    for name, value in said.items():
+        if name in _BASES:
+            shifts = (f"base_{k}_{axis}" for k in range(2, pivots + 1) for axis in (name[5:] or "xy"))
+            every = dict.fromkeys(shifts, value) | every
+        else:
+            every[name] = value
+    return {n: v for n, v in every.items() if (shift := BASE.fullmatch(n)) is None or int(shift[1]) <= pivots}
 
 
 def checked_unknown(unknown: Any) -> dict[str, Unknown]:

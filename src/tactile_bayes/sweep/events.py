@@ -100,6 +100,9 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
     index = np.zeros(len(phases) + 1, dtype=np.intp)
     states = paths.event_states().take(index, np.arange(index.size))
     columns = to_lab_frame(paths.sweep_frame, index, states, rod)
+    if np.any(paths.sweeps.compliance):  # the rod at its base has another direction than the drive
+        driven = paths.drive_angles_at(paths.event_travels()[0, : index.size])
+        columns["drive_angle"] = np.pi - driven if direction == "backward" else driven
     clear, again = bool(paths.is_clear()[0]), np.nan
     if isinstance(drive, Carried):
         internal = lines_through(drive.poses, rod.length, backward=direction == "backward").travels

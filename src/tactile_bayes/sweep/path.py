@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -49,10 +49,12 @@ def sweep_paths(
     direction: Direction = "forward",
     rod: Rod | None = None,
     friction: float = 0.0,
+    compliance: float = 0.0,
 ) -> Paths:
     """Compute the exact path of one sweep along one contour, or raise an error that says why there is none.
 
-    Parameters and errors are those of `scan`, with one pivot and one direction. Friction opposes the slip all along the
+    Parameters and errors are those of `scan`, with one pivot and one direction, and the compliance of the suspension
+    [rad/(EI/L)]. Friction opposes the slip all along the
     path, or from a travel on: see `sliding_from`.
     """
     rod = Rod() if rod is None else rod
@@ -64,9 +66,14 @@ def sweep_paths(
             f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
-    paths = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile, asks_sliding=True)
+    known: dict[str, Any] = {
+        "friction_angle": friction_angle,
+        "suspension_compliance": compliance,
+        "profile": rod.profile,
+    }
+    paths = trace(sweep_frame, asks_sliding=True, **known)
     if paths.reach[0] == Reachability.STICKS:
-        assumed = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile)
+        assumed = trace(sweep_frame, **known)
         if assumed.reach[0] == Reachability.TOUCHES and np.isfinite(sliding_from(assumed)):
             paths = assumed
     where = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
@@ -75,7 +82,7 @@ def sweep_paths(
 
 
 def carried_paths(
-    contour: Contour, drive: Carried, *, rod: Rod | None = None, friction: float = 0.0
+    contour: Contour, drive: Carried, *, rod: Rod | None = None, friction: float = 0.0, compliance: float = 0.0
 ) -> tuple[Paths, Direction]:
     """Compute the exact path of a rod that a drive carries along one contour, and the direction that its side implies.
 
@@ -89,7 +96,13 @@ def carried_paths(
         way = float(np.abs(poses[:, 0] - base[0]).max()) / rod.length
         lines = lines_through(poses, rod.length, backward=direction == "backward").lines[None]
         sweep_frame = replace(to_sweep_frame(contour, base, direction, rod), way=way)
-        found[direction] = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile, lines=lines)
+        found[direction] = trace(
+            sweep_frame,
+            friction_angle=friction_angle,
+            suspension_compliance=compliance,
+            profile=rod.profile,
+            lines=lines,
+        )
 
     first = {direction: float(of_side.first_angle[0]) for direction, of_side in found.items()}
     is_same = abs(first["forward"] - first["backward"]) < _SAME

@@ -23,13 +23,15 @@ from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig import make_record
+from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import Rig, rig_of
-from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation
+from tactile_bayes.rig.unknown import of_pivots
+from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation, Translation
 from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.path import Direction, carried_paths, friction_angle_of, sweep_paths, to_sweep_frame
 
-__all__ = ["Scan", "drives_of", "equilibria", "scan"]
+__all__ = ["Scan", "acting", "drives_of", "equilibria", "scan"]
 
 _MARGIN = 15
 """Number of drive steps before first contact and after snap-off."""
@@ -50,6 +52,13 @@ _ROUNDING = 1e-9
 """Share of a step by which the last one may be too short."""
 
 _TURN = 2.0 * math.pi
+
+_NOT_SWEPT = {
+    **dict.fromkeys(GROUPS["gauge"], "it is the place of a gauge, so sweep along a contour that is there"),
+    **dict.fromkeys(GROUPS["discrepancy"], "a discrepancy is a function and no number, and no sweep has it"),
+    **dict.fromkeys(("moment_noise", "force_noise"), "state it in the load cell, which `Rig.measure` applies"),
+}
+"""Parameters that do not act in sweeps nor in readings, and what to do."""
 
 _COARSEST = 0.5
 """Largest step of the drive [rad]; a larger one is probably in degrees."""
@@ -151,7 +160,7 @@ def equilibria(
     pivots = check_pivots("base", base)
     if len(pivots) > 1:
         raise ParameterError(f"base is {base!r}: equilibria takes one pivot (x, y), only scan several")
-    rod, friction = rig_of(rig).known_rod, rig_of(rig).friction
+    rod, friction, compliance = acting(rig)
     sweep_frame = to_sweep_frame(contour, pivots[0], direction, rod)
     index = np.zeros(alpha.size, dtype=np.intp)
     side = -1.0 if sweep_frame.mirrored[0] else 1.0
@@ -161,6 +170,7 @@ def equilibria(
     wrench = states.wrench
     columns = to_lab_frame(sweep_frame, index, states, rod)
     reached = wrench.phase != NONE
+    columns["drive_angle"] = columns["drive_angle"] + compliance * columns["holding_moment"] / rod.moment_unit
     columns["contact_phase"] = np.array(PHASE_NAMES)[wrench.phase]
     data, units = {}, "dimensionless" if rod.is_dimensionless else "SI"
     for name, values in columns.items():
@@ -215,7 +225,8 @@ def scan(
         One contour; in metres if the rig states its rod, else in rod lengths.
     rig : Rig, optional
         Its rod, by default the dimensionless one, with the deviations that are known; a rod with a diameter touches
-        with its surface. Friction is 0 unless it is known, and at most 0.84. With friction, a rod that turns about a
+        with its surface. What is not known is as stated, without friction, which is at most 0.84. Errors of load cell
+        and encoder change no load: `Rig.measure` applies them. With friction, a rod that turns about a
         pivot and is curved toward the object sticks at first, which is not modelled: these samples are left out
         (`SweepEvents.slides_from`).
     drive : Rotation, Translation or Motion, or a sequence of them, optional
@@ -270,9 +281,9 @@ def scan(
     >>> round(result.events["forward"].snap_off.drive_angle, 6)
     3.154275
     """
-    rod, friction = rig_of(rig).known_rod, rig_of(rig).friction
+    rod, friction, compliance = acting(rig)
     check_choice("direction", direction, ("both", "forward", "backward"), "choose 'forward' or 'backward', or 'both'")
-    drives = drives_of(drive, base)
+    drives = _shifted(drives_of(drive, base), rig_of(rig))
     step = _checked_step(drive_step, drives, rod)
     given = None if drive_angles is None else _floats(drive_angles)
     grid = None if given is None else np.unique(given)
@@ -289,7 +300,7 @@ def scan(
     senses: tuple[Direction, ...] = ("forward", "backward") if direction == "both" else (direction,)
     for one in drives:
         if isinstance(one, Carried):
-            paths, sense = carried_paths(contour, one, rod=rod, friction=friction)
+            paths, sense = carried_paths(contour, one, rod=rod, friction=friction, compliance=compliance)
             sweep = events_of(paths, sense, one, rod)
             _warn_of(sweep, one, rod)
             travels = _travels(one, step, sweep, rod)
@@ -297,7 +308,9 @@ def scan(
         else:
             found = []
             for sense in senses:
-                paths = sweep_paths(contour, base=one.base, direction=sense, rod=rod, friction=friction)
+                paths = sweep_paths(
+                    contour, base=one.base, direction=sense, rod=rod, friction=friction, compliance=compliance
+                )
                 sweep = events_of(paths, sense, one, rod)
                 _warn_of(sweep, one, rod)
                 angles = _angles(grid, step, sweep)
@@ -314,6 +327,39 @@ def scan(
         )
     record = {name: np.concatenate([of_sweep[name] for of_sweep in columns]) for name in columns[0]}
     return Scan(make_record(record, Rig(rod=rod)), tuple(sweeps), contour)
+
+
+def acting(rig: Rig | None) -> tuple[Rod, float, float]:
+    """Return the rod, the friction and the compliance [rad/(EI/L)] that known deviations give a rig.
+
+    Raises
+    ------
+    ParameterError
+        If a number is known that no sweep has.
+    """
+    rig = rig_of(rig)
+    rod, known = rig.known_rod, rig.known
+    for name, correction in _NOT_SWEPT.items():
+        if known.get(name, 0.0):
+            raise ParameterError(f"{name} is known to be {known[name]:g}: {correction}")
+    return rod, rig.friction, known.get("suspension_compliance", 0.0) * rod.moment_unit
+
+
+def _shifted(drives: list[Drive], rig: Rig) -> list[Drive]:
+    """Return drives about pivots, or from places, that are shifted against the stated ones."""
+    begins = [one.base if isinstance(one, Rotation) else tuple(one.poses[0, :2].tolist()) for one in drives]
+    numbers = {place: number for number, place in enumerate(dict.fromkeys(begins), start=1)}
+    known: dict[str, Any] = {**of_pivots(rig.known, len(numbers))}
+    found: list[Drive] = []
+    for one, place in zip(drives, begins, strict=True):
+        x, y = (float(known.get(f"base_{numbers[place]}_{axis}", 0.0)) for axis in "xy")
+        if not (x or y):
+            found.append(one)
+        elif isinstance(one, Motion):
+            found.append(replace(one, x=np.asarray(one.x) + x, y=np.asarray(one.y) + y))
+        elif isinstance(one, Rotation | Translation):
+            found.append(replace(one, base=(place[0] + x, place[1] + y)))
+    return found
 
 
 def drives_of(drive: Drive | Sequence[Drive] | None, base: Any) -> list[Drive]:

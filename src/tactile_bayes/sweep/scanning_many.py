@@ -16,9 +16,10 @@ from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.record.schema import column_attributes
-from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.rig.rig import Rig
 from tactile_bayes.sweep.columns import ManyUnits, phases_of, sweep_events, sweep_samples
 from tactile_bayes.sweep.path import friction_angle_of
+from tactile_bayes.sweep.scanning import acting
 
 __all__ = ["scan_many"]
 
@@ -81,7 +82,7 @@ def scan_many(
             f"contours with parameters of shape (n,) are wanted, not of shape {contours.shape}: for one contour, use "
             "scan"
         )
-    rod, friction, (count,) = rig_of(rig).known_rod, rig_of(rig).friction, contours.shape
+    (rod, friction, compliance), (count,) = acting(rig), contours.shape
     try:
         x, y = (np.broadcast_to(check_numbers("base", b), (count,)) for b in base)
         angles = check_array("drive_angles", drive_angles)
@@ -115,6 +116,7 @@ def scan_many(
     paths = trace(
         sweep_frame,
         friction_angle=friction_angle_of(friction),
+        suspension_compliance=compliance,
         profile=rod.profile,
         drive_angles=in_sweep_frame,
         polished=False,

@@ -7,14 +7,17 @@ import pytest
 
 import tactile_bayes as tb
 from helpers.refusals import refused
+from tactile_bayes.contours import paper_profile
 from tactile_bayes.diagnostics.inspection import known_cell
 from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, stuck, uneven_steps
 from tactile_bayes.diagnostics.inspection.stretches import autocorrelation, unloaded_stretches
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.misfit import CHECK_RIG
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import rows_of_sweeps
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
+from tactile_bayes.sweep import scan
 
 COARSE = np.radians(12.0)
 OTHER_FORCE_X = 'force_x had the other sign (force_x = "-force_x" under [file] of rig.toml).'
@@ -475,3 +478,16 @@ def test_noise_between_positions_that_readings_do_not_explain_is_named(ideal):
     assert all(name in sentence for name in tb.LoadCell().standard_deviations)
     between = found.channels.position_noise.values / np.array([0.25e-3, 3e-3, 3e-3])
     assert between == pytest.approx(np.sqrt(1.05) * np.ones(3), rel=0.35)
+
+
+def test_step_2_corrects_for_known_deviations():
+    """As `reconstruct` does, and then nothing looks wrong."""
+    cell = LoadCell(force_noise=0.005, moment_noise=0.002)
+    rig = Rig(load_cell=cell, unknown={"lever": 0.1, "force_y_gain": 1.3, "moment_gain": 0.8})
+    record = rig.measure(scan(paper_profile("II", q=0.5), rig, drive_step=0.05).record, rng=1)
+    told = tb.inspect_record(record, rig)
+    own = tb.reconstruct(record, rig, method="raw").status.values
+    assert told.statuses == {str(each): np.count_nonzero(own == each) for each in np.unique(own)}
+    untold = tb.inspect_record(record, Rig(load_cell=cell, unknown="nothing"))
+    assert not told.is_suspect
+    assert untold.statuses != told.statuses

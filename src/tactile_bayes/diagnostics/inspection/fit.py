@@ -45,28 +45,25 @@ class Fit(NamedTuple):
 
 
 def fit_of(
-    record: xr.Dataset,
-    cell: LoadCell,
+    found: Corrected,
     *,
     most: float,
-    friction: float = 0.0,
     progress: Callable[[int, int], object] = lambda done, count: None,
 ) -> Fit:
     """Return the shares of samples that fit no contact above the pivot, and a correction where one exceeds `most`.
 
     Parameters
     ----------
-    record : xr.Dataset
-        A valid record with all load channels.
-    cell : LoadCell
-        The sensor, with noise of finite variance on each channel.
+    found : Corrected
+        A record with all load channels, and its load cell, with noise of finite variance on each channel.
     most : float
         Share above which corrections are tried: other signs, another frame, exchanged forces, friction, another zero or
         sense of the drive angle.
     progress : callable
         Called with the number of corrections that were tried, and their total.
     """
-    contacts = _contacts(record, cell, friction)
+    record, cell = found.record, found.load_cell
+    contacts = contacts_of(found, "constrained")
     share, below, loaded = _shares(contacts)
     if loaded < _FEWEST:
         return Fit(np.nan, np.nan, loaded, "")
@@ -78,11 +75,15 @@ def fit_of(
     alone = _of_any_samples(cell, record.sizes["sample"])
 
     def share_if(correction: Correction) -> float:
-        return sum(_shares(_contacts(_read_by(alone, correction.apply(loads)), alone, correction.friction))[:2])
+        return sum(_shares(contacts_of(as_if(correction), "constrained"))[:2])
 
-    corrections = corrections_for(loads, friction)
+    def as_if(correction: Correction) -> Corrected:
+        read = _read_by(alone, correction.apply(loads))
+        return found._replace(record=read, load_cell=alone, friction=correction.friction)
+
+    corrections = corrections_for(loads, found.friction)
     progress(0, len(corrections))
-    part = share_if(Correction("", as_it_is, friction))
+    part = share_if(Correction("", as_it_is, found.friction))
     left = []
     for correction in corrections:
         left.append(share_if(correction))
@@ -91,10 +92,6 @@ def fit_of(
         np.argmin([over + _CHANGE * correction.changes for over, correction in zip(left, corrections, strict=True)])
     )
     return Fit(share, below, loaded, corrections[best].text if left[best] <= _CORRECTED * part else "")
-
-
-def _contacts(record: xr.Dataset, cell: LoadCell, friction: float) -> xr.Dataset:
-    return contacts_of(Corrected(record, cell, friction), "constrained")
 
 
 def _shares(contacts: xr.Dataset) -> tuple[float, float, int]:

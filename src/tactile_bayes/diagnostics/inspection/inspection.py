@@ -22,7 +22,8 @@ from tactile_bayes.errors import DriftWarning
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, present_channels, rows_of_sweeps, validate, with_rod
-from tactile_bayes.rig.corrected import Corrected
+from tactile_bayes.rig.corrected import corrected
+from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["Inspection", "inspect_record"]
@@ -97,7 +98,7 @@ def inspect_record(
         A record.
     rig : Rig, optional
         Rod and load cell, by default those that the record states, bias and noise estimated from its unloaded samples
-        where nobody states a load cell; and friction for Step 2, 0 unless it is known.
+        where nobody states a load cell; and known deviations, for which Step 2 corrects.
     false_alarm : float
         Level of every test, in (0, 0.5): the probability of a false alarm for a record in white normal noise with
         nothing wrong, for each sweep in `zero_load`, and for all channels and samples together in the others.
@@ -160,17 +161,16 @@ def inspect_record(
     statuses: dict[str, int] = {}
     fit = Fit(math.nan, math.nan, 0, "")
     if len(present_channels(record)) == len(CHANNELS):
-        status = contacts_of(Corrected(record, cell or LoadCell(), rig.friction), "raw").status.values
+        status = contacts_of(corrected(record, cell or LoadCell(), rig.known), "raw").status.values
         samples["status"] = ("sample", status, {"long_name": "status in raw Step 2"})
         statuses = dict(Counter(status.tolist()).most_common())
         report(2, _STEPS)
         dead = any(np.ptp(record[name].values) == 0.0 for name in CHANNELS)
+        without_zeros = {name: value for name, value in rig.known.items() if name not in GROUPS["bias"]}
         if cell is not None and cell.has_variances and found["contact"].values.any() and not dead:
             fit = fit_of(
-                record,
-                _with_zero(cell, found),
+                corrected(record, _with_zero(cell, found), without_zeros),
                 most=UNFIT,
-                friction=rig.friction,
                 progress=lambda done, count: report(_STEPS + done, _STEPS + count),
             )
     else:

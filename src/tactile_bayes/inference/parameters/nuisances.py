@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from scipy import stats
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.distributions import Distribution
@@ -19,12 +18,13 @@ from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.load_cell.curve import curved
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
-from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, parameter_named
+from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, parameter_named
+from tactile_bayes.rig.stated import Stated, stated_values, unit_of
+from tactile_bayes.rig.unknown import of_pivots
 
 if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
     from tactile_bayes.rig.rig_prior import RigPrior
-    from tactile_bayes.rig.unknown import Unknown
 
 __all__ = [
     "BIASES",
@@ -36,7 +36,6 @@ __all__ = [
     "belongs",
     "deviating",
     "nuisances_of",
-    "stated_values",
 ]
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
@@ -93,11 +92,7 @@ class Nuisances:
     """Unit of each parameter in dimensionless calculations, in the record's units."""
 
     def __post_init__(self) -> None:
-        moment, force, length = self.rod.moment_unit, self.rod.force_unit, self.rod.length_unit
-        units = {
-            n: (force if n.startswith("force") else moment) ** p.of_moment * length**p.of_length
-            for n, p in PARAMETERS.items()
-        }
+        units = {name: unit_of(name, self.rod) for name in PARAMETERS}
         shifts = (n for n in self.names if BASE.fullmatch(n) or n in GROUPS["gauge"])
         units |= dict.fromkeys(shifts, 1.0)  # they stay in the record's unit of length
         object.__setattr__(self, "units", units)
@@ -220,7 +215,8 @@ def nuisances_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool 
     if joint is not None:
         joint = joint.without([name for name in joint.priors if not _is_shown(name, present)])
     found = () if joint is None else tuple(joint.priors)
-    said = _of_pivots({name: v for name, v in rig.said.items() if name not in (*found, *_OF_NOISE)}, measured)
+    said = {name: v for name, v in rig.said.items() if name not in (*found, *_OF_NOISE)}
+    said = of_pivots(said, len(bases_of(measured)))
     hidden = _hidden(measured, rig, cell, present, gauge)
     names = [name for name, value in said.items() if not isinstance(value, float) and name not in hidden]
     every_gain = [f"{name}_gain" for name in present]
@@ -246,23 +242,10 @@ def nuisances_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool 
         curve,
         len(bases_of(measured)),
     )
-    stated = stated_values(rod, cell)
-    priors = {name: _default_prior(name, nuisances, stated, cell) for name in names if name not in found}
+    stated = Stated.of(rod, cell)
+    priors = {name: stated.default(name) for name in names if name not in found}
     priors |= {name: value for name, value in said.items() if name in priors and not isinstance(value, str | float)}
     return replace(nuisances, priors={**priors, **(joint.priors if joint is not None else {})})
-
-
-def _of_pivots(said: Mapping[str, Unknown], measured: xr.Dataset) -> dict[str, Unknown]:
-    """Return what is said of each parameter, with the shifts of the pivots that the record has."""
-    every: dict[str, Unknown] = {}
-    pivots = range(2, len(bases_of(measured)) + 1)
-    for name, value in said.items():
-        if name in ("base", "base_x", "base_y"):
-            every = {f"base_{k}_{axis}": value for k in pivots for axis in (name[5:] or "xy")} | every
-        else:
-            every[name] = value
-    last = pivots.stop - 1
-    return {n: v for n, v in every.items() if (shift := BASE.fullmatch(n)) is None or int(shift[1]) <= last}
 
 
 def _hidden(measured: xr.Dataset, rig: Rig, cell: LoadCell, present: Sequence[str], gauge: bool) -> set[str]:
@@ -283,41 +266,12 @@ def _hidden(measured: xr.Dataset, rig: Rig, cell: LoadCell, present: Sequence[st
     return hidden
 
 
-def stated_values(rod: Rod, cell: LoadCell) -> dict[str, float]:
-    """Return the parameters of a rig that is as stated, except shifts of pivots, which are 0, and noises."""
-    neutral = {name: parameter.neutral for name, parameter in PARAMETERS.items() if parameter.neutral is not None}
-    of_rod = {"rest_curvature": rod.mean_rest_curvature, "taper": rod.taper, "stem": rod.stem, "length": rod.length}
-    return {**neutral, **of_rod, **dict(zip(CURVE, cell.moment_curve, strict=True))}
-
-
 def deviating(known: Mapping[str, float], unknown: Collection[str], rod: Rod, cell: LoadCell) -> dict[str, float]:
     """Return the known parameters that are not as stated, and a curvature that would change with the length."""
     stated = stated_values(rod, cell)
     off = {name: value for name, value in known.items() if value != stated.get(name, 0.0)}
     kept = ("rest_curvature",) if "length" in (*unknown, *off) else ()
     return {name: value for name, value in known.items() if name in off or name in kept}
-
-
-def _default_prior(name: str, nuisances: Nuisances, stated: Mapping[str, float], cell: LoadCell) -> Distribution:
-    """Return the default prior of a parameter, in the record's units."""
-    parameter, rod = parameter_named(name), nuisances.rod
-    assert parameter is not None
-    of_place = BASE.fullmatch(name) or name in GROUPS["gauge"]
-    scale = parameter.width * (rod.length if of_place else nuisances.units[name])
-    for names in (BIASES, DRIFTS):  # as readings
-        if name in names:
-            scale *= cell.own_gains.tolist()[names.index(name)]
-    if name == "rest_curvature" and rod.rest_curvature_deviation:
-        scale = rod.rest_curvature_deviation
-    centre = stated.get(name, 0.0)
-    if parameter.default == "log_normal":
-        return stats.lognorm(s=parameter.width, scale=centre)
-    if parameter.default == "half_normal":
-        return stats.halfnorm(scale=scale)
-    if name in MAY_VANISH:
-        ends = ((end - centre) / scale for end in (parameter.low, parameter.high))
-        return stats.truncnorm(*ends, loc=centre, scale=scale)
-    return stats.norm(centre, scale)
 
 
 def _refuse_shifted_stem(measured: xr.Dataset, names: Sequence[str], gauge: bool) -> None:

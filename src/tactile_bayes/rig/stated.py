@@ -1,0 +1,124 @@
+"""What the data sheets of a rig state, and the default distributions of deviations from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from scipy import stats
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.distributions import Distribution
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, PARAMETERS, parameter_named
+
+__all__ = ["Stated", "cell_with", "stated_values", "unit_of", "within_bounds"]
+
+_LEAST_SHARE = 2.0**-54
+"""Least probability, below which a normal quantile would be infinite."""
+
+
+class Units(Protocol):
+    """Units of a rod: a `Rod`, or arrays for many rods."""
+
+    @property
+    def length_unit(self) -> Any: ...
+    @property
+    def moment_unit(self) -> Any: ...
+    @property
+    def force_unit(self) -> Any: ...
+
+
+def unit_of(name: str, rod: Units) -> Any:
+    """Return the unit of a parameter in dimensionless calculations, in those of the rod."""
+    parameter = parameter_named(name)
+    assert parameter is not None
+    load = rod.force_unit if name.startswith("force") else rod.moment_unit
+    return load**parameter.of_moment * rod.length_unit**parameter.of_length
+
+
+def stated_values(rod: Rod, cell: LoadCell) -> dict[str, float]:
+    """Return the parameters of a rig that is as stated, except shifts of pivots, which are 0, and noises."""
+    neutral = {name: parameter.neutral for name, parameter in PARAMETERS.items() if parameter.neutral is not None}
+    of_rod = {"rest_curvature": rod.mean_rest_curvature, "taper": rod.taper, "stem": rod.stem, "length": rod.length}
+    return {**neutral, **of_rod, **dict(zip(GROUPS["moment_curve"], cell.moment_curve, strict=True))}
+
+
+class Stated(NamedTuple):
+    """What the data sheets of a rig state; with arrays, those of many rigs."""
+
+    units: Units
+    values: Mapping[str, Any]
+    """Parameters of a rig that is as stated, as `stated_values`; those that are zero may be left out."""
+    own_gains: Sequence[Any]
+    """Reading of each channel for a unit of its own load, without sign."""
+    rest_curvature_deviation: Any = 0.0
+
+    @classmethod
+    def of(cls, rod: Rod, cell: LoadCell) -> Stated:
+        """Return what a rod and a load cell state."""
+        return cls(rod, stated_values(rod, cell), cell.own_gains.tolist(), rod.rest_curvature_deviation)
+
+    def default(self, name: str) -> Distribution:
+        """Return the default distribution of a parameter, in the units of the rod."""
+        parameter = parameter_named(name)
+        assert parameter is not None
+        scale = parameter.width * unit_of(name, self.units)
+        for names in (GROUPS["bias"], GROUPS["drift"]):  # as readings
+            if name in names:
+                scale = scale * self.own_gains[names.index(name)]
+        if name == "rest_curvature":
+            scale = np.where(self.rest_curvature_deviation, self.rest_curvature_deviation, scale)[()]
+        centre = self.values.get(name, 0.0)
+        if parameter.default == "log_normal":
+            return stats.lognorm(s=parameter.width, scale=centre)
+        if parameter.default == "half_normal":
+            return stats.halfnorm(scale=scale)
+        if name in MAY_VANISH:
+            ends = ((end - centre) / scale for end in (parameter.low, parameter.high))
+            return stats.truncnorm(*ends, loc=centre, scale=scale)
+        return stats.norm(centre, scale)
+
+
+def within_bounds(name: str, distribution: Distribution, share: Floats) -> Floats:
+    """Return the quantiles of a parameter at probabilities in [0, 1), as a distribution within its bounds has them.
+
+    Raises
+    ------
+    ParameterError
+        If the distribution has no quantiles, or none within the bounds.
+    """
+    parameter = parameter_named(name)
+    assert parameter is not None
+    if not (hasattr(distribution, "ppf") and hasattr(distribution, "cdf")):
+        raise ParameterError(f"the distribution of {name} has no quantiles: give one with cdf and ppf to draw from it")
+    low, high = (distribution.cdf(end) for end in (parameter.low, parameter.high))
+    if np.any(high <= low):
+        raise ParameterError(
+            f"the distribution of {name} lies beyond what it can be, {parameter.low:.4g} to {parameter.high:.4g}"
+        )
+    found = distribution.ppf(low + np.maximum(share, _LEAST_SHARE) * (high - low))
+    return np.clip(found, parameter.low, parameter.high)
+
+
+def cell_with(cell: LoadCell, rig: Mapping[str, float]) -> LoadCell:
+    """Return a load cell with the errors that parameters by name give it; drift and noise have no effect."""
+    gain = np.array(cell.gain) * [rig.get(name, 1.0) for name in GROUPS["gain"]]
+    bias, lever = (
+        np.add(stated, [rig.get(name, 0.0) for name in GROUPS[what]]).tolist()
+        for what, stated in (("bias", cell.bias), ("lever", cell.lever))
+    )
+    curve = (rig.get(name, v) for name, v in zip(GROUPS["moment_curve"], cell.moment_curve, strict=True))
+    return replace(
+        cell,
+        gain=gain.tolist(),
+        bias=bias,
+        lever=lever,
+        moment_curve=(next(curve), next(curve)),
+        drive_angle_offset=cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
+        drive_angle_backlash=cell.drive_angle_backlash + rig.get("backlash", 0.0),
+    )

@@ -1,0 +1,170 @@
+"""A number is known: a scan of a rig, read by it, is what inference expects at that value."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from helpers.refusals import refused
+from tactile_bayes.contours import Circle
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.planning.plan import Plan
+from tactile_bayes.record import CHANNELS, bases_of
+from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
+from tactile_bayes.sweep import Rotation, Translation, equilibria, scan, scan_many
+
+NOT_SWEPT = {*GROUPS["gauge"], *GROUPS["discrepancy"], "moment_noise", "force_noise"}
+KNOWN = {
+    "rigidity_scale": 1.04,
+    "drive_angle_offset": 0.015,
+    "moment_bias": 0.05,
+    "force_x_bias": -0.04,
+    "force_y_bias": 0.03,
+    "lever_x": 0.005,
+    "lever_y": -0.007,
+    "backlash": 0.02,
+    "friction": 0.15,
+    "moment_drift": 0.1,
+    "force_x_drift": 0.07,
+    "force_y_drift": -0.08,
+    "moment_gain": 1.03,
+    "force_x_gain": 0.96,
+    "force_y_gain": 1.05,
+    "moment_curve_quadratic": -0.01,
+    "moment_curve_cubic": 0.004,
+    "suspension_compliance": 0.03,
+    "rest_curvature": 0.11,
+    "taper": 0.25,
+    "stem": 0.055,
+    "length": 1.02,
+    "noise_scale": 1.7,
+    "base_2_x": 0.009,
+    "base_2_y": -0.004,
+}
+"""In units of the rod."""
+PIN = Circle(0.3, 0.5, 0.02)
+ROD = Rod(rest_curvature=0.2, taper=0.2, stem=0.04)
+CELL = LoadCell(gain=((1.02, 0, 0.03), (0, 0.97, 0.01), (0, 0, 1)), lever=(0.01, 0.02), moment_curve=(0.02, 0.001))
+BASES = ((0.0, 0.0), (0.1, 0.03))
+
+
+def scaled(length: float, rigidity: float):
+    """Rod, load cell, contour, pivots and known numbers in SI."""
+    whole = Rod(length, rigidity, rest_curvature=0.2 / length, taper=0.2, stem=0.04 * length)
+    moment, force = whole.moment_unit, whole.force_unit
+    units = {
+        name: (force if name.startswith("force") else moment) ** of.of_moment * length**of.of_length
+        for name, of in PARAMETERS.items()
+    } | dict.fromkeys(("base_2_x", "base_2_y"), length)
+    cell = replace(
+        CELL,
+        gain=((1.02, 0, 0.03 * length), (0, 0.97, 0.01), (0, 0, 1)),
+        lever=(0.01 * length, 0.02 * length),
+        moment_curve=(0.02 / moment, 0.001 / moment**2),
+    )
+    contour = Circle(0.3 * length, 0.5 * length, 0.02 * length)
+    bases = tuple((x * length, y * length) for x, y in BASES)
+    return whole, cell, contour, bases, {name: value * units[name] for name, value in KNOWN.items()}
+
+
+def expected(record, rig, contour):
+    """Readings that inference expects of this rig, and its own rod's units."""
+    noisy = replace(rig.load_cell, force_noise=1.0, moment_noise=1.0)
+    rig = replace(rig, load_cell=noisy, unknown={"noise_scale": 1.0, **rig.entries})
+    model = Experiment(record, rig, "circle").model
+    model.likelihood.exact = True
+    point = np.array([[getattr(contour, name) for name in ("r", "q", "x_c")]])
+    assert model.names == ("r", "q", "x_c")
+    loads, reached = model.likelihood.predict(model.contours(point), model.rig(point))
+    assert reached.all()
+    own = model.likelihood.load_cell
+    sensed = model.nuisances.sensed(loads, model.values(point), own)
+    return own.expected(sensed)[0] * model.likelihood.rod.load_units
+
+
+def test_numbers_of_all_parameters_are_tried():
+    assert {name for name in KNOWN if not name.startswith("base")} == set(PARAMETERS) - NOT_SWEPT
+
+
+@pytest.mark.parametrize("length", [None, 0.1], ids=["dimensionless", "SI"])
+@pytest.mark.parametrize("name", [*KNOWN, "all"])
+def test_a_scan_that_is_read_is_what_inference_expects(name, length):
+    rod, cell, contour, bases, known = scaled(length or 1.0, 1.0 if length is None else 2e-4)
+    said = {**NOTHING, **(known if name == "all" else {name: known[name]})}
+    rig = Rig(rod if length else replace(ROD), cell, said)
+    swept = scan(contour, rig, base=bases, drive_step=0.1)
+    record = rig.measure(swept.record, rng=1)
+    assert record.attrs["units"] == ("SI" if length else "dimensionless")
+    np.testing.assert_allclose(bases_of(record), bases, rtol=0, atol=1e-15)
+    readings = np.stack([record[channel].values for channel in CHANNELS], axis=1)
+    should = expected(record, rig, contour)
+    largest = np.abs(should).max(axis=0)
+    np.testing.assert_allclose(readings / largest, should / largest, rtol=0, atol=1e-9)
+
+
+def test_many_scans_and_equilibria_yield_too():
+    rig = Rig(unknown={"suspension_compliance": 0.05, "friction": 0.1, "length": 1.01})
+    swept = scan(PIN, rig, direction="backward", drive_step=0.1)
+    record, event = swept.record, swept.events["backward"]
+    many = scan_many(PIN.broadcast_to((1,)), record.drive_angle.values, direction="backward", rig=rig).isel(contour=0)
+    np.testing.assert_allclose(many.holding_moment, record.holding_moment, rtol=0, atol=1e-8)
+    assert float(many.snap_off_drive_angle) == pytest.approx(event.snap_off.drive_angle, rel=1e-9)
+    loaded = record.isel(sample=record.truth_contact_phase.values != "none").isel(sample=slice(0, 5))
+    found = equilibria(PIN, loaded.truth_slope_angle.values, direction="backward", rig=rig)
+    np.testing.assert_allclose(found.drive_angle, loaded.drive_angle, rtol=0, atol=1e-9)
+    stiff = scan(PIN, rig.with_unknown(suspension_compliance=0.0), direction="backward").events["backward"]
+    assert abs(stiff.snap_off.drive_angle - event.snap_off.drive_angle) > 1e-3
+
+
+@pytest.mark.parametrize("second", [Rotation((0.1, 0.03)), Translation((0.9, -0.1), 3.1416, 1.4, 1.8)])
+def test_a_shifted_place_is_where_the_rod_begins(second):
+    rig = Rig(unknown={"base": 0.01})
+    record = scan(PIN, rig, drive=[Rotation(), second]).record
+    np.testing.assert_allclose(bases_of(record), [(0.0, 0.0), np.add(second.base, 0.01)], atol=1e-15)
+    np.testing.assert_allclose(bases_of(rig.measure(record, rng=1)), [(0.0, 0.0), second.base], atol=1e-15)
+
+
+@pytest.mark.parametrize("name", sorted(NOT_SWEPT))
+def test_what_no_sweep_has_is_refused(name):
+    with refused(ParameterError, name):
+        scan(PIN, Rig(unknown={name: 0.01}))
+
+
+def test_a_drawn_rig_has_numbers_alone_and_is_drawn_from_the_distributions():
+    rig = Rig(Rod(0.1, 1e-4), LoadCell(bias_uncertainty=(1e-5, 0.0, 0.0)), {"friction": stats.halfnorm(scale=2.0)})
+    drawn = [rig.draw(seed, pivots=2).known for seed in range(300)]
+    assert set(drawn[0]) == set(rig.said) - {"moment_bias"}
+    assert drawn[0] == rig.draw(0, pivots=2).known != drawn[1]
+    values = {name: [one[name] for one in drawn] for name in drawn[0]}
+    whole = stats.halfnorm(scale=2.0)
+    most = PARAMETERS["friction"].high
+    for name, cdf in (
+        ("friction", lambda x: whole.cdf(x) / whole.cdf(most)),
+        ("rigidity_scale", stats.lognorm(s=0.05).cdf),
+        ("force_x_bias", stats.norm(0.0, 0.1 * rig.rod.force_unit).cdf),
+        ("lever_x", stats.norm(0.0, 0.005 * rig.rod.length).cdf),
+    ):
+        assert stats.kstest(values[name], cdf).pvalue > 1e-4, name
+    with refused(ParameterError, "discrepancy_scale", "not drawn"):
+        Rig(unknown={"discrepancy": "default"}).draw(1)
+
+
+def test_a_plan_has_known_numbers():
+    rod, cell, contour, bases, known = scaled(0.1, 2e-4)
+    noises = {"force_noise": 0.05 * rod.force_unit, "moment_noise": 0.02 * rod.moment_unit}
+    said = {**NOTHING, **{n: v for n, v in known.items() if n not in ("noise_scale",)}}
+    plan = Plan(contour, Rig(rod, replace(cell, **noises), said), base=bases, drive_step=0.1)
+    should = expected(plan.record, plan.rig, contour)
+    readings = np.stack([plan.record[channel].values for channel in CHANNELS], axis=1)
+    largest = np.abs(should).max(axis=0)
+    np.testing.assert_allclose(readings / largest, should / largest, rtol=0, atol=1e-9)
+    contacts = plan.reconstruct(plan.record, "raw")
+    sure = (contacts.status == "ok").values & (plan.record.truth_contact_phase != "none").values
+    assert sure.sum() > 20
+    off = np.hypot(contacts.contact_x - plan.record.truth_contact_x, contacts.contact_y - plan.record.truth_contact_y)
+    assert float(off.values[sure].max()) < 1e-6 * rod.length
