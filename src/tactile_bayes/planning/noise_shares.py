@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -180,7 +179,7 @@ def _states(plan: Plan, count: int) -> xr.Dataset:
     for sweep in plan.scan.sweeps:
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
         angles.append(first + (snap - first) * (np.arange(count) + 0.5) / count)
-    record = _with_travels(replace(plan, drive_angles=np.concatenate(angles)).scan.record)
+    record = _with_travels(plan.at_angles(np.concatenate(angles)).scan.record)
     near = np.array([np.isin(record.drive_angle.values[i], angles[s]) for i, s in enumerate(record.sweep.values)])
     return record.isel(sample=np.flatnonzero(near & (record.truth_contact_phase.values != "none")))
 
