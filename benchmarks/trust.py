@@ -57,7 +57,7 @@ def made(name: str, other: str, records: int) -> list[Row]:
     identity = {"case": f"{name} {other}", "probability": repr(PROBABILITY)}
     folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in f"{name} {other}".strip())
     with open_results_store(identity, folder, RECORDS) as store:
-        kept = keep_outcomes(store, one, (name, other), records, workers=None, scheduler=None, progress=None)
+        kept = keep_outcomes(store, one, (name, other), records, workers=None)
     return [kept[number] for number in range(records)]
 
 

@@ -45,7 +45,7 @@ def done(tmp_path_factory, coarse_pictures):
 
 @pytest.fixture(scope="module")
 def analysed():
-    return tb.sensitivity(seed=1, drive_step=float(np.radians(6.0)), samples=8)
+    return tb.sensitivity(seed=1, drive=tb.Rotation(drive_step=float(np.radians(6.0))), samples=8)
 
 
 @pytest.fixture(scope="module")

@@ -115,18 +115,18 @@ def gap() -> xr.Dataset:
 
 @functools.cache
 def plan() -> tb.Plan:
-    return tb.Plan(PARABOLA, rig=STATED, drive_step=0.1)
+    return tb.Plan(PARABOLA, rig=STATED, drive=tb.Rotation(drive_step=0.1))
 
 
 @functools.cache
 def plan_si() -> tb.Plan:
     contour = tb.contours.Parabola(5.0, 0.05)
-    return tb.Plan(contour, rig=Rig(rod=ROD, load_cell=SI_CELL, unknown="nothing"), drive_step=0.1)
+    return tb.Plan(contour, rig=Rig(rod=ROD, load_cell=SI_CELL, unknown="nothing"), drive=tb.Rotation(drive_step=0.1))
 
 
 @functools.cache
 def sensitivity() -> xr.DataTree:
-    return tb.sensitivity(PARABOLA, seed=1, rig=STATED, drive_step=0.1, samples=8)
+    return tb.sensitivity(PARABOLA, seed=1, rig=STATED, drive=tb.Rotation(drive_step=0.1), samples=8)
 
 
 @functools.cache

@@ -46,7 +46,7 @@ PLANS = {
         ),
     ),
     "friction": Plan(PROFILE, Rig(load_cell=replace(QUIET, drive_angle_noise=2e-6), unknown={"friction": 0.3})),
-    "another pivot": Plan(paper_profile("III", q=0.4), Rig(load_cell=QUIET), base=(0.2, -0.1)),
+    "another pivot": Plan(paper_profile("III", q=0.4), Rig(load_cell=QUIET), drive=tb.Rotation((0.2, -0.1))),
 }
 
 
@@ -195,7 +195,11 @@ def test_a_rod_in_si_is_a_scaled_one():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     angles = in_the_middle("plain")[0].drive_angles
     si = amplification(
-        Plan(enlarged(PROFILE, 0.2), Rig(load_cell=in_units_of(QUIET, rod), rod=rod), drive_angles=angles)
+        Plan(
+            enlarged(PROFILE, 0.2),
+            Rig(load_cell=in_units_of(QUIET, rod), rod=rod),
+            drive=tb.Rotation(drive_angles=angles),
+        )
     )
     plain = in_the_middle("plain")[1]
     per = rod.length / np.array([*rod.load_units, 1.0])
@@ -225,7 +229,7 @@ def test_the_drive_angle_alone_does_not_move_raw_contacts_along_the_contour():
 
 
 def test_growth_is_what_single_samples_show():
-    plan = Plan(PROFILE, direction="forward")
+    plan = Plan(PROFILE, drive=tb.Rotation(direction="forward"))
     first = plan.scan.sweeps[0].first_contact.drive_angle
     near = amplification(replace(plan, drive_angles=first + np.array([1e-4, 2e-4, 0.5])))
     raw = near.sel(reconstruction="raw")

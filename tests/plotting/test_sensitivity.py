@@ -11,13 +11,14 @@ from helpers.refusals import refused
 from tactile_bayes import LoadCell, Rig, Rod, error_map, plotting, sensitivity
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.sweep_plans import METHOD_COLOURS, READING_COLOURS
+from tactile_bayes.sweep import Rotation
 
 ROD = Rod(0.1, 1e-5)
 
 
 @pytest.fixture(scope="module")
 def found():
-    return sensitivity(seed=1, drive_step=0.1, samples=8)
+    return sensitivity(seed=1, drive=Rotation(drive_step=0.1), samples=8)
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,7 @@ def in_si():
     return sensitivity(
         seed=1,
         rig=Rig(rod=ROD, load_cell=cell, unknown="nothing"),
-        drive_step=0.2,
+        drive=Rotation(drive_step=0.2),
         parts=["information", "required_noise"],
     )
 
