@@ -251,9 +251,8 @@ def test_refusals(tmp_path, monkeypatch, options, words):
 
 def amplification_at_once(plan):
     """On the drive angles of the record, and not close to its ends."""
-    from dataclasses import replace
 
-    return amplification(replace(plan, drive_angles=np.radians(np.arange(-30.0, 211.0, 10.0))))
+    return amplification(plan.at_angles(np.radians(np.arange(-30.0, 211.0, 10.0))))
 
 
 @pytest.mark.slow

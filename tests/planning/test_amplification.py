@@ -60,7 +60,7 @@ def in_the_middle(name):
         every = first + (snap - first) * np.linspace(0.05, 0.95, 10)
         changes = np.array([change.drive_angle for change in sweep.transitions])
         angles.append(every[np.all(np.abs(every[:, None] - changes) > 0.02, axis=1)])
-    plan = replace(plan, drive_angles=np.unique(np.concatenate(angles)))
+    plan = plan.at_angles(np.concatenate(angles))
     return plan, amplification(plan)
 
 
@@ -193,7 +193,7 @@ def test_both_directions_are_mirror_images():
 def test_a_rod_in_si_is_a_scaled_one():
     """Gains in m/(N m), m/N and m/rad."""
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
-    angles = in_the_middle("plain")[0].drive_angles
+    angles = in_the_middle("plain")[0].drives[0].drive_angles
     si = amplification(
         Plan(
             enlarged(PROFILE, 0.2),
@@ -231,7 +231,7 @@ def test_the_drive_angle_alone_does_not_move_raw_contacts_along_the_contour():
 def test_growth_is_what_single_samples_show():
     plan = Plan(PROFILE, drive=tb.Rotation(direction="forward"))
     first = plan.scan.sweeps[0].first_contact.drive_angle
-    near = amplification(replace(plan, drive_angles=first + np.array([1e-4, 2e-4, 0.5])))
+    near = amplification(plan.at_angles(first + np.array([1e-4, 2e-4, 0.5])))
     raw = near.sel(reconstruction="raw")
     np.testing.assert_allclose(raw.after_first_contact.values, [1e-4, 2e-4, 0.5], rtol=1e-9)
     for sd in (raw.sd_along.values, raw.sd_across.values):

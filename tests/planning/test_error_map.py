@@ -44,10 +44,8 @@ def test_cells_are_the_same_for_any_number_of_workers():
 
 
 def test_another_seed_draws_other_noise_and_expects_the_same():
-    other, nearer = (
-        error_map(**{**SMALL, "seed": 4, "over": {"noise_factor": [1.0], "distance": [0.4]}}),
-        small().sel(distance=[0.4]),
-    )
+    over = {"noise_factor": [1.0], "distance": [0.4]}
+    other, nearer = error_map(**{**SMALL, "seed": 4, "over": over}), small().sel(distance=[0.4])
     drawn = "rms_along"
     assert np.all(other[drawn].values != nearer[drawn].values)
     np.testing.assert_array_equal(other.expected_gap_width.values, nearer.expected_gap_width.values)

@@ -66,7 +66,7 @@ def swept(a, q, x_c, less, direction):
 def readings(plan, values, by_angle=0.0):
     """What the plan's cell would read, by `scan`: shape (samples, 3)."""
     of = dict(zip(plan.model.forward_parameters, map(float, values), strict=True))
-    loads, angles = swept(of["a"], of["q"], of["x_c"], of.get("drive_angle_offset", 0.0) - by_angle, plan.direction)
+    loads, angles = swept(of["a"], of["q"], of["x_c"], of.get("drive_angle_offset", 0.0) - by_angle, plan.drive.direction)
     if plan.cell.frame == "turning":
         cos, sin = np.cos(angles), np.sin(angles)
         moment, x, y = loads.T
@@ -387,10 +387,11 @@ def test_leverage_sums_to_what_is_told():
 
 def test_leverage_on_a_parameter_is_what_is_lost_without_the_sample():
     """Of a forward sweep, by a plan without that drive angle."""
-    plan = replace(between("rigidity_scale"), direction="forward")
+    forward = tb.Rotation(direction="forward", drive_angles=BETWEEN)
+    plan = replace(between("rigidity_scale"), drive=forward)
     found = told(plan)
-    angles = np.delete(np.asarray(plan.drive_angles), 7)
-    without = information(replace(plan, drive_angles=angles)).bound_with_priors.values
+    angles = np.delete(BETWEEN, 7)
+    without = information(plan.at_angles(angles)).bound_with_priors.values
     right = 1.0 - (found.bound_with_priors.values / without) ** 2
     np.testing.assert_allclose(found.leverage_on.values[7, :-1], right[:-1], rtol=0.0, atol=2e-5)
     np.testing.assert_allclose(found.leverage_on.values[-1, :3], 0.0, atol=1e-12)  # unloaded
@@ -425,7 +426,7 @@ def test_stretches_are_between_the_events():
     assert gap.max() < ends[1]
     touched = found.x.values[found.stretch.values == "touched"]
     assert np.all((touched <= ends[0] + 1e-12) | (touched >= ends[1] - 1e-12))
-    one = told(replace(DOUBLE, direction="forward"))
+    one = told(replace(DOUBLE, drive=replace(DOUBLE.drive, direction="forward")))
     assert np.isnan(float(one.gap_width))
     assert set(one.stretch.values) == {"touched"}
 

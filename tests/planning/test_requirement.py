@@ -71,7 +71,7 @@ def test_a_rod_in_si_needs_the_same():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     cell = tb.LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
     si = required_noise(
-        Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod), drive=tb.Rotation(drive_step=PLAN.drive_step)),
+        Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod), drive=PLAN.drive),
         0.2 * 0.003,
     )
     plain = required_noise(PLAN, 0.003)
@@ -108,7 +108,7 @@ def test_widths_that_are_none_are_refused(width):
 
 def test_a_gap_is_asked_for_where_there_is_one():
     with refused(ParameterError, "gap"):
-        required_noise(replace(PLAN, direction="forward"), 0.01, where="gap")
+        required_noise(replace(PLAN, drive=replace(PLAN.drive, direction="forward")), 0.01, where="gap")
     with refused(ParameterError, where="nowhere"):
         required_noise(PLAN, 0.01, where="nowhere")
 

@@ -154,11 +154,3 @@ def test_one_sweep_has_no_gap_to_speak_of():
     tree = sensitivity(PROFILE, seed=1, drive=tb.Rotation(direction="backward", drive_step=STEP), parts=["information"])
     (line,) = [line for line in words(tree) if "expected width" in line]
     assert "gap" not in line
-
-
-def test_progress_is_told_after_each_part():
-    told = []
-    sensitivity(
-        seed=1, drive=tb.Rotation(drive_step=0.2), parts=["information", "required_noise"], progress=told.append
-    )
-    assert [(step.done, step.wanted) for step in told] == [(1, 2), (2, 2)]

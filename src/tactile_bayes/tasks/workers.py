@@ -77,7 +77,7 @@ class Workers:
     progress: Callable[[Any], object] | None = None
 
     def __post_init__(self) -> None:
-        if self.where is not None and not isinstance(self.where, str):
+        if self.where is not None and not (isinstance(self.where, str) and ":" in self.where):
             what = "give a positive number, or the address of a Dask scheduler, like 'tcp://10.0.0.1:8786'"
             check_whole_number("workers", self.where, 1, what)
         check_function("progress", self.progress)
