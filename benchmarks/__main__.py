@@ -27,11 +27,11 @@ from benchmarks.starting import starting
 from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.sweep_frame import SweepFrame
-from tactile_bayes.inference.ensembles import spawn
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.mechanics.paths import trace
+from tactile_bayes.numerics.random_numbers import spawn
 from tactile_bayes.record import make_record
 from tactile_bayes.runs.demonstration import CONTOUR as DEMONSTRATED
 from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
@@ -128,7 +128,7 @@ def step_two() -> tuple[list[Row], str]:
         return np.array([contact_by_integration(*wrench, rtol) for wrench in zip(*wrenches, strict=True)])
 
     integration = best_time(by_hand, 3) / some.sizes["sample"]
-    records = {"without noise": clean, "with noise": CELL.measure(clean, seed=1)}
+    records = {"without noise": clean, "with noise": CELL.measure(clean, rng=1)}
     rows = []
     for kind, measured in records.items():
         ours = best_time(lambda measured=measured: tb.reconstruct(measured), 10) / measured.sizes["sample"]
@@ -144,7 +144,7 @@ def step_two() -> tuple[list[Row], str]:
 
 def constrained() -> tuple[Row, str]:
     """Time a sample; by hand, some in tangential contact, for which that sheet alone is fitted."""
-    measured = CELL.measure(record(MANY), seed=1)
+    measured = CELL.measure(record(MANY), rng=1)
     contacts = tb.reconstruct(measured, method="constrained")
     lying = (contacts.contact_phase.values == "tangential") & (contacts.status.values == "ok")
     some = np.flatnonzero(lying & (measured.direction.values == "forward"))[:: MANY // 120]
@@ -166,11 +166,11 @@ def constrained() -> tuple[Row, str]:
 
 def posteriors() -> Row:
     """Time a contact of a double sweep at 1°; every fortieth sample by emcee."""
-    measured = CELL.measure(tb.scan(CONTOUR).record, seed=1)
+    measured = CELL.measure(tb.scan(CONTOUR).record, rng=1)
     some = measured.isel(sample=slice(None, None, 40))
     counts = [int((tb.reconstruct(part).status != "no contact").sum()) for part in (some, measured)]
-    by_emcee = best_time(lambda: tb.infer_contacts(some, seed=1, method="emcee"), 1) / counts[0]
-    ours = best_time(lambda: tb.infer_contacts(measured, seed=1), 1) / counts[1]
+    by_emcee = best_time(lambda: tb.infer_contacts(some, rng=1, method="emcee"), 1) / counts[0]
+    ours = best_time(lambda: tb.infer_contacts(measured, rng=1), 1) / counts[1]
     return Row(f"posterior of one of {counts[1]} contacts: emcee for each / infer_contacts", by_emcee, ours)
 
 
@@ -180,10 +180,10 @@ def contour_posterior() -> tuple[Row, str]:
     These get the start, the same log-probability, vectorised, and enough steps to forget the start; their
     effective draws are those of the second half.
     """
-    measured = LOAD_CELL.measure(tb.scan(DEMONSTRATED, tb.Rig(rod=ROD)).record, seed=1)
+    measured = LOAD_CELL.measure(tb.scan(DEMONSTRATED, tb.Rig(rod=ROD)).record, rng=1)
     results: list[xr.DataTree] = []
     rig = tb.Rig(unknown="nothing")
-    ours = best_time(lambda: results.append(tb.infer_contour(measured, rig=rig, seed=1)), 3)
+    ours = best_time(lambda: results.append(tb.infer_contour(measured, rig=rig, rng=1)), 3)
     model = demonstration()
     start = started(walk_of(model, spawn(1, 1)[0], tb.SamplerSettings()))
     began = time.perf_counter()
@@ -207,7 +207,7 @@ def sweeps(by_hand: float) -> list[Row]:
     scanned = in_contact(scan.record)
     observed = loads(1_000)
     touching = float(np.mean(np.any(observed() != 0.0, axis=-1))) * ANGLES.size
-    measured = CELL.measure(tb.scan(CONTOUR, drive_angles=ANGLES).record, seed=1)
+    measured = CELL.measure(tb.scan(CONTOUR, drive_angles=ANGLES).record, rng=1)
     likelihood = RecordLikelihood(measured, CELL)
     walkers = contours(64)
     rows = [
@@ -248,11 +248,11 @@ def other_rods() -> str:
     }
     times = {}
     for name, (rod, rig) in rods.items():
-        measured = CELL.measure(tb.scan(CONTOUR, tb.Rig(rod=rod), drive_angles=ANGLES).record, seed=1)
+        measured = CELL.measure(tb.scan(CONTOUR, tb.Rig(rod=rod), drive_angles=ANGLES).record, rng=1)
         likelihood = RecordLikelihood(measured, CELL)
         times[name] = best_time(lambda of=likelihood, rig=rig: of.log_likelihood(walkers, rig=rig), 50) / 64
     for name, drive in CARRIED.items():
-        measured = CELL.measure(tb.scan(CONTOUR, drive=replace(drive, drive_step=_STEP_OF_TRAVEL)).record, seed=1)
+        measured = CELL.measure(tb.scan(CONTOUR, drive=replace(drive, drive_step=_STEP_OF_TRAVEL)).record, rng=1)
         likelihood = RecordLikelihood(measured, CELL)
         times[name] = best_time(lambda of=likelihood: of.log_likelihood(walkers), 50) / 64
     straight = times.pop("straight")

@@ -70,7 +70,7 @@ def published(noise: str) -> dict[str, xr.Dataset]:
         if path.exists():
             rows = json.loads(path.read_text(encoding="utf-8"))["replicates"]
             outcomes = {row["number"]: REPLICATES.decode(row) for row in rows}
-            found[family] = summary(experiment_of(family, tb.Rig(load_cell=load_cell(noise)), seed=SEED), outcomes)
+            found[family] = summary(experiment_of(family, tb.Rig(load_cell=load_cell(noise)), rng=SEED), outcomes)
     return found
 
 
@@ -109,7 +109,7 @@ def _share(claim: xr.Dataset) -> str:
 def calibrated(family: str, noise: str) -> xr.Dataset:
     replicates = FAMILIES[family].replicates // (1 if noise == "usual" else 2)
     rig, out = tb.Rig(load_cell=load_cell(noise)), OUT / folder_of(family, noise)
-    found = tb.calibrate(family, rig, replicates=replicates, seed=SEED, out=out)
+    found = tb.calibrate(family, rig, replicates=replicates, rng=SEED, out=out)
     print(f"{family}, {noise} noise: {found.attrs['verdict']}", flush=True)
     return found
 

@@ -102,19 +102,19 @@ def coverage(sweeps: int, seed: int) -> dict[str, NDArray[np.generic]]:
     """Return the probability of the smallest region that holds the true contact, for contacts above the noise."""
     parts: list[dict[str, NDArray[np.generic]]] = []
     for number, truth in enumerate(records(sweeps, seed)):
-        measured = CELL.measure(truth, seed=np.random.default_rng([seed, number]))
+        measured = CELL.measure(truth, rng=np.random.default_rng([seed, number]))
         held: dict[str, NDArray[np.generic]] = {}
         for method in METHODS:
             contacts = tb.reconstruct(measured, method=method)
             held[method] = chdtr(2.0, squared_distance(contacts, measured))
             held[f"{method} ok"] = contacts.status.values == "ok"
         loaded = np.flatnonzero(contacts.status.values != "no contact")
-        posterior = tb.infer_contacts(measured, seed=seed, draws=400)["posterior"].to_dataset()
+        posterior = tb.infer_contacts(measured, rng=seed, draws=400)["posterior"].to_dataset()
         held["posterior"] = np.full(measured.sizes["sample"], np.nan)
         held["posterior ok"] = np.ones(measured.sizes["sample"], dtype=bool)
         for i in loaded.tolist():
             place = measured.truth_contact_x.values[i], measured.truth_contact_y.values[i]
-            held["posterior"][i] = tb.contact_region(posterior, i).least_probability(*place)
+            held["posterior"][i] = tb.uncertainty.contact_region(posterior, i).least_probability(*place)
         held["phase"] = measured.truth_contact_phase.values
         of_sweep = np.repeat(list(PLACES), [SAMPLES[place] for place in PLACES])
         held["place"] = np.tile(of_sweep, measured.sizes["sample"] // of_sweep.size)

@@ -85,7 +85,7 @@ def compared(number: int) -> Outcome:
         gap = tb.gap(posterior)
         x = np.linspace(*_span(posterior), PLACES)
         candidates = [(float(across), float(above)) for above in ABOVE for across in ACROSS]
-        planned = tb.design(posterior, bases=candidates, drive_steps=[STEP], span=(x[0], x[-1]), seed=number, draws=8)
+        planned = tb.design(posterior, bases=candidates, drive_steps=[STEP], span=(x[0], x[-1]), rng=number, draws=8)
         reached = planned.isel(candidate=np.flatnonzero(planned.reached.values == 1.0))
         best = reached.isel(candidate=int(np.argmin(reached.width.values)))
         bases = {
@@ -107,7 +107,7 @@ def compared(number: int) -> Outcome:
 
 def _inferred(record: xr.Dataset, seed: int) -> xr.DataTree:
     rig = tb.Rig(load_cell=usual_load_cell(tb.Rod()))
-    return tb.infer_contour(record, family=FAMILY, rig=rig, settings=SETTINGS, seed=seed)
+    return tb.infer_contour(record, family=FAMILY, rig=rig, settings=SETTINGS, rng=seed)
 
 
 def _span(posterior: xr.DataTree) -> tuple[float, float]:

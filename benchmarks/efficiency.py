@@ -21,7 +21,9 @@ FACTORS = (3.0, 1.0, 0.1, 0.01)
 DRAWS = 2500.0
 SETTINGS = tb.SamplerSettings(ensembles=4, walkers=32, max_r_hat=1.01, min_ess=DRAWS, max_steps=4000)
 RIG = tb.Rig(load_cell=tb.LoadCell(force_noise=0.05, moment_noise=0.02))
-PLAN = tb.Plan(tb.contours.paper_profile("II", q=0.5), RIG, drive=tb.Rotation(drive_step=float(np.radians(2.0))))
+PLAN = tb.planning.Plan(
+    tb.contours.paper_profile("II", q=0.5), RIG, drive=tb.Rotation(drive_step=float(np.radians(2.0)))
+)
 
 
 def main(records: int = 8) -> None:
@@ -39,8 +41,8 @@ def compared(task: tuple[float, int]) -> Floats:
     """Return standard deviation over bound of every parameter."""
     factor, seed = task
     plan = PLAN.with_noise(factor)
-    measured = plan.cell.measure(plan.scan.record, seed=seed)
-    posterior = tb.infer_contour(measured, rig=plan.rig, seed=seed, settings=SETTINGS)
+    measured = plan.cell.measure(plan.scan.record, rng=seed)
+    posterior = tb.infer_contour(measured, rig=plan.rig, rng=seed, settings=SETTINGS)
     draws = posterior["posterior"].to_dataset()
     of_record = plan.with_noise(float(draws.noise_scale.mean()))
     bounds = information(of_record).bound_with_priors.sel(parameter=list(PLAN.model.names)).values

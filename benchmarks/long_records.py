@@ -28,9 +28,9 @@ def _one(samples: int) -> None:
     cell, contour = tb.LoadCell(force_noise=0.05, moment_noise=0.02), paper_profile("II", q=0.5)
     settings = tb.SamplerSettings(max_seconds=_SECONDS)
     for count in (300, samples):  # the first one waits for compiled code
-        record = cell.measure(tb.scan(contour, drive_step=np.radians(268.0) / count).record, seed=1)
+        record = cell.measure(tb.scan(contour, drive_step=np.radians(268.0) / count).record, rng=1)
         began, busy = time.perf_counter(), time.process_time()
-        result = tb.infer_contour(record, seed=1, settings=settings)
+        result = tb.infer_contour(record, rng=1, settings=settings)
         wall, processor = time.perf_counter() - began, time.process_time() - busy
     taken, memory = result["observed_data"].sizes["sample"], _peak() / 1e9
     print(f"{record.sizes['sample']:8,}  {taken:6,}  {wall:5.1f} s  {processor:7.1f} s  {memory:5.2f} GB")

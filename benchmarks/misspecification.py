@@ -70,7 +70,7 @@ def _untold(truth: tb.Rig, *, options: Mapping[str, Any] = MappingProxyType({}),
 
 def _spotted(at: float) -> dict[str, Run]:
     """Return runs with a flat spot; a shape-free family takes parabolas for any smooth contour."""
-    spotted = tb.Misspecification(flat_spot=(at, 2.0))
+    spotted = tb.calibration.Misspecification(flat_spot=(at, 2.0))
     free = {"family": "shape-free", "misspecification": replace(spotted, family="parabola")}
     return {"": Run(_real(), options={"misspecification": spotted}), "shape free": Run(_real(), options=free)}
 
@@ -83,7 +83,7 @@ CASES: Mapping[str, Mapping[str, Run]] = {
     **{f"friction {mu}": _known_to_vary(friction=mu) for mu in (0.1, 0.3, 0.5)},
     **{
         f"base off by 1 % L, {way}": _untold(
-            _real(), options={"misspecification": tb.Misspecification(base_shift=shift)}
+            _real(), options={"misspecification": tb.calibration.Misspecification(base_shift=shift)}
         )
         for way, shift in (("across", (0.01, 0.0)), ("along", (0.0, 0.01)))
     },
@@ -141,7 +141,7 @@ def calibrated(name: str, run: Run, replicates: int) -> xr.Dataset:
     folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in name.strip())
     settings = None if run.options.get("family") == "shape-free" else SETTINGS
     options = {"rig": run.rig, "truth": run.truth, "settings": settings, **run.options}
-    return tb.calibrate(seed=2029, replicates=replicates, out=folder, **options)
+    return tb.calibrate(rng=2029, replicates=replicates, out=folder, **options)
 
 
 def row(name: str, found: xr.Dataset) -> str:

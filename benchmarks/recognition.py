@@ -123,13 +123,13 @@ def recognised(task: tuple[str, str, int]) -> Outcome:
     rng = np.random.default_rng([2028, number])
     cell = tb.LoadCell(force_noise=NOISES[noise][0], moment_noise=NOISES[noise][1])
     contour = _neither(rng) if kind == NONE else _drawn(kind, cell, rng)
-    measured = cell.measure(tb.scan(contour, drive_angles=ANGLES).record, seed=rng)
+    measured = cell.measure(tb.scan(contour, drive_angles=ANGLES).record, rng=rng)
     began = time.perf_counter()
     result = tb.compare_families(
         measured,
         [tb.Family(family, **VERTEX) for family in FAMILIES],
         tb.Rig(load_cell=cell, unknown=UNKNOWN),
-        seed=int(rng.integers(2**32)),
+        rng=int(rng.integers(2**32)),
         leave_one_out=False,
         settings=SETTINGS,
     )

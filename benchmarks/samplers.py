@@ -27,10 +27,11 @@ from threadpoolctl import threadpool_limits
 import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.ensembles import sample, spawn
+from tactile_bayes.inference.ensembles import sample
 from tactile_bayes.inference.ensembles.diagnosis import walker_major
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
+from tactile_bayes.numerics.random_numbers import spawn
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.tasks import one_thread
 
@@ -83,7 +84,7 @@ def started(walk: Walk) -> Floats:
 
 
 def demonstration() -> ContourModel:
-    measured = LOAD_CELL.measure(tb.scan(CONTOUR, tb.Rig(rod=ROD)).record, seed=1)
+    measured = LOAD_CELL.measure(tb.scan(CONTOUR, tb.Rig(rod=ROD)).record, rng=1)
     return Experiment(measured, tb.Rig(unknown="nothing")).model
 
 

@@ -106,19 +106,19 @@ def record(task: tuple[str, str, int]) -> Outcome:
     contour = truth.build(float(rng.uniform(0.45, 0.6)), float(rng.normal(0.0, 0.05)))
     cell = tb.LoadCell(force_noise=NOISES[noise][0], moment_noise=NOISES[noise][1])
     scan = tb.scan(contour, drive_angles=ANGLES + rng.uniform(0.0, np.radians(1.0)))
-    measured = cell.measure(scan.record, seed=rng)
+    measured = cell.measure(scan.record, rng=rng)
     began = time.perf_counter()
     rig = tb.Rig(load_cell=cell)
-    result = tb.infer_contour(measured, family="shape-free", rig=rig, seed=number, settings=SETTINGS)
+    result = tb.infer_contour(measured, family="shape-free", rig=rig, rng=number, settings=SETTINGS)
     seconds = time.perf_counter() - began
     gap, touched = gap_and_touched(scan)
     in_gap, width, off = compared(result, contour, gap)
     out_of_gap, _, _ = compared(result, contour, touched)
     known_width = np.nan
     if truth.family is not None:
-        known = tb.infer_contour(measured, family=truth.family, rig=rig, seed=number, settings=SETTINGS)
+        known = tb.infer_contour(measured, family=truth.family, rig=rig, rng=number, settings=SETTINGS)
         _, known_width, _ = compared(known, contour, gap)
-    passed = bool(tb.check_record(result).attrs["passed"])
+    passed = bool(tb.diagnostics.check_record(result).attrs["passed"])
     return Outcome(in_gap, out_of_gap, width, off, known_width, seconds, bool(result.attrs["converged"]), passed)
 
 

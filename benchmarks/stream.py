@@ -51,8 +51,8 @@ WRONG: Mapping[str, dict[str, Any]] = {
     "friction of 0.3, not inferred": {"truth": SMOOTH.with_unknown(friction=0.3)},
     "rod tapered by 30 %": {"truth": SMOOTH.with_unknown(taper=0.3)},
     "rod curved by 0.2/L": {"truth": SMOOTH.with_unknown(rest_curvature=0.2)},
-    "circle": {"misspecification": tb.Misspecification(family="circle")},
-    "flat spot in the gap": {"misspecification": tb.Misspecification(flat_spot=(0.0, 2.0))},
+    "circle": {"misspecification": tb.calibration.Misspecification(family="circle")},
+    "flat spot in the gap": {"misspecification": tb.calibration.Misspecification(flat_spot=(0.0, 2.0))},
     "outliers (t, 2.5)": {"truth": replace(SMOOTH, load_cell=replace(CELL, degrees_of_freedom=2.5))},
 }
 """What the model does not have: it takes all for parabolas without friction and backlash."""
@@ -73,7 +73,7 @@ def one(task: tuple[tuple[()], int]) -> Row:
     """Return ranks, bands and times of one record."""
     _, number = task
     try:
-        replicate = calibration_replicate(number, rig=tb.Rig(load_cell=CELL), seed=SEED)
+        replicate = calibration_replicate(number, rig=tb.Rig(load_cell=CELL), rng=SEED)
     except TactileBayesError as error:
         return {"error": f"{number}: {error}"}
     assert replicate.measured is not None
@@ -106,13 +106,13 @@ def wrong(records: int = 20) -> None:
 def wrong_one(task: tuple[str, int]) -> Row:
     """Return the e-values of one record, and whether no particle explained it."""
     name, number = task
-    experiment = experiment_of(rig=SMOOTH, seed=SEED, **WRONG[name])
+    experiment = experiment_of(rig=SMOOTH, rng=SEED, **WRONG[name])
     random = np.random.default_rng(np.random.SeedSequence(SEED, spawn_key=(number,)))
     try:
         measured = simulate(experiment, random).measured
     except TactileBayesError as error:
         return {"error": f"{number}: {error}"}
-    stream = tb.Stream(rig=SMOOTH, seed=number, particles=PARTICLES)
+    stream = tb.Stream(rig=SMOOTH, rng=number, particles=PARTICLES)
     row: dict[str, Any] = {"e_values": [], "shifts": [], "ended": False}
     for block in np.array_split(np.arange(measured.sizes["sample"]), BLOCKS):
         try:
@@ -127,7 +127,7 @@ def wrong_one(task: tuple[str, int]) -> Row:
 
 def compared(measured: xr.Dataset, truth: Mapping[str, float], posterior: xr.DataTree, number: int) -> Row:
     x = float(posterior["posterior"]["x_c"].median()) + AROUND
-    stream = tb.Stream(rig=tb.Rig(load_cell=CELL), seed=number, particles=PARTICLES, x=x)
+    stream = tb.Stream(rig=tb.Rig(load_cell=CELL), rng=number, particles=PARTICLES, x=x)
     height = tb.contours.Parabola(truth["a"], truth["q"], truth["x_c"]).height(x)
     row: dict[str, Any] = {"ranks": [], "held": [], "width": [], "seconds": [], "stages": []}
     for k, block in enumerate(np.array_split(np.arange(measured.sizes["sample"]), BLOCKS), start=1):

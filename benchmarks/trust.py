@@ -67,8 +67,8 @@ def one(task: tuple[tuple[str, str], int]) -> Row:
     run = CASES[name][other]
     options = {"rig": run.rig, "truth": run.truth, "settings": SETTINGS, **run.options}
     try:
-        replicate = calibration_replicate(number, seed=2031, probability=PROBABILITY, **options)
-        found = trust(replicate.posterior, replicates=0, assumptions=False)
+        replicate = calibration_replicate(number, rng=2031, probability=PROBABILITY, **options)
+        found = trust(replicate.posterior, rng=1, replicates=0, assumptions=False)
     except TactileBayesError as error:
         return {"conclusion": LOST, "summary": str(error)}
     numbers = replicate.outcome.numbers

@@ -181,7 +181,7 @@ def calibrated(folder: Path, rod: tb.Rod) -> tuple[tb.Rig, xr.DataTree]:
             options = {"checkpoint": folder / "rig", "settings": LONG}
         probe = tb.contours.Circle(r=1e-5, q=-1e-5)
         rig = tb.Rig(load_cell=SENSOR, unknown=unknown)
-        rig = tb.calibrate_rig(points(rod), contour=probe, rig=rig, seed=1, **options)
+        rig = tb.calibrate_rig(points(rod), contour=probe, rig=rig, rng=1, **options)
         assert rig.calibration is not None
         assert rig.calibration.posterior is not None
         rig.write(file)
@@ -203,7 +203,7 @@ def measured(
             record_of(name, rod),
             family="shape-free" if of_any_shape else "circle",
             rig=rig.with_unknown(**unknown),
-            seed=1,
+            rng=1,
             settings=ENOUGH_OF_ANY_SHAPE if of_any_shape else ENOUGH,
         )
         tb.write_result(found, path)
@@ -217,7 +217,7 @@ def file_name(name: str, of_any_length: bool, of_any_shape: bool) -> str:
 
 def roundness(found: xr.DataTree) -> str:
     """Return the radius of a circle fitted to the arc that was touched, and its largest distance from the arc."""
-    touched = np.nanquantile(tb.implied_contacts(found, draws=100)["posterior"].slope_angle, [0.02, 0.98])
+    touched = np.nanquantile(tb.uncertainty.implied_contacts(found, draws=100)["posterior"].slope_angle, [0.02, 0.98])
     draws = found["posterior"].dataset.stack(every=("chain", "draw"))
     contours = contours_of(draws.isel(every=slice(None, None, max(1, draws.sizes["every"] // 200))), "shape-free")
     radii, off = [], []
@@ -283,7 +283,7 @@ def picture(posterior: xr.DataTree) -> Figure:
     for radius, middle, lowest in zip(r[some], x_c[some], q[some], strict=True):
         circle = 1e3 * (middle + radius * np.cos(turn)), 1e3 * (lowest + radius + radius * np.sin(turn))
         plane.plot(*circle, color="#0072B2", linewidth=0.6, alpha=0.4)
-    touched = tb.implied_contacts(posterior, draws=20)["posterior"]
+    touched = tb.uncertainty.implied_contacts(posterior, draws=20)["posterior"]
     at = (1e3 * touched[name].values.ravel() for name in ("contact_x", "contact_y"))
     plane.plot(*at, ".", markersize=1.5, color="#D55E00", rasterized=True)
     plane.set(xlabel="$x$ / mm", ylabel="$y$ / mm", aspect="equal")

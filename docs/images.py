@@ -40,7 +40,7 @@ def contacts() -> Figure:
     """The same contacts, raw, constrained, and as posteriors."""
     contour = tb.contours.paper_profile("II", q=0.5)
     cell = tb.LoadCell(force_noise=0.1, moment_noise=0.04)
-    measured = cell.measure(tb.scan(contour, direction="forward", drive_step=np.radians(2)).record, seed=5)
+    measured = cell.measure(tb.scan(contour, direction="forward", drive_step=np.radians(2)).record, rng=5)
     figure = Figure(figsize=(11.0, 3.6), layout="compressed")
     columns = figure.subplots(1, 3, sharex=True, sharey=True, subplot_kw={"xlim": (0.03, 0.83), "ylim": (0.35, 0.85)})
     constrained = tb.reconstruct(measured, method="constrained")
@@ -48,7 +48,7 @@ def contacts() -> Figure:
     options = {"samples": drawn, "truth": contour}
     tb.plotting.contact_ellipses(tb.reconstruct(measured), ax=columns[0], **options)
     tb.plotting.contact_ellipses(constrained, ax=columns[1], **options)
-    tb.plotting.contact_regions(tb.infer_contacts(measured, seed=1, draws=4000), ax=columns[2], **options)
+    tb.plotting.contact_regions(tb.infer_contacts(measured, rng=1, draws=4000), ax=columns[2], **options)
     for ax, title in zip(columns, ("raw, first order", "constrained, first order", "posterior"), strict=True):
         ax.set(title=title, xlim=(0.03, 0.83), ylim=(0.35, 0.85))
         ax.get_legend().remove()
@@ -67,7 +67,7 @@ def whisker() -> Figure:
     true = tb.Rod(0.1, rigidity, rest_curvature=lambda s: 2.0 + 40.0 * s, taper=0.5)
     parabola = tb.contours.Parabola(a=5.0, q=0.07)
     cell = tb.LoadCell(force_noise=3e-4, moment_noise=1.5e-5)
-    measured = cell.measure(tb.scan(parabola, tb.Rig(rod=true), drive_step=np.radians(3)).record, seed=2)
+    measured = cell.measure(tb.scan(parabola, tb.Rig(rod=true), drive_step=np.radians(3)).record, rng=2)
 
     figure = Figure(figsize=(8.0, 6.5), layout="constrained")
     above, below = figure.subplots(2, 1)

@@ -85,7 +85,7 @@ def commands_built_once():
 @pytest.fixture(scope="session")
 def measured():
     """The demonstration's record, in coarse steps: SI, both directions, all channels."""
-    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.05).record, seed=1)
+    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.05).record, rng=1)
     return record.drop_vars([name for name in record.data_vars if name.startswith("truth_")])
 
 
@@ -95,7 +95,7 @@ def analysed(measured, tmp_path_factory):
     from tactile_bayes.runs.contour import analyse
 
     folder = tmp_path_factory.mktemp("analysed") / "made" / "on the way"
-    return analyse(measured, folder, rig=Rig(unknown="nothing"), settings=QUICK, truth=CONTOUR), folder
+    return analyse(measured, folder, rig=Rig(unknown="nothing"), settings=QUICK, truth=CONTOUR, rng=1), folder
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers.public_calls import AcceptedError, end_before_sampling
+from helpers.public_names import public
 from helpers.refusals import refused
 from helpers.wrong_values import WRONG
 from tactile_bayes.checks import (
@@ -32,7 +33,6 @@ from tactile_bayes.checks import (
     check_pivots,
     check_positive,
     check_probability,
-    check_seed,
     check_switch,
     check_whole_number,
     shown,
@@ -49,7 +49,7 @@ def ideal():
 
 @functools.cache
 def measured():
-    return CELL.measure(ideal(), seed=1)
+    return CELL.measure(ideal(), rng=1)
 
 
 @functools.cache
@@ -194,7 +194,7 @@ AT_LEAST_0, POSITIVE = number(0.0), number(TINY)
 SHARE = number(TINY, math.nextafter(1.0, 0.0))
 NO_SHARES = [0.0, 1.0, 90.0]
 FLAG = kind(bool | np.bool_)
-SEED = whole(0)
+RNG = either(whole(0), kind(np.random.Generator), kind(np.random.SeedSequence))
 CELL_OR_NONE = either(nothing, kind(tb.LoadCell))
 ROD_OR_NONE = either(nothing, kind(tb.Rod, is_dimensionless=True))
 SETTINGS_OR_NONE = either(nothing, kind(tb.SamplerSettings))
@@ -209,9 +209,9 @@ def cases(tmp_path):
     tb.write_record(ideal(), good)
     paths = {"path": ["\0", "folder/\0.csv", tmp_path, tmp_path / "record.txt", 3]}
     of_record, of_posterior = {"measured": no_records()}, {"posterior": no_posteriors()}
-    of_seed = {
+    of_random = {
         "measured": (measured(), never),
-        "seed": (1, SEED),
+        "rng": (1, RNG),
         "settings": (None, SETTINGS_OR_NONE),
         "progress": (None, PROGRESS),
     }
@@ -222,7 +222,7 @@ def cases(tmp_path):
     }
     no_bases = [[(0, 0), (1,)], [0.0, None], "here", (0.0,), (0.0, 0.0, 0.0), [(0.0, math.nan)], (math.nan, 0)]
     stated = tb.Rig(load_cell=CELL, unknown="nothing")
-    of_contour = {**of_seed, "rig": (stated, either(nothing, kind(tb.Rig)))}
+    of_contour = {**of_random, "rig": (stated, either(nothing, kind(tb.Rig)))}
     place = {"q": (0.5, numbers), "x_c": (0.0, numbers)}
     contours = {
         "Parabola": {"a": (0.5, numbers), **place},
@@ -281,7 +281,7 @@ def cases(tmp_path):
         ),
         "LoadCell.measure": (
             CELL.measure,
-            {"record": (ideal(), never), "seed": (1, either(SEED, kind(np.random.Generator)))},
+            {"record": (ideal(), never), "rng": (1, RNG)},
             {"record": no_records()},
         ),
         "LoadCell.from_record": (tb.LoadCell.from_record, {"record": (measured(), never)}, {"record": no_records()}),
@@ -291,7 +291,7 @@ def cases(tmp_path):
             {"record": no_records()},
         ),
         "zero_load": (
-            tb.zero_load,
+            tb.load_cell.zero_load,
             {"record": (measured(), never), "false_alarm": (1e-3, number(TINY, 0.499))},
             {"record": no_records(), "false_alarm": [0.5]},
         ),
@@ -360,7 +360,7 @@ def cases(tmp_path):
             {**of_posterior, "x": [[[0.0, 1.0]], [0.0, math.nan]], "probability": NO_SHARES},
         ),
         "predictive_interval": (
-            tb.predictive_interval,
+            tb.uncertainty.predictive_interval,
             {"posterior": (posterior(), never), "probability": (0.9, SHARE)},
             {"probability": NO_SHARES},
         ),
@@ -379,7 +379,7 @@ def cases(tmp_path):
         "compare_families": (
             tb.compare_families,
             {
-                **{name: of_seed[name] for name in ("measured", "seed", "settings", "progress")},
+                **{name: of_random[name] for name in ("measured", "rng", "settings", "progress")},
                 "rig": (stated, either(nothing, kind(tb.Rig))),
                 "families": (["parabola", "circle"], never),
                 "leave_one_out": (False, FLAG),
@@ -393,13 +393,13 @@ def cases(tmp_path):
         "infer_contacts": (
             tb.infer_contacts,
             {
-                **of_seed,
+                **of_random,
                 "rig": (stated, either(nothing, kind(tb.Rig))),
                 "prior": ("flat", one_of("flat", "polar")),
                 "draws": (4, lambda value: whole(4, 10**6)(value) and value % 4 == 0),
                 "method": ("importance", one_of("auto", "importance", "emcee")),
             },
-            {**of_record, "draws": [2, 10, 4.0, "4"], "method": ["nuts"], "seed": [-1]},
+            {**of_record, "draws": [2, 10, 4.0, "4"], "method": ["nuts"], "rng": [-1]},
         ),
     }
     assert set(made) == set(CASES)
@@ -521,7 +521,6 @@ REFUSALS = {
     "base": (check_pivots, [(0, 1), [(0, 1), (2, 1)]], [(0, 1, 2), [], [(0, 1), (2,)], (0, math.nan), 1.0, "01"]),
     "draws": (functools.partial(check_whole_number, least=2), [np.uint8(2), 3], [True, 2.0, "2", None, 1]),
     "replicate": (lambda name, value: check_whole_number(name, value, 0, most=9), [9], [10, -1, False]),
-    "seed": (lambda name, value: check_seed(value), [0, 2**70], [-1, True, 1.5, None, "1"]),
     "method": (
         functools.partial(check_choice, choices=("raw", "constrained")),
         ["raw"],
@@ -572,18 +571,17 @@ def test_what_is_long_is_shown_by_its_kind():
 
 def switches():
     """(name of a public function, its boolean parameter), by annotation or default."""
-    for module in (tb, tb.contours, tb.datasets, tb.elastica, tb.paper_figures, tb.plotting):
-        for name in module.__all__:
-            value = getattr(module, name)
-            methods = [f"{name}.{own}" for own in dir(value) if inspect.isclass(value) and not own.startswith("_")]
-            for label in [name, *methods]:
-                function = functools.reduce(getattr, label.split("."), module)
-                if not callable(function) or inspect.ismodule(function):
-                    continue
-                with contextlib.suppress(ValueError, TypeError):  # of some builtins
-                    for parameter in inspect.signature(function).parameters.values():
-                        if parameter.annotation in (bool, "bool") or isinstance(parameter.default, bool):
-                            yield module, label, parameter.name
+    for module, name, _ in public():
+        value = getattr(module, name)
+        methods = [f"{name}.{own}" for own in dir(value) if inspect.isclass(value) and not own.startswith("_")]
+        for label in [name, *methods]:
+            function = functools.reduce(getattr, label.split("."), module)
+            if not callable(function) or inspect.ismodule(function):
+                continue
+            with contextlib.suppress(ValueError, TypeError):  # of some builtins
+                for parameter in inspect.signature(function).parameters.values():
+                    if parameter.annotation in (bool, "bool") or isinstance(parameter.default, bool):
+                        yield module, label, parameter.name
 
 
 def required():
@@ -607,7 +605,7 @@ def required():
         "record": measured(),
         "records": measured(),
         "run_or_posterior": posterior_with_prior(),
-        "seed": 0,
+        "rng": 0,
         "self": CELL,
         "source": {"records": 1, "seed": 1, "contours": contours},
         "x": [0.0, 0.1],

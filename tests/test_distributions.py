@@ -88,7 +88,7 @@ ASKED = {
     "Rig, of a group": lambda: Rig(unknown={"bias": NO_WIDTH}),
     "Family": lambda: Family("parabola", q=NO_WIDTH),
     "infer_point_load": lambda: infer_point_load(
-        POINTS, 0.1 * POINTS, np.arange(12.0), priors={"clamp_angle": stats.norm(0.0, 0.0)}, seed=1
+        POINTS, 0.1 * POINTS, np.arange(12.0), priors={"clamp_angle": stats.norm(0.0, 0.0)}, rng=1
     ),
 }
 

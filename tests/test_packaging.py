@@ -74,7 +74,8 @@ def test_it_starts_without_what_is_loaded_when_used():
 import sys
 sys.modules.update(dict.fromkeys({OPTIONAL!r}))
 import tactile_bayes as tb
-from tactile_bayes import contours, elastica, load_cell, record
+from tactile_bayes import contours, load_cell, record
+from tactile_bayes.mechanics import elastica
 assert "numba" not in sys.modules
 measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(
     tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.2).record, seed=1

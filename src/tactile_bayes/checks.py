@@ -33,7 +33,6 @@ __all__ = [
     "check_pivots",
     "check_positive",
     "check_probability",
-    "check_seed",
     "check_switch",
     "check_whole_number",
     "refused",
@@ -52,13 +51,7 @@ _SHOWN = 120
 
 
 def shown(value: object) -> str:
-    """Return the representation of a value for a message, or its type if that is long.
-
-    Examples
-    --------
-    >>> shown("left"), shown(np.zeros((100, 100)))
-    ("'left'", 'a ndarray of shape (100, 100)')
-    """
+    """Return the representation of a value for a message, or its type if that is long."""
     written = repr(value)
     if len(written) <= _SHOWN and "\n" not in written:
         return written
@@ -72,13 +65,7 @@ def refused(name: str, value: object, correction: str) -> ParameterError:
 
 
 def as_number(value: Any) -> float | None:
-    """Return a real number as a float; None for a truth value, text, a complex number, or several numbers.
-
-    Examples
-    --------
-    >>> as_number(np.float32(0.5)), as_number(True), as_number("1"), as_number([1.0]), as_number(math.nan)
-    (0.5, None, None, None, nan)
-    """
+    """Return a real number as a float; None for a truth value, text, a complex number, or several numbers."""
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if kind and (kind not in "iuf" or getattr(value, "shape", None) != ()):
         return None
@@ -96,13 +83,7 @@ def unmasked(values: Any) -> Any:
 
 
 def as_numbers(values: Any) -> Floats | None:
-    """Return real numbers as an array of their shape, NaN where masked; None if one of them is not a real number.
-
-    Examples
-    --------
-    >>> as_numbers([1, 2.5]), as_numbers([1, "2"]), as_numbers([[1, 2], [3]]), as_numbers([True, 1.0])
-    (array([1. , 2.5]), None, None, None)
-    """
+    """Return real numbers as an array of their shape, NaN where masked; None if one of them is not a real number."""
     try:
         array = np.asarray(values)
         if array.dtype.kind not in "iuf":
@@ -117,13 +98,7 @@ def as_numbers(values: Any) -> Floats | None:
 
 
 def check_array(name: str, values: Any, correction: str = "give a number, or an array of numbers") -> Floats:
-    """Return real numbers, which need not be finite, as an array of their shape.
-
-    Examples
-    --------
-    >>> check_array("x", [1, math.nan])
-    array([ 1., nan])
-    """
+    """Return real numbers, which need not be finite, as an array of their shape."""
     if type(values) is np.ndarray and values.dtype == np.float64:  # a short cut, for inner loops
         return values
     numbers = as_numbers(values)
@@ -133,15 +108,7 @@ def check_array(name: str, values: Any, correction: str = "give a number, or an 
 
 
 def check_arrays(**values: Any) -> list[Floats]:
-    """Return arrays of numbers whose shapes broadcast.
-
-    Examples
-    --------
-    >>> check_arrays(x=[1.0, 2.0], y=[1.0, 2.0, 3.0])
-    Traceback (most recent call last):
-    ...
-    tactile_bayes.errors.ParameterError: x of shape (2,), y of shape (3,) do not broadcast: give numbers, or ...
-    """
+    """Return arrays of numbers whose shapes broadcast."""
     arrays = {name: check_array(name, given) for name, given in values.items()}
     try:
         np.broadcast_shapes(*(array.shape for array in arrays.values()))
@@ -154,15 +121,7 @@ def check_arrays(**values: Any) -> list[Floats]:
 def check_number(
     name: str, value: Any, correction: str = "give a finite number", *, least: float = -math.inf, most: float = math.inf
 ) -> float:
-    """Return a finite number from `least` to `most`.
-
-    Examples
-    --------
-    >>> check_number("friction", "0.2", "give a number from 0 up", least=0.0)
-    Traceback (most recent call last):
-    ...
-    tactile_bayes.errors.ParameterError: friction is '0.2': give a number from 0 up
-    """
+    """Return a finite number from `least` to `most`."""
     number = as_number(value)
     if number is None or not (math.isfinite(number) and least <= number <= most):
         raise refused(name, value, correction)
@@ -178,17 +137,7 @@ def check_numbers(
     least: float = -math.inf,
     most: float = math.inf,
 ) -> Floats:
-    """Return finite numbers from `least` to `most` as an array; None in its shape stands for any size above 0.
-
-    Examples
-    --------
-    >>> check_numbers("span", (0, 1), shape=(2,))
-    array([0., 1.])
-    >>> check_numbers("lever", [0.0, 0.1, 0.2], "give two finite numbers (x, y)", shape=(2,))
-    Traceback (most recent call last):
-    ...
-    tactile_bayes.errors.ParameterError: lever is [0.0, 0.1, 0.2]: give two finite numbers (x, y)
-    """
+    """Return finite numbers from `least` to `most` as an array; None in its shape stands for any size above 0."""
     numbers = as_numbers(values)
     if numbers is None or not (np.isfinite(numbers) & (least <= numbers) & (numbers <= most)).all():
         raise refused(name, values, correction)
@@ -204,13 +153,7 @@ def _is_of(shape: Sequence[int | None], sizes: Sequence[int]) -> bool:
 
 
 def check_pivots(name: str, values: Any) -> list[tuple[float, float]]:
-    """Return one or several pivots as pairs of finite numbers.
-
-    Examples
-    --------
-    >>> check_pivots("base", (0, 1)), check_pivots("base", [(0, 1), (2, 1)])
-    ([(0.0, 1.0)], [(0.0, 1.0), (2.0, 1.0)])
-    """
+    """Return one or several pivots as pairs of finite numbers."""
     correction = "give a pivot (x, y), or several: [(x, y), (x, y)]"
     numbers = np.atleast_2d(check_numbers(name, values, correction))
     if not _is_of((None, 2), numbers.shape):
@@ -231,33 +174,14 @@ def check_probability(
 
 
 def check_whole_number(name: str, value: Any, least: int, correction: str = "", *, most: float = _MOST) -> int:
-    """Return a whole number from `least` to `most`; a truth value is refused.
-
-    Examples
-    --------
-    >>> check_whole_number("draws", np.int64(4), 1)
-    4
-    """
+    """Return a whole number from `least` to `most`; a truth value is refused."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
         raise refused(name, value, correction or f"give a whole number from {least} up, at most {most:g}")
     return int(value)
 
 
-def check_seed(value: Any, correction: str = "") -> int:
-    """Return a whole number from 0 up, the seed of random numbers."""
-    return check_whole_number("seed", value, 0, correction, most=math.inf)
-
-
 def check_choice(name: str, value: Any, choices: Collection[str], correction: str = "") -> str:
-    """Return a word if it is one of the choices.
-
-    Examples
-    --------
-    >>> check_choice("method", ["raw"], ["raw", "constrained"])
-    Traceback (most recent call last):
-    ...
-    tactile_bayes.errors.ParameterError: method is ['raw']: choose 'raw' or 'constrained'
-    """
+    """Return a word if it is one of the choices."""
     if isinstance(value, str) and value in choices:
         return value
     *others, last = map(repr, choices)
@@ -290,15 +214,7 @@ def check_function(name: str, value: Any) -> None:
 
 
 def check_names(name: str, values: Any) -> list[str]:
-    """Return a list of names.
-
-    Examples
-    --------
-    >>> check_names("nuisances", "bias")
-    Traceback (most recent call last):
-    ...
-    tactile_bayes.errors.ParameterError: nuisances is 'bias': give a list of names, like ['bias']
-    """
+    """Return a list of names."""
     listed = values.tolist() if isinstance(values, np.ndarray) and values.dtype.kind in "UO" else values
     if isinstance(listed, str):
         raise refused(name, values, f"give a list of names, like [{listed!r}]")
@@ -319,15 +235,7 @@ def check_mapping(name: str, values: Any, correction: str) -> None:
 
 
 def check_path(name: str, value: Any, correction: str = "give a path, like 'record.csv'") -> Path:
-    """Return the path of a file or a folder.
-
-    Examples
-    --------
-    >>> check_path("path", 3)
-    Traceback (most recent call last):
-    ...
-    tactile_bayes.errors.ParameterError: path is 3: give a path, like 'record.csv'
-    """
+    """Return the path of a file or a folder."""
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
     if not isinstance(text, str) or not text or "\0" in text:
         raise refused(name, value, correction)

@@ -129,30 +129,7 @@ _NAMES["loguniform"] = "log_uniform"
 def distribution_of_table(
     value: Any, name: str, number: Callable[[Any], float | None] = as_number
 ) -> float | Distribution:
-    """Return what a value of a table states: a number, or a frozen distribution.
-
-    Parameters
-    ----------
-    value : Any
-        A number; { KIND = [numbers] } with a kind of `KINDS`, for a single number { KIND = number }; or
-        { NAME = { argument = number } } with any continuous distribution of `scipy.stats` and its arguments.
-    name : str
-        What it is a value of, for messages.
-    number : callable
-        Return a number of the table; None if it is none.
-
-    Raises
-    ------
-    ParameterError
-        If it states neither.
-
-    Examples
-    --------
-    >>> distribution_of_table(0.3, "friction")
-    0.3
-    >>> in_words(distribution_of_table({"half_normal": 0.3}, "friction"))
-    'halfnorm(0, 0.3)'
-    """
+    """Return what a value of a table states: a number, or a frozen distribution."""
     hint = (
         f"give a number, or a distribution like {{ normal = [0.0, 0.1] }} (there are {', '.join(KINDS)}, and those of "
         "scipy.stats by name, like { beta = { a = 2.0, b = 3.0 } })"
@@ -195,18 +172,7 @@ def _of_scipy(
 
 
 def table_of_distribution(value: float | Distribution) -> Any:
-    """Return the value of a table that states a number or a distribution, as `distribution_of_table` takes it.
-
-    Raises
-    ------
-    ParameterError
-        If a distribution is none of SciPy with numbers.
-
-    Examples
-    --------
-    >>> table_of_distribution(stats.lognorm(s=0.5, scale=2.0)), table_of_distribution(0.3)
-    ({'log_normal': [2.0, 0.5]}, 0.3)
-    """
+    """Return the value of a table that states a number or a distribution, as `distribution_of_table` takes it."""
     plain = as_number(value)
     if plain is not None:
         return plain
@@ -286,13 +252,7 @@ class _Newer:
 
 
 def check_distribution(parameter: str, distribution: Any) -> None:
-    """Refuse what is no distribution, or has no density.
-
-    Raises
-    ------
-    ParameterError
-        If it is none; the message names the parameter.
-    """
+    """Refuse what is no distribution, or has no density."""
     if not isinstance(distribution, Distribution) or isinstance(distribution, stats.rv_continuous):
         correction = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
         raise ParameterError(f"the prior of {parameter} is {shown(distribution)}: {correction}")
@@ -332,13 +292,7 @@ def _no_width(value: float) -> str:
 
 
 def refuse_unknown_names(given: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
-    """Refuse distributions by names that are no parameters.
-
-    Raises
-    ------
-    ParameterError
-        If there are such names.
-    """
+    """Refuse distributions by names that are no parameters."""
     unknown = sorted(set(given) - set(names))
     if unknown:
         raise ParameterError(
@@ -351,11 +305,6 @@ def numbers_of(distribution: Any) -> dict[str, Any]:
     """Return shapes, loc and scale of a frozen distribution of scipy.stats by name, however they were given.
 
     {} for an object of another kind.
-
-    Examples
-    --------
-    >>> numbers_of(stats.lognorm(0.5, scale=2.0))
-    {'s': 0.5, 'loc': 0, 'scale': 2.0}
     """
     of_scipy = getattr(distribution, "dist", None)
     if not isinstance(of_scipy, stats.rv_continuous):
@@ -372,13 +321,7 @@ def support_of(distribution: Distribution) -> tuple[float, float]:
 
 
 def in_words(distribution: Distribution) -> str:
-    """Return a distribution as text, the same however its numbers were given: its identity.
-
-    Examples
-    --------
-    >>> in_words(stats.norm(scale=0.1)), in_words(stats.lognorm(0.5, scale=2.0))
-    ('norm(0, 0.1)', 'lognorm(s=0.5, scale=2)')
-    """
+    """Return a distribution as text, the same however its numbers were given: its identity."""
     of_scipy = getattr(distribution, "dist", None)
     if isinstance(of_scipy, stats.rv_histogram):
         counts, edges = of_scipy._histogram  # type: ignore[attr-defined]

@@ -101,7 +101,7 @@ SCALES = np.array([0.003, 0.002, 0.003, 0.03])
 def test_residuals_of_a_record_of_the_model_have_unit_variance(errors):
     """Some 600 residuals: their mean square scatters by 6 %, and the best of a record away from its start as well."""
     cell = replace(CELL, **errors)
-    record = cell.measure(swept(Parabola(**TRUTH)), seed=11)
+    record = cell.measure(swept(Parabola(**TRUTH)), rng=11)
     model = Experiment(record, rig=Rig(load_cell=cell, unknown="nothing")).model
     starts = np.array([[*TRUTH.values(), 1.0], [0.51, 0.495, 0.004, 1.0]])
     at, away = Linearisation(model, SCALES).fits(np.stack([model.likelihood.measured] * 2), starts)
@@ -112,14 +112,14 @@ def test_residuals_of_a_record_of_the_model_have_unit_variance(errors):
 
 def test_too_many_readings_that_share_errors_are_refused():
     cell = replace(CELL, drift=RandomWalk(moment=0.01, force=0.02))
-    record = cell.measure(swept(Parabola(**TRUTH), step=np.radians(0.07)), seed=11)
+    record = cell.measure(swept(Parabola(**TRUTH), step=np.radians(0.07)), rng=11)
     model = Experiment(record, rig=Rig(load_cell=cell, unknown="nothing")).model
     with pytest.raises(InferenceError, match="2000 are possible"):
         Linearisation(model, SCALES)
 
 
 def test_out_of_reach_there_is_no_fit():
-    record = CELL.measure(swept(Parabola(**TRUTH)), seed=11)
+    record = CELL.measure(swept(Parabola(**TRUTH)), rng=11)
     model = Experiment(record, rig=Rig(load_cell=CELL, unknown="nothing")).model
     starts = np.array([[0.5, 3.0, 0.0, 1.0]])
     assert Linearisation(model, SCALES).fits(model.likelihood.measured[None], starts) == [None]
@@ -127,7 +127,7 @@ def test_out_of_reach_there_is_no_fit():
 
 def test_differences_stay_within_the_bounds_of_parameters():
     """A posterior that is wide over a parameter's size reaches the bound, at which there is no contour."""
-    record = CELL.measure(swept(Parabola(**TRUTH)), seed=11)
+    record = CELL.measure(swept(Parabola(**TRUTH)), rng=11)
     model = Experiment(record, rig=Rig(load_cell=CELL, unknown="nothing")).model
     starts = np.array([[1e-3, TRUTH["q"], TRUTH["x_c"], 1.0]])
     (found,) = Linearisation(model, np.array([10.0, *SCALES[1:]])).fits(model.likelihood.measured[None], starts)

@@ -60,7 +60,7 @@ def test_a_sampler_that_is_too_narrow_is_caught_and_a_right_one_is_not(width, co
     points = points_of(tree, model.names)[:, predicted.draw.values].reshape(-1, len(model.names))
     loads = model.likelihood.load_cell.expected(model.loads(points))
     cell = model.likelihood.load_cell
-    readings = cell.simulate(loads, seed=5, noise_scale=model.noise_scale(points))
+    readings = cell.simulate(loads, rng=5, noise_scale=model.noise_scale(points))
     shape = predicted.holding_moment.shape
     columns = {
         name: (predicted[name].dims, readings[..., i].reshape(shape))

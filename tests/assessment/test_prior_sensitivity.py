@@ -20,7 +20,7 @@ def test_a_record_sets_the_parabola_and_its_band():
 def test_a_prior_as_narrow_as_the_record_is_named_beside_it():
     deviation = float(posterior()["posterior"]["q"].std())
     family = Family("parabola", q=stats.norm(0.5, 0.3 * deviation))
-    strong = infer_as_stated(measured(), load_cell=CELL, family=family, seed=1, settings=SOUND)
+    strong = infer_as_stated(measured(), load_cell=CELL, family=family, rng=1, settings=SOUND)
     model = experiment_of(strong).model
     found = prior_sensitivity(strong, model, REGIONS)["sensitivity"]
     assert float(found.sel(quantity="q", component="contour")) > 0.05

@@ -25,8 +25,8 @@ def test_parts_of_a_record_of_the_model_agree():
 
 @pytest.mark.slow
 def test_friction_shows_as_a_disagreement_of_early_and_late_contacts():
-    record = CELL.measure(swept(Parabola(0.5, 0.5), friction=0.007), seed=3)
-    found = found_of(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND))
+    record = CELL.measure(swept(Parabola(0.5, 0.5), friction=0.007), rng=3)
+    found = found_of(infer_as_stated(record, load_cell=CELL, rng=1, settings=SOUND))
     assert found.attrs["passed"] == 0
     assert float(found["sd"].sel(part="earlier half")) > 5.0
 
@@ -36,15 +36,15 @@ def test_a_zero_that_moves_between_sweeps_shows_though_zeros_are_not_inferred():
     record = measured().copy(deep=True)
     course = np.linspace(-1.0, 1.0, record.sizes["sample"])
     record["force_x"] = record.force_x + xr.DataArray(0.05 * course, dims="sample")
-    assert found_of(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND)).attrs["passed"] == 0
+    assert found_of(infer_as_stated(record, load_cell=CELL, rng=1, settings=SOUND)).attrs["passed"] == 0
 
 
 @pytest.mark.slow
 def test_noise_that_is_known_and_larger_than_stated_shows():
     louder = type(CELL)(force_noise=1.25 * CELL.force_noise, moment_noise=1.25 * CELL.moment_noise)
-    record = louder.measure(swept(Parabola(0.5, 0.5)), seed=4)
+    record = louder.measure(swept(Parabola(0.5, 0.5)), rng=4)
     rig = Rig(load_cell=CELL, unknown={**NOTHING, "noise_scale": 1.0})
-    found = found_of(infer_contour(record, rig=rig, seed=1, settings=SOUND))
+    found = found_of(infer_contour(record, rig=rig, rng=1, settings=SOUND))
     assert found.attrs["passed"] == 0
     assert float(found["sd"].sel(part="noise")) > 4.0
 

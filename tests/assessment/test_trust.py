@@ -14,7 +14,7 @@ from tactile_bayes.inference.result import write_result
 
 @cache
 def right():
-    return trust(posterior(), replicates=0, assumptions=False)
+    return trust(posterior(), rng=1, replicates=0, assumptions=False)
 
 
 def test_a_record_of_the_model_holds_and_says_so():
@@ -32,8 +32,8 @@ def test_a_record_of_the_model_holds_and_says_so():
 
 @pytest.mark.slow
 def test_a_wrong_family_is_not_to_be_relied_on():
-    record = CELL.measure(swept(tb.contours.paper_profile("III", q=0.5)), seed=2)
-    found = trust(infer_as_stated(record, load_cell=CELL, seed=1, settings=SOUND), replicates=0, assumptions=False)
+    record = CELL.measure(swept(tb.contours.paper_profile("III", q=0.5)), rng=2)
+    found = trust(infer_as_stated(record, load_cell=CELL, rng=1, settings=SOUND), replicates=0, assumptions=False)
     assert found.attrs["conclusion"] == "do not rely on it"
     assert found.attrs["summary"].startswith("Do not rely on the band, because ")
     assert "the parts of the record contradict one another" in found.attrs["summary"]
@@ -43,8 +43,8 @@ def test_a_wrong_family_is_not_to_be_relied_on():
 def test_a_narrow_prior_of_the_vertex_sets_the_gap():
     deviation = float(posterior()["posterior"]["q"].std())
     family = tb.Family("parabola", q=stats.norm(0.5, 0.2 * deviation))
-    tree = infer_as_stated(measured(), load_cell=CELL, family=family, seed=1, settings=SOUND)
-    found = trust(tree, replicates=0, assumptions=False)
+    tree = infer_as_stated(measured(), load_cell=CELL, family=family, rng=1, settings=SOUND)
+    found = trust(tree, rng=1, replicates=0, assumptions=False)
     assert found.attrs["conclusion"] == "holds, but the prior sets the gap"
     assert "The band in the gap is set by the prior, that of the contour." in found.attrs["words"]
     *_, said, _ = tb.verdicts(tree, trust=found)  # the last one names q, of which the record adds little
@@ -53,7 +53,7 @@ def test_a_narrow_prior_of_the_vertex_sets_the_gap():
 
 @pytest.mark.slow
 def test_replicates_give_ranks_coverage_and_factors():
-    found = trust(posterior(), replicates=2, assumptions=False, workers=1)
+    found = trust(posterior(), rng=1, replicates=2, assumptions=False, workers=1)
     assert found.attrs["calibration"] == "too few"
     assert {"rank_p_value", "coverage", "factor", "corrected"} <= set(found.data_vars)
     assert "corrected_lower" not in found
@@ -89,20 +89,20 @@ def test_a_band_is_corrected_about_its_median_where_it_is_too_narrow():
 @pytest.mark.slow
 def test_a_run_and_its_file_are_taken_and_other_things_refused(tmp_path):
     write_result(posterior(), tmp_path / "posterior.nc")
-    assert trust(tmp_path, replicates=0, assumptions=False).equals(right())
+    assert trust(tmp_path, rng=1, replicates=0, assumptions=False).equals(right())
     with pytest.raises(InferenceError, match="there is no file"):
-        trust(str(tmp_path / "nothing"))
+        trust(str(tmp_path / "nothing"), rng=1)
     with pytest.raises(ParameterError, match="run_or_posterior is 3"):
-        trust(3)
+        trust(3, rng=1)
     with pytest.raises(ParameterError, match="replicates"):
-        trust(posterior(), replicates=-1)
+        trust(posterior(), rng=1, replicates=-1)
 
 
 def test_a_posterior_of_contacts_alone_is_refused():
     tree = posterior().copy()
     tree.attrs = {**tree.attrs, "events": 0}
     with pytest.raises(InferenceError, match="events=False"):
-        trust(tree)
+        trust(tree, rng=1)
 
 
 @pytest.mark.slow
@@ -110,10 +110,10 @@ def test_a_distribution_that_is_none_of_scipys_has_to_be_given_again():
     """A histogram of q: the posterior states that it was one, and not its numbers."""
     heights = stats.rv_histogram(np.histogram(np.linspace(0.3, 0.7, 50), bins=5), density=True)()
     family = tb.Family("parabola", q=heights)
-    tree = infer_as_stated(measured(), load_cell=CELL, family=family, seed=1, settings=SOUND)
+    tree = infer_as_stated(measured(), load_cell=CELL, family=family, rng=1, settings=SOUND)
     with pytest.raises(ParameterError, match="does not state its family"):
-        trust(tree, replicates=0, assumptions=False)
-    assert trust(tree, family=family, replicates=0, assumptions=False).attrs["conclusion"] == "holds"
+        trust(tree, rng=1, replicates=0, assumptions=False)
+    assert trust(tree, rng=1, family=family, replicates=0, assumptions=False).attrs["conclusion"] == "holds"
 
 
 def test_too_few_loaded_samples_are_refused_with_the_reason():
@@ -121,4 +121,4 @@ def test_too_few_loaded_samples_are_refused_with_the_reason():
     events = tree["events"].to_dataset()
     tree["events"] = xr.DataTree(events.assign(snap_off_drive_angle=events["first_drive_angle"]))
     with pytest.raises(InferenceError, match="too few to judge"):
-        trust(tree, replicates=0, assumptions=False)
+        trust(tree, rng=1, replicates=0, assumptions=False)

@@ -26,6 +26,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings, moves
 from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import child
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.sweep import Rotation
 from tactile_bayes.tasks import Workers
@@ -47,14 +48,14 @@ BY_DEFAULT = SamplerSettings(ensembles=2, walkers=20, block_steps=25, max_r_hat=
 
 
 def quickly(**options):
-    asked = {"family": FAMILY, "rig": AS_STATED, "replicates": 2, "drive": DRIVE, "seed": 1, "workers": 1}
+    asked = {"family": FAMILY, "rig": AS_STATED, "replicates": 2, "drive": DRIVE, "rng": 1, "workers": 1}
     return calibrate(**(asked | options))
 
 
 def made_up(task):
     """In place of a replicate: numbers that follow from seed and number alone."""
     experiment, number = task
-    rng = np.random.default_rng([experiment.seed, number])
+    rng = np.random.default_rng(child(experiment.seed, number))
     numbers = {"seconds": 0.0, "snap_off": 0.5 * int(rng.integers(3)), "width_in_gap": np.nan}
     return Outcome({"a": int(rng.integers(100)), "q": int(rng.integers(100))}, numbers, "converged")
 
@@ -114,7 +115,7 @@ def test_workers_change_nothing_but_the_seconds(small):
 def test_replicates_do_not_depend_on_how_many_there_are(noted):
     three, five = quickly(replicates=3), quickly(replicates=5)
     np.testing.assert_array_equal(three["ranks"], five["ranks"][:3])
-    assert not np.array_equal(three["ranks"], quickly(replicates=3, seed=2)["ranks"])
+    assert not np.array_equal(three["ranks"], quickly(replicates=3, rng=2)["ranks"])
 
 
 # ---- what is lost
@@ -209,7 +210,7 @@ def test_an_interrupt_in_the_sampler_loses_the_replicate_and_not_half_of_it(tmp_
 
 
 def again(number, **options):
-    asked = {"family": FAMILY, "rig": AS_STATED, "drive": DRIVE, "settings": FEW_STEPS, "seed": 1}
+    asked = {"family": FAMILY, "rig": AS_STATED, "drive": DRIVE, "settings": FEW_STEPS, "rng": 1}
     return calibration_replicate(number, **(asked | options))
 
 
@@ -257,7 +258,7 @@ def test_what_has_not_converged_is_run_again_with_more_walkers(monkeypatch):
         return sampled(problem, settings=FEW_STEPS, **options)
 
     monkeypatch.setattr("tactile_bayes.calibration.replicate.sampled", spied)
-    asked = {"family": FAMILY, "rig": AS_STATED, "drive": DRIVE, "seed": 1}
+    asked = {"family": FAMILY, "rig": AS_STATED, "drive": DRIVE, "rng": 1}
     assert not calibration_replicate(0, **asked).outcome.numbers["converged"]
     first, second = runs
     assert first == BY_DEFAULT
@@ -269,7 +270,7 @@ def test_what_has_not_converged_is_run_again_with_more_walkers(monkeypatch):
 
 def test_a_replicate_of_another_calibration_is_refused(small, tmp_path):
     with refused(CalibrationError, seed=1):
-        again(0, out=small[1], seed=2)
+        again(0, out=small[1], rng=2)
     for number in (-1, True, 0.0, "1"):
         with refused(ParameterError, repr(number)):
             again(number)
@@ -374,7 +375,7 @@ def test_a_killed_run_goes_on(tmp_path, wait):
 @pytest.mark.parametrize(
     ("other", "differs"),
     [
-        ({"seed": 2}, ("seed", 1, 2)),
+        ({"rng": 2}, ("seed", 1, 2)),
         ({"rig": AS_STATED.with_unknown(friction=0.1)}, ("unknown", 0.1)),
         ({"rig": AS_STATED.with_unknown(bias="default")}, ("unknown", "default")),
         ({"rig": replace(AS_STATED, load_cell=LoadCell(force_noise=0.1, moment_noise=0.02))}, ("load_cell", 0.05, 0.1)),
@@ -402,7 +403,7 @@ def test_another_calibration_is_left_alone(noted, tmp_path, other, differs):
 @pytest.mark.parametrize(
     "same",
     [
-        {"seed": np.int64(1)},
+        {"rng": np.int64(1)},
         {"drive": [Rotation(drive_angles=ANGLES[::-1])]},
         {"truth": Misspecification(base_shift=[0.0, 0.0])},
         {"rig": Rig(unknown=NOTHING)},
@@ -418,7 +419,7 @@ def test_the_same_in_other_words_is_the_same(noted, tmp_path, same):
 
 def test_what_an_experiment_is_follows_from_its_words():
     """Defaults and the same written out."""
-    words = experiment_of(rig=AS_STATED, seed=1).identity
+    words = experiment_of(rig=AS_STATED, rng=1).identity
     written_out = {
         "family": Family("parabola"),
         "rig": Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02), unknown="nothing"),
@@ -428,7 +429,7 @@ def test_what_an_experiment_is_follows_from_its_words():
         ),
         "truth": Misspecification(),
     }
-    assert experiment_of(seed=1, **written_out).identity == words
+    assert experiment_of(rng=1, **written_out).identity == words
     assert all(isinstance(said, str) for said in words.values())
 
 
@@ -439,7 +440,7 @@ def test_what_an_experiment_is_follows_from_its_words():
     "wrong",
     [
         {"replicates": 0},
-        {"seed": -1},
+        {"rng": -1},
         {"workers": 0},
         {"drive": "all"},
         {"drive": []},

@@ -11,12 +11,12 @@ from tactile_bayes.calibration.calibrate import experiment_of
 
 FAMILY = tb.Family("circle", r=stats.uniform(0.25, 0.1), q=stats.uniform(0.75, 0.1), x_c=stats.norm(0.0, 0.02))
 DRIVE = [tb.Translation((0.8, 0.0), np.pi, 1.1, 1.6), tb.Motion([-0.8, 0.8], 0.0, [2.2, 1.6])]
-OPTIONS = {"family": FAMILY, "rig": tb.Rig(unknown="nothing"), "seed": 1, "drive": DRIVE}
+OPTIONS = {"family": FAMILY, "rig": tb.Rig(unknown="nothing"), "rng": 1, "drive": DRIVE}
 
 
 @pytest.mark.slow
 def test_a_replicate_is_scored_by_the_travel_of_its_end():
-    replicate = tb.calibration_replicate(0, **OPTIONS)
+    replicate = tb.calibration.calibration_replicate(0, **OPTIONS)
     assert replicate.outcome.message.startswith("converged")
     assert {"snap_off_forward", "snap_off_backward"} <= replicate.outcome.ranks.keys()
     measured = replicate.measured
@@ -38,5 +38,5 @@ def test_intervals_hold_at_the_default_priors(family):
         tb.Translation((0.9, 0.0), np.pi, 1.0, 1.8),
         tb.Translation((-0.9, 0.0), 0.0, np.pi - 1.0, 1.8),
     ]
-    found = tb.calibrate(family, seed=3, replicates=60, drive=drive, workers=2)
+    found = tb.calibrate(family, rng=3, replicates=60, drive=drive, workers=2)
     assert found.attrs["conclusion"] == "calibrated", found.attrs["verdict"]

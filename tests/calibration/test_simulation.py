@@ -33,7 +33,7 @@ SI = Rod(length=0.1, flexural_rigidity=1e-5)
 
 
 def experiment(family=FAMILY, *, unknown="nothing", load_cell=QUIET, rod=None, drive=DRIVE, truth=None):
-    return experiment_of(family, Rig(rod=rod, load_cell=load_cell, unknown=unknown), seed=1, drive=drive, truth=truth)
+    return experiment_of(family, Rig(rod=rod, load_cell=load_cell, unknown=unknown), rng=1, drive=drive, truth=truth)
 
 
 def simulated(seed=0, **options):

@@ -13,7 +13,7 @@ from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
 from tactile_bayes.calibration.summary import CLAIMS, FALSE_ALARM, summary
 from tactile_bayes.rig import Rig
 
-EXPERIMENT = experiment_of(rig=Rig(unknown="nothing"), seed=1)
+EXPERIMENT = experiment_of(rig=Rig(unknown="nothing"), rng=1)
 
 NAMES = ("a", "q", "x_c", "rigidity_scale", "noise_scale", LOG_LIKELIHOOD, "snap_off_backward", "snap_off_forward")
 

@@ -55,7 +55,7 @@ def bare(record):
 @pytest.fixture(scope="session")
 def posterior(record):
     """What that record is taken for, after few steps."""
-    return infer_contour(read_record(record), rig=Rig(unknown="nothing"), seed=1, settings=FEW)
+    return infer_contour(read_record(record), rig=Rig(unknown="nothing"), rng=1, settings=FEW)
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ def records(tmp_path_factory):
     for seed, (name, ideal) in enumerate(sources.items(), start=1):
         for channel in ("holding_moment", "force_x", "force_y"):
             ideal[channel] = 1.04 * ideal[channel]
-        write_record(CELL.measure(ideal, seed=seed), folder / f"{name}.nc")
+        write_record(CELL.measure(ideal, rng=seed), folder / f"{name}.nc")
     (folder / "rig.toml").write_text(ONE, encoding="utf-8")
     return folder
 

@@ -27,7 +27,7 @@ READING = [
 
 def record_of_rig():
     cell = tb.LoadCell(force_noise=LOAD_CELL.force_noise, moment_noise=LOAD_CELL.moment_noise, bias=(1e-4, 4e-3, -2e-3))
-    return cell.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=math.radians(2.0)).record, seed=1)
+    return cell.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=math.radians(2.0)).record, rng=1)
 
 
 @pytest.fixture(scope="module")
@@ -270,7 +270,7 @@ def test_a_data_sheet_tells_whether_noise_explains_the_misfit(measured, tmp_path
 
 
 def test_friction_that_is_not_stated_comes_first(tmp_path, rig_file):
-    measured = LOAD_CELL.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD, unknown={"friction": 0.3})).record, seed=1)
+    measured = LOAD_CELL.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD, unknown={"friction": 0.3})).record, rng=1)
     write_record(measured, tmp_path / "r.csv")
     lines = call("reconstruct", tmp_path / "r.csv", "--out", tmp_path).stdout.splitlines()
     assert lines[0].startswith("The loads of single samples contradict one another, misfit ")

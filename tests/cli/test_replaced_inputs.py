@@ -149,5 +149,5 @@ def test_functions_that_know_both_refuse_as_well(tmp_path, measured):
     with refused(ParameterError, "would replace"):
         Watch(run, record_file=run / "contacts.csv")
     with refused(ParameterError, "would replace"):
-        analyse(measured, run, record_file=run / "contacts.csv")
+        analyse(measured, run, record_file=run / "contacts.csv", rng=1)
     assert contents(tmp_path) == before

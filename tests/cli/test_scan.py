@@ -151,7 +151,7 @@ def test_a_load_cell_measures_an_ideal_record(ideal, tmp_path, rig_file):
     result = call("measure", ideal[0], *noise, "--seed", 3, "--out", tmp_path / "m.csv")
     assert result.exit_code == 0, result.output
     assert "without columns of the truth" in result.stdout
-    expected = cell.measure(tb.read_record(ideal[0]), seed=3)
+    expected = cell.measure(tb.read_record(ideal[0]), rng=3)
     found = tb.read_record(tmp_path / "m.csv")
     assert tb.LoadCell.from_record(found) == cell
     assert not [name for name in found.data_vars if name.startswith("truth_")]
@@ -169,7 +169,7 @@ def test_known_errors_of_a_rig_are_those_of_its_load_cell(ideal, tmp_path, rig_f
 
 def test_a_record_that_states_no_load_cell_is_taken_to_be_ideal(ideal, tmp_path):
     """As the help says: what is not in the header cannot be known."""
-    noisy = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(tb.read_record(ideal[0]), seed=1)
+    noisy = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(tb.read_record(ideal[0]), rng=1)
     noisy.attrs = {name: value for name, value in noisy.attrs.items() if not name.startswith("load_cell_")}
     tb.write_record(noisy, tmp_path / "noisy.csv")
     told("measure", tmp_path / "noisy.csv", "--force-noise", 0.1, "--moment-noise", 0.1, "--out", tmp_path / "m.csv")
@@ -208,7 +208,7 @@ gain_force_x_force_y = 0.02
         relative_noise=0.01,
         degrees_of_freedom=5.0,
         bias_uncertainty=(0.1, 0.2, 0.3),
-        drift=tb.OrnsteinUhlenbeck(moment=0.01, force=0.02, time=30.0),
+        drift=tb.load_cell.OrnsteinUhlenbeck(moment=0.01, force=0.02, time=30.0),
         force_range=9.0,
         moment_range=2.0,
         force_resolution=0.01,

@@ -45,7 +45,7 @@ def done(tmp_path_factory, coarse_pictures):
 
 @pytest.fixture(scope="module")
 def analysed():
-    return tb.sensitivity(seed=1, drive=tb.Rotation(drive_step=float(np.radians(6.0))), samples=8)
+    return tb.sensitivity(rng=1, drive=tb.Rotation(drive_step=float(np.radians(6.0))), samples=8)
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +147,7 @@ def test_without_options_it_is_profile_ii_at_half_a_rod_length(asked, tmp_path):
     options = asked["sensitivity"]
     assert options["contour"] == Parabola(0.5, 0.5)
     assert (options["rig"].rod, options["rig"].load_cell, options["rig"].entries) == (None, None, {})
-    assert options["seed"] == 1
+    assert options["rng"] == 1
     assert options["base"] == [(0.0, 0.0)]
     assert options["drive_step"] == pytest.approx(np.radians(1.0))
     assert options["band_widths"] is None
@@ -176,7 +176,7 @@ def test_rig_and_options_arrive(asked, tmp_path, rig_file):
     assert options["rig"].load_cell == cell
     assert options["rig"].entries == {"friction": 0.2, "discrepancy": "default"}
     assert options["base"] == [(0.1, 0.0), (0.2, 0.0)]
-    assert options["seed"] == 3
+    assert options["rng"] == 3
     assert options["band_widths"] == [0.01, 0.02]
 
 

@@ -166,7 +166,7 @@ def test_the_same_command_goes_on_with_the_same_numbers(path, lines, follow):
     assert (resumed["samples"], resumed["new"]) == (30, 0)
     assert resumed["quantities"] == objects(first)[0]["quantities"]
     measured = read_record(path)
-    stream = Stream(rig=Rig(unknown="nothing"), seed=1, particles=120)
+    stream = Stream(rig=Rig(unknown="nothing"), rng=1, particles=120)
     stream.update(measured.isel(sample=slice(0, 30)))
     stream.update(measured.isel(sample=slice(30, None)))
     expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
@@ -196,7 +196,7 @@ def test_of_a_long_record_every_other_sample_is_taken(path, lines, follow):
     assert (thinned["samples"], thinned["new"], thinned["every"]) == (half, half, 2)
     assert not thinned["restarted"]
     assert any("one sample of 2" in words for words in thinned["warnings"])
-    stream = Stream(rig=Rig(unknown="nothing"), seed=1, particles=120)
+    stream = Stream(rig=Rig(unknown="nothing"), rng=1, particles=120)
     stream.update(read_record(path).isel(sample=slice(None, None, 2)))
     expected = [float(np.median(values)) for values in stream.posterior()["posterior"].data_vars.values()]
     assert [row["median"] for row in thinned["quantities"]] == pytest.approx(expected, rel=1e-12)
@@ -215,7 +215,7 @@ def test_samples_of_a_load_cell_that_drifts_are_all_taken(record, tmp_path):
     """The steps of its drift are those from one sample to the next; of another cell every other sample is taken."""
     measured = read_record(record)
     steady = LoadCell.from_record(measured)
-    size, options = measured.sizes["sample"], {"record_file": record, "seed": 1, "particles": 100}
+    size, options = measured.sizes["sample"], {"record_file": record, "rng": 1, "particles": 100}
     for cell, every in ((steady, 2), (replace(steady, drift=RandomWalk(force=1e-4)), 1)):
         rig = Rig(load_cell=cell, unknown="nothing")
         with open_watch(tmp_path / f"run {every}", most_samples=100, rig=rig, **options) as watched:
@@ -269,7 +269,7 @@ def test_a_wrong_model_is_told_once(path, follow, tmp_path):
     """Friction that is not inferred."""
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     record = cell.measure(
-        scan(paper_profile("II", q=0.5), drive_step=0.05, rig=Rig(unknown={"friction": 0.2})).record, seed=1
+        scan(paper_profile("II", q=0.5), drive_step=0.05, rig=Rig(unknown={"friction": 0.2})).record, rng=1
     )
     write_record(record.isel(sample=slice(0, 60)), tmp_path / "whole.csv")
     text = (tmp_path / "whole.csv").read_text(encoding="utf-8").splitlines(keepends=True)

@@ -20,12 +20,12 @@ BRIEF = SamplerSettings(ensembles=2, walkers=20, min_ess=100, max_r_hat=1.1, max
 
 @pytest.fixture(scope="module")
 def circle():
-    return CELL.measure(swept(Circle(0.8, 0.5, 0.0), step=0.1, direction="forward"), seed=1)
+    return CELL.measure(swept(Circle(0.8, 0.5, 0.0), step=0.1, direction="forward"), rng=1)
 
 
 @pytest.fixture(scope="module")
 def compared(circle):
-    return compare_families(circle, families=["circle", "ellipse"], rig=RIG, seed=1, settings=BRIEF)
+    return compare_families(circle, families=["circle", "ellipse"], rig=RIG, rng=1, settings=BRIEF)
 
 
 @pytest.mark.slow
@@ -61,12 +61,12 @@ def test_wider_priors_are_worse_for_more_parameters(compared):
 @pytest.mark.slow
 def test_a_shape_that_is_far_off_is_given_up():
     """And the only one that is left fits as badly: none does."""
-    measured = CELL.measure(swept(paper_profile("IV", q=0.5), step=0.1), seed=1)
+    measured = CELL.measure(swept(paper_profile("IV", q=0.5), step=0.1), rng=1)
     found = compare_families(
         measured,
         families=["circle", "ellipse"],
         rig=RIG,
-        seed=1,
+        rng=1,
         leave_one_out=False,
         settings=SamplerSettings(ensembles=2, max_steps=150),
     )
@@ -80,8 +80,8 @@ def test_a_shape_that_is_far_off_is_given_up():
     ("truth", "right"), [(Ellipse(0.9, 0.5, 0.5, 0.02), "ellipse"), (paper_profile("II", q=0.5), "parabola")]
 )
 def test_the_right_one_of_all(truth, right):
-    measured = CELL.measure(swept(truth, step=np.radians(1.0)), seed=1)
-    found = compare_families(measured, rig=Rig(load_cell=CELL), seed=1)
+    measured = CELL.measure(swept(truth, step=np.radians(1.0)), rng=1)
+    found = compare_families(measured, rig=Rig(load_cell=CELL), rng=1)
     assert found.attrs["most_probable"] == right
     assert float(found.probability.sel(family=right)) > 0.5
     assert bool(found.fits.sel(family=right))
@@ -92,12 +92,12 @@ def test_the_right_one_of_all(truth, right):
 
 @pytest.mark.slow
 def test_what_is_none_of_the_shapes_comes_out_as_such():
-    measured = CELL.measure(swept(paper_profile("IV", q=0.5), step=np.radians(1.0)), seed=1)
+    measured = CELL.measure(swept(paper_profile("IV", q=0.5), step=np.radians(1.0)), rng=1)
     found = compare_families(
         measured,
         families=["parabola", "circle", "ellipse", "power-law"],
         rig=Rig(load_cell=CELL),
-        seed=1,
+        rng=1,
         leave_one_out=False,
     )
     assert found.attrs["none_fits"]
@@ -109,7 +109,7 @@ def test_a_run_is_made_again_from_its_seed(circle, compared):
         circle,
         families=["ellipse", "circle"],
         rig=RIG,
-        seed=1,
+        rng=1,
         leave_one_out=False,
         settings=BRIEF,
     )
@@ -126,7 +126,7 @@ def test_an_interrupt_ends_the_comparison(circle):
             circle,
             families=["circle", "ellipse"],
             rig=RIG,
-            seed=1,
+            rng=1,
             settings=SamplerSettings(ensembles=2, min_ess=1e9),
             progress=interrupt,
         )
@@ -145,13 +145,13 @@ def test_an_interrupt_ends_the_comparison(circle):
 )
 def test_what_cannot_be_compared_is_refused(circle, families, named):
     with refused(ParameterError, *named):
-        compare_families(circle, families, RIG, seed=1)
+        compare_families(circle, families, RIG, rng=1)
 
 
 def test_families_of_which_something_is_said(circle):
     """What is said replaces matched priors; what is known is a constant among the draws, in the family's order."""
     families = [Family("circle", q=0.5), Family("ellipse", a=stats.norm(0.8, 0.01), b=0.8)]
-    found = compare_families(circle, families, RIG, seed=1, settings=BRIEF, leave_one_out=False)
+    found = compare_families(circle, families, RIG, rng=1, settings=BRIEF, leave_one_out=False)
     assert found.family.values.tolist() == ["circle", "ellipse"]
     draws = found.contour_draws.values
     assert draws.shape[2] == 4

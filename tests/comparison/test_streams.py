@@ -13,7 +13,7 @@ from tactile_bayes.inference.parameters.matched_priors import matched_priors
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 RIG = tb.Rig(load_cell=CELL, unknown="nothing")
-OPTIONS = {"rig": RIG, "seed": 1, "particles": 200}
+OPTIONS = {"rig": RIG, "rng": 1, "particles": 200}
 FAMILIES = ["circle", "ellipse", "parabola"]
 X = [-0.1, 0.0, 0.1]
 
@@ -21,7 +21,7 @@ X = [-0.1, 0.0, 0.1]
 @pytest.fixture(scope="module")
 def measured():
     scan = tb.scan(tb.contours.Circle(0.4, q=0.5), drive_step=0.08)
-    return CELL.measure(scan.record, seed=3)
+    return CELL.measure(scan.record, rng=3)
 
 
 def fed(streams, measured, blocks):
@@ -31,7 +31,9 @@ def fed(streams, measured, blocks):
 
 @pytest.fixture(scope="module")
 def compared(measured):
-    streams = tb.StreamComparison(families=FAMILIES, x=X, stop=lambda now: now.probability.max() > 0.9, **OPTIONS)
+    streams = tb.comparison.StreamComparison(
+        families=FAMILIES, x=X, stop=lambda now: now.probability.max() > 0.9, **OPTIONS
+    )
     return streams, fed(streams, measured, 3)
 
 
@@ -51,9 +53,9 @@ def test_each_family_is_a_stream_of_its_own(compared, measured):
 @pytest.mark.slow
 def test_the_last_evidences_agree_with_those_of_the_whole_record(measured):
     quick = tb.SamplerSettings(ensembles=2, min_ess=400, max_r_hat=1.05)
-    options = {"rig": RIG, "seed": 1, "leave_one_out": False, "settings": quick}
+    options = {"rig": RIG, "rng": 1, "leave_one_out": False, "settings": quick}
     whole = tb.compare_families(measured, families=FAMILIES[:2], **options)
-    streams = tb.StreamComparison(families=FAMILIES[:2], **(OPTIONS | {"particles": 1000}))
+    streams = tb.comparison.StreamComparison(families=FAMILIES[:2], **(OPTIONS | {"particles": 1000}))
     now = fed(streams, measured, 3)[-1]
     np.testing.assert_allclose(now.log_evidence, whole.log_evidence, atol=1.5)
     assert now.attrs["most_probable"] == whole.attrs["most_probable"] == "circle"
@@ -77,7 +79,7 @@ def test_a_condition_ends_it_near_the_truth(compared):
 
 
 def test_heights_are_averaged_over_families_and_a_refusal_leaves_all_streams_as_they_were(measured):
-    streams = tb.StreamComparison(families=FAMILIES[:2], x=X, **(OPTIONS | {"particles": 100}))
+    streams = tb.comparison.StreamComparison(families=FAMILIES[:2], x=X, **(OPTIONS | {"particles": 100}))
     now = streams.update(measured.isel(sample=slice(0, 20)))
     band = tb.contour_band(now, X)
     np.testing.assert_allclose(now.height.sel(level=0.025), band["lower"], rtol=1e-12)
@@ -91,19 +93,19 @@ def test_heights_are_averaged_over_families_and_a_refusal_leaves_all_streams_as_
 def test_resumed_streams_go_on_with_the_same_numbers(measured, tmp_path):
     first, block = measured.isel(sample=slice(0, 10)), measured.isel(sample=slice(10, 14))
     options = OPTIONS | {"particles": 100}
-    streams = tb.StreamComparison(families=FAMILIES[:2], **options)
+    streams = tb.comparison.StreamComparison(families=FAMILIES[:2], **options)
     for early in (lambda: streams.save(tmp_path / "streams.nc"), streams.latest, lambda: streams.posterior("circle")):
         with pytest.raises(InferenceError):
             early()
     streams.update(first)
     streams.save(tmp_path / "streams.nc")
-    resumed = tb.StreamComparison.resume(tmp_path / "streams.nc", measured, families=FAMILIES[:2], **options)
+    resumed = tb.comparison.StreamComparison.resume(tmp_path / "streams.nc", measured, families=FAMILIES[:2], **options)
     xr.testing.assert_identical(resumed.latest(), streams.latest())
     one, other = (each.update(block) for each in (streams, resumed))
     xr.testing.assert_identical(one.drop_vars("seconds"), other.drop_vars("seconds"))
-    for changed in ({"families": FAMILIES[1:]}, {"families": FAMILIES[:2], "seed": 2}):
+    for changed in ({"families": FAMILIES[1:]}, {"families": FAMILIES[:2], "rng": 2}):
         with pytest.raises(InferenceError):
-            tb.StreamComparison.resume(tmp_path / "streams.nc", **(options | changed))
+            tb.comparison.StreamComparison.resume(tmp_path / "streams.nc", **(options | changed))
     with pytest.raises(InferenceError, match=r"streams\.nc"):
         tb.Stream.resume(tmp_path / "streams.nc", **options)
 
@@ -111,7 +113,7 @@ def test_resumed_streams_go_on_with_the_same_numbers(measured, tmp_path):
 def test_families_of_which_something_is_said(measured):
     """What is known is a constant among the draws."""
     families = [tb.Family("circle", q=0.5), tb.Family("ellipse", b=0.4)]
-    streams = tb.StreamComparison(families, x=X, **(OPTIONS | {"particles": 100}))
+    streams = tb.comparison.StreamComparison(families, x=X, **(OPTIONS | {"particles": 100}))
     draws = streams.update(measured).contour_draws.values
     np.testing.assert_array_equal(draws[0, :, 1], 0.5)  # r, q, x_c
     np.testing.assert_array_equal(draws[1, :, 1], 0.4)  # a, b, q, x_c
@@ -130,4 +132,4 @@ def test_families_of_which_something_is_said(measured):
 )
 def test_impossible_arguments_are_refused(arguments):
     with pytest.raises(ParameterError):
-        tb.StreamComparison(**(OPTIONS | arguments))
+        tb.comparison.StreamComparison(**(OPTIONS | arguments))

@@ -231,7 +231,7 @@ def test_readings_are_those_of_the_load_cell_that_the_record_states(cell, frame)
         rng = np.random.default_rng(np.random.SeedSequence(spec["seed"], spawn_key=(i, 1)))
         truth = np.stack([one[f"truth_{name}"].values for name in CHANNELS], axis=-1)
         readings = np.stack([one[name].values for name in CHANNELS], axis=-1)
-        np.testing.assert_array_equal(readings, stated.simulate(truth, seed=rng))
+        np.testing.assert_array_equal(readings, stated.simulate(truth, rng=rng))
         if "drive_angle_noise" in cell:
             wrong = one.drive_angle.values - one.truth_drive_angle.values - stated.misread(one.direction.values)
             expected = stated.drive_angle_noise * rng.standard_normal(wrong.reshape(2, -1).shape).ravel()

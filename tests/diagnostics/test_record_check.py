@@ -28,7 +28,7 @@ CELLS = {
 
 def readings(cell, seed):
     loads = np.stack([ideal(name) for name in CHANNELS], axis=-1)
-    return dict(zip(CHANNELS, np.moveaxis(cell.simulate(loads, seed=seed), -1, 0), strict=True))
+    return dict(zip(CHANNELS, np.moveaxis(cell.simulate(loads, rng=seed), -1, 0), strict=True))
 
 
 def mean_residual(tree, name):
@@ -138,8 +138,8 @@ def test_records_of_the_right_family_pass(name):
     contour = paper_profile("II", q=0.5)
     p_values = []
     for seed in range(12):
-        measured = CELLS[name].measure(scan(contour, drive_step=np.radians(2.0)).record, seed=seed)
-        result = infer_contour(measured, rig=Rig(load_cell=CELLS[name], unknown="nothing"), seed=seed, settings=SHORT)
+        measured = CELLS[name].measure(scan(contour, drive_step=np.radians(2.0)).record, rng=seed)
+        result = infer_contour(measured, rig=Rig(load_cell=CELLS[name], unknown="nothing"), rng=seed, settings=SHORT)
         p_values.append(float(check_record(result).overall_p_value))
     assert min(p_values) > 5e-3
 
@@ -149,6 +149,6 @@ def test_records_of_the_right_family_pass(name):
 def test_profile_iv_is_no_parabola(noise):
     for seed in range(4):
         cell = LoadCell(force_noise=noise, moment_noise=0.4 * noise)
-        measured = cell.measure(scan(paper_profile("IV", q=0.5), drive_step=np.radians(2.0)).record, seed=seed)
-        result = infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), seed=seed, settings=SHORT)
+        measured = cell.measure(scan(paper_profile("IV", q=0.5), drive_step=np.radians(2.0)).record, rng=seed)
+        result = infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), rng=seed, settings=SHORT)
         assert not check_record(result).passed

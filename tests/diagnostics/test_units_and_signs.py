@@ -17,7 +17,7 @@ CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 
 @pytest.fixture(scope="module")
 def record():
-    return CELL.measure(scan(paper_profile("II", q=0.5), drive_step=STEP).record, seed=1)
+    return CELL.measure(scan(paper_profile("II", q=0.5), drive_step=STEP).record, rng=1)
 
 
 @pytest.mark.parametrize(
@@ -27,7 +27,7 @@ def record():
 def test_a_right_record_is_not_suspected(contour, direction):
     record = scan(contour, direction=direction, drive_step=STEP).record
     assert check_units_and_signs(record) == ()
-    assert check_units_and_signs(in_frame(CELL.measure(record, seed=1), "turning")) == ()
+    assert check_units_and_signs(in_frame(CELL.measure(record, rng=1), "turning")) == ()
 
 
 def test_what_is_unloaded_or_missing_is_not_suspected(measured, record):

@@ -207,7 +207,7 @@ READERS = {
     "contour_band": lambda tree: contour_band(tree, [0.0]),
     "normal_band": lambda tree: normal_band(tree, [0.0]),
     "to_arviz": to_arviz,
-    "trust": lambda tree: trust(tree, replicates=0, assumptions=False),
+    "trust": lambda tree: trust(tree, rng=1, replicates=0, assumptions=False),
 }
 
 
@@ -235,6 +235,6 @@ def test_a_sweep_that_goes_back_in_contact_is_named_where_there_is_friction(fric
     there_and_back = scan(Parabola(0.5, 0.5), drive=Motion(0.0, 0.0, [0.4, 2.2, 0.4], drive_step=0.1)).record
     back = np.arange(there_and_back.sizes["sample"]) > 18
     columns = {"sweep": ("sample", back.astype(int)), "direction": ("sample", np.where(back, "backward", "forward"))}
-    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(there_and_back.assign(columns), seed=1)
-    posterior = infer_contour(measured, rig=Rig(unknown={**NOTHING, "friction": friction}), seed=1, settings=QUICK)
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(there_and_back.assign(columns), rng=1)
+    posterior = infer_contour(measured, rig=Rig(unknown={**NOTHING, "friction": friction}), rng=1, settings=QUICK)
     assert ("Sweep 1 went back in contact" in verdicts(posterior)[-1]) is named

@@ -12,17 +12,14 @@ from matplotlib import pyplot as plt
 
 import tactile_bayes as tb
 from helpers.public_calls import AcceptedError, end_before_sampling, right_calls
+from helpers.public_names import public
 from helpers.refusals import refused
 from helpers.wrong_values import MORE, RESULTS, WRONG
 from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
-from tactile_bayes.mechanics import elastica
 from tactile_bayes.tasks import Workers
 
 ROOT = Path(__file__).parents[2]
-MODULES = {"": tb, "contours.": tb.contours, "datasets.": tb.datasets, "plotting.": tb.plotting}
-MODULES |= {"paper_figures.": tb.paper_figures, "elastica.": elastica}
-
 NOT_CALLED = {
     *(f"contours.{name}" for name in ("Contour", "Graph", "Single", "Locus")),
     *(f"datasets.{name}" for name in ("Specification", "Verification")),
@@ -56,7 +53,9 @@ SENSIBLE = {
     "probability": lambda value: value is None or a_number(1e-323, 1.0 - 1e-16)(value),
     "false_alarm": a_number(1e-323, 1.0 - 1e-16),
     "friction": lambda value: value is None or a_number(0.0, 100.0)(value) or hasattr(value, "logpdf"),
-    "seed": lambda value: (type(value) is int and value >= 0) or isinstance(value, np.random.Generator),
+    "rng": lambda value: (
+        (type(value) is int and value >= 0) or isinstance(value, (np.random.Generator, np.random.SeedSequence))
+    ),
     "workers": lambda value: value is None or isinstance(value, str | Workers) or (type(value) is int and value > 0),
     "rod": a_kind(tb.Rod),
     "load_cell": a_kind(tb.LoadCell),
@@ -118,10 +117,7 @@ def outcome(call, argument, value):
 
 
 def public_names():
-    for prefix, module in MODULES.items():
-        for name in module.__all__:
-            if callable(getattr(module, name)) and prefix + name not in NOT_CALLED:
-                yield prefix + name
+    return [label for module, name, label in public() if callable(getattr(module, name)) and label not in NOT_CALLED]
 
 
 def names_on_first_pages():

@@ -37,7 +37,7 @@ def test_interpolation_is_not_felt_at_the_truth(fuzz_seed):
             record, friction, contour = drawn_scene(rng)
         except (tb.errors.ReachError, tb.errors.ContourError):
             continue
-        measured = CELL.measure(record, seed=rng)
+        measured = CELL.measure(record, rng=rng)
         likelihoods = [RecordLikelihood(measured, CELL, friction, exact) for exact in (True, False)]
         values = [float(one.log_likelihood(contour)[0]) for one in likelihoods]
         if np.isfinite(values[0]):
@@ -52,7 +52,7 @@ def test_loads_of_thousands_do_not_change_that(q):
     record = tb.scan(
         tb.contours.Parabola(0.16, q, 0.17), rig=Rig(rod=rod, unknown={"friction": 0.29}), drive_step=np.radians(3.0)
     ).record
-    measured = CELL.measure(record, seed=1)
+    measured = CELL.measure(record, rng=1)
     contour = tb.contours.Parabola(*np.array([[0.16], [q], [0.17]]))
     exact, found = (
         float(RecordLikelihood(measured, CELL, 0.29, exact).log_likelihood(contour)[0]) for exact in (True, False)

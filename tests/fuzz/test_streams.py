@@ -100,7 +100,7 @@ def test_a_file_that_grows_is_read_as_the_whole_file_is(tmp_path, fuzz_seed):
 
 ARGUMENTS = {
     "rig": tb.Rig(load_cell=tb.LoadCell(force_noise=0.05, moment_noise=0.02), unknown="nothing"),
-    "seed": 1,
+    "rng": 1,
     "particles": 100,
 }
 
@@ -109,7 +109,7 @@ ARGUMENTS = {
 def saved(tmp_path_factory):
     path, stream = tmp_path_factory.mktemp("stream") / "stream.nc", tb.Stream(**ARGUMENTS)
     scan = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.1)
-    stream.update(ARGUMENTS["rig"].load_cell.measure(scan.record, seed=1).isel(sample=slice(0, 8)))
+    stream.update(ARGUMENTS["rig"].load_cell.measure(scan.record, rng=1).isel(sample=slice(0, 8)))
     stream.save(path)
     return path.read_bytes(), stream.latest()
 

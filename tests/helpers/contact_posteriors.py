@@ -41,12 +41,12 @@ def measured(kind: str = "plain") -> xr.Dataset:
     """
     if kind == "SI":
         return SI_CELL.measure(
-            scan(Parabola(5.0, q=0.05), rig=Rig(rod=ROD), drive_step=0.05, base=(0.01, 0.002)).record, seed=3
+            scan(Parabola(5.0, q=0.05), rig=Rig(rod=ROD), drive_step=0.05, base=(0.01, 0.002)).record, rng=3
         )
     record = scan(paper_profile("II", q=0.5), drive_step=0.05).record
     if kind == "turning":
         record = in_frame(record, "turning")
-    return (EXACT_ANGLE if kind == "exact angle" else CELL).measure(record, seed=1 if kind == "plain" else 2)
+    return (EXACT_ANGLE if kind == "exact angle" else CELL).measure(record, rng=1 if kind == "plain" else 2)
 
 
 @dataclass(frozen=True)

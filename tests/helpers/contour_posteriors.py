@@ -86,10 +86,10 @@ def assert_near(result: xr.DataTree, truth: dict[str, float], deviations: float 
 @cache
 def measured() -> xr.Dataset:
     """Profile II at q = 0.5, both sweeps in steps of 2°."""
-    return CELL.measure(swept(Parabola(**TRUTH)), seed=5)
+    return CELL.measure(swept(Parabola(**TRUTH)), rng=5)
 
 
 @cache
 def posterior() -> xr.DataTree:
     """The parabola's posterior of it."""
-    return infer_as_stated(measured(), load_cell=CELL, seed=1, settings=SOUND)
+    return infer_as_stated(measured(), load_cell=CELL, rng=1, settings=SOUND)

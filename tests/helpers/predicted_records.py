@@ -31,10 +31,10 @@ def predicted(cell: LoadCell = CELL, *, chains: int = 4, draws: int = 250, seed:
     rng = np.random.default_rng(seed)
     ideal = swept().record
     loads = np.stack([ideal[name].values for name in CHANNELS], axis=-1)
-    values = cell.simulate(np.broadcast_to(loads, (chains, draws, *loads.shape)), seed=rng)
+    values = cell.simulate(np.broadcast_to(loads, (chains, draws, *loads.shape)), rng=rng)
     dims = ("chain", "draw", "sample")
     predictive = {name: (dims, values[..., i], ideal[name].attrs) for i, name in enumerate(CHANNELS)}
-    record = cell.measure(ideal, seed=rng)
+    record = cell.measure(ideal, rng=rng)
     events = {
         f"{label}_drive_angle": [getattr(swept().events[side], kind).drive_angle for side in ("forward", "backward")]
         for label, kind in (("first", "first_contact"), ("snap_off", "snap_off"))
@@ -70,8 +70,8 @@ def predicted(cell: LoadCell = CELL, *, chains: int = 4, draws: int = 250, seed:
 @cache
 def taken_for_a_parabola(profile: str) -> xr.DataTree:
     """The parabola's posterior, of few steps, of a record of one of the paper's profiles; not to be changed."""
-    measured = CELL.measure(scan(paper_profile(profile, q=0.5), drive_step=0.1).record, seed=1)
-    return infer_contour(measured, rig=Rig(load_cell=CELL, unknown="nothing"), seed=1, settings=SHORT)
+    measured = CELL.measure(scan(paper_profile(profile, q=0.5), drive_step=0.1).record, rng=1)
+    return infer_contour(measured, rig=Rig(load_cell=CELL, unknown="nothing"), rng=1, settings=SHORT)
 
 
 def with_readings(tree: xr.DataTree, **readings: np.ndarray) -> xr.DataTree:

@@ -75,7 +75,7 @@ def ideal() -> xr.Dataset:
 
 @functools.cache
 def measured() -> xr.Dataset:
-    return CELL.measure(ideal(), seed=1)
+    return CELL.measure(ideal(), rng=1)
 
 
 @functools.cache
@@ -86,12 +86,12 @@ def scanned():
 @functools.cache
 def posterior() -> xr.DataTree:
     """A posterior of a few draws: enough for every figure and summary, not for numbers."""
-    return infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF)
+    return infer_as_stated(measured(), load_cell=CELL, rng=1, settings=BRIEF)
 
 
 @functools.cache
 def contacts_drawn() -> xr.DataTree:
-    return tb.infer_contacts(measured(), rig=Rig(load_cell=CELL), seed=1, draws=40, method="importance")
+    return tb.infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40, method="importance")
 
 
 @functools.cache
@@ -101,7 +101,7 @@ def contacts() -> xr.Dataset:
 
 @functools.cache
 def implied() -> xr.DataTree:
-    return tb.implied_contacts(posterior(), draws=10)
+    return tb.uncertainty.implied_contacts(posterior(), draws=10)
 
 
 @functools.cache
@@ -115,36 +115,38 @@ def gap() -> xr.Dataset:
 
 
 @functools.cache
-def plan() -> tb.Plan:
-    return tb.Plan(PARABOLA, rig=STATED, drive=tb.Rotation(drive_step=0.1))
+def plan() -> tb.planning.Plan:
+    return tb.planning.Plan(PARABOLA, rig=STATED, drive=tb.Rotation(drive_step=0.1))
 
 
 @functools.cache
-def plan_si() -> tb.Plan:
+def plan_si() -> tb.planning.Plan:
     contour = tb.contours.Parabola(5.0, 0.05)
-    return tb.Plan(contour, rig=Rig(rod=ROD, load_cell=SI_CELL, unknown="nothing"), drive=tb.Rotation(drive_step=0.1))
+    return tb.planning.Plan(
+        contour, rig=Rig(rod=ROD, load_cell=SI_CELL, unknown="nothing"), drive=tb.Rotation(drive_step=0.1)
+    )
 
 
 @functools.cache
 def sensitivity() -> xr.DataTree:
-    return tb.sensitivity(PARABOLA, seed=1, rig=STATED, drive=tb.Rotation(drive_step=0.1), samples=8)
+    return tb.sensitivity(PARABOLA, rng=1, rig=STATED, drive=tb.Rotation(drive_step=0.1), samples=8)
 
 
 @functools.cache
 def designed() -> xr.Dataset:
-    return tb.design(posterior(), drives=[tb.Rotation((0.0, y), drive_step=0.1) for y in (0.0, -0.1)], draws=2, seed=1)
+    return tb.design(posterior(), drives=[tb.Rotation((0.0, y), drive_step=0.1) for y in (0.0, -0.1)], draws=2, rng=1)
 
 
 @functools.cache
 def mapped() -> xr.Dataset:
     options = {"over": {"noise_factor": [0.1, 1.0]}, "replicates": 1, "drive": tb.Rotation(drive_step=0.1)}
-    return tb.error_map(["II"], rig=STATED, seed=1, workers=1, **options)
+    return tb.planning.error_map(["II"], rig=STATED, rng=1, workers=1, **options)
 
 
 @functools.cache
 def rods_required() -> xr.Dataset:
     options = {"lengths": [0.1], "diameters": [1e-3], "youngs_modulus": 1e9, "elastic_strain": 0.05}
-    return tb.required_rod(plan_si(), **options)
+    return tb.planning.required_rod(plan_si(), **options)
 
 
 @functools.cache
@@ -155,19 +157,19 @@ def inspected() -> Inspection:
 @functools.cache
 def stream() -> tb.Stream:
     """A stream before its first update."""
-    return tb.Stream(rig=STATED, seed=1, particles=100)
+    return tb.Stream(rig=STATED, rng=1, particles=100)
 
 
 @functools.cache
 def updated() -> tb.Stream:
-    made = tb.Stream(rig=STATED, seed=1, particles=100)
+    made = tb.Stream(rig=STATED, rng=1, particles=100)
     made.update(measured().isel(sample=slice(0, 10)))
     return made
 
 
 @functools.cache
-def streams() -> tb.StreamComparison:
-    made = tb.StreamComparison(families=["parabola", "circle"], rig=STATED, seed=1, particles=100)
+def streams() -> tb.comparison.StreamComparison:
+    made = tb.comparison.StreamComparison(families=["parabola", "circle"], rig=STATED, rng=1, particles=100)
     made.update(measured().isel(sample=slice(0, 10)))
     return made
 
@@ -292,15 +294,15 @@ def _load_cell_calls() -> dict[str, Call]:
         "LoadCell.from_zero_load": Call(tb.LoadCell.from_zero_load, zero),
         "LoadCell.log_density_left_out": Call(CELL.log_density_left_out, density),
         "LoadCell.log_likelihood": Call(CELL.log_likelihood, {**density, "pointwise": False}),
-        "LoadCell.measure": Call(CELL.measure, {"record": ideal(), "seed": 1}),
+        "LoadCell.measure": Call(CELL.measure, {"record": ideal(), "rng": 1}),
         "LoadCell.refuse_other_frame": Call(tb.LoadCell(frame="fixed").refuse_other_frame, {"record": measured()}),
-        "LoadCell.simulate": Call(CELL.simulate, {"loads": loads, "seed": 1, "noise_scale": 1.0, "discrepancy": None}),
+        "LoadCell.simulate": Call(CELL.simulate, {"loads": loads, "rng": 1, "noise_scale": 1.0, "discrepancy": None}),
         "LoadCell.squared_mahalanobis_distance": Call(CELL.squared_mahalanobis_distance, {"readings": loads}),
-        "OrnsteinUhlenbeck": Call(tb.OrnsteinUhlenbeck, {"moment": 0.1, "force": 0.1, "time": 100.0}),
-        "RandomWalk": Call(tb.RandomWalk, {"moment": 0.1, "force": 0.1}),
+        "OrnsteinUhlenbeck": Call(tb.load_cell.OrnsteinUhlenbeck, {"moment": 0.1, "force": 0.1, "time": 100.0}),
+        "RandomWalk": Call(tb.load_cell.RandomWalk, {"moment": 0.1, "force": 0.1}),
         "discrepancy.Course.along": Call(Course.along, {"coordinate": np.arange(4.0), "sweeps": [np.arange(4)]}),
         "discrepancy.Discrepancy": Call(Discrepancy, dict(vars(discrepancy))),
-        "zero_load": Call(tb.zero_load, zero),
+        "zero_load": Call(tb.load_cell.zero_load, zero),
     }
 
 
@@ -401,12 +403,14 @@ def _record_calls(folder: Path) -> dict[str, Call]:
         ),
         "read_record": Call(tb.read_record, {**reading, "path": file, "columns": None}),
         "write_record": Call(tb.write_record, {"record": ideal(), "path": folder / "out.csv"}),
-        "in_frame": Call(tb.in_frame, {"record": measured(), "frame": "turning"}),
+        "in_frame": Call(tb.record.in_frame, {"record": measured(), "frame": "turning"}),
         "inspect_record": Call(
             tb.inspect_record,
             {"record": measured(), "rig": STATED, "false_alarm": 1e-3, "progress": None},
         ),
-        "check_units_and_signs": Call(tb.check_units_and_signs, {"measured": measured(), "load_cell": CELL}),
+        "check_units_and_signs": Call(
+            tb.diagnostics.check_units_and_signs, {"measured": measured(), "load_cell": CELL}
+        ),
         "read_result": Call(tb.read_result, {"path": posterior_file}),
         "write_result": Call(tb.write_result, {"result": posterior(), "path": folder / "out.nc"}),
         "to_arviz": Call(tb.to_arviz, {"posterior": posterior()}),
@@ -433,7 +437,7 @@ def _data_set(folder: Path) -> Path:
 
 
 def _inference_calls(folder: Path) -> dict[str, Call]:
-    rig = {"rig": STATED, "seed": 1}
+    rig = {"rig": STATED, "rng": 1}
     sampled = {"settings": BRIEF, "progress": None}
     stored = {**rig, **sampled, "checkpoint": None, "keep": None}
     streamed = {**rig, "particles": 100, "x": [0.0, 0.1], "stop": None}
@@ -484,7 +488,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
                 "measured": measured(),
                 "rig": STATED,
                 "prior": "flat",
-                "seed": 1,
+                "rng": 1,
                 "draws": 40,
                 "method": "importance",
             },
@@ -496,7 +500,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
                 "axial": np.linspace(0.2, 0.6, 20),
                 "lateral": np.linspace(0.01, 0.05, 20),
                 "reading": np.linspace(0.1, 0.9, 20) ** 2,
-                "seed": 1,
+                "rng": 1,
                 "priors": None,
                 "full_scale": None,
             },
@@ -508,7 +512,7 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
                 "measured": measured(),
                 "families": ["parabola", "circle"],
                 "rig": STATED,
-                "seed": 1,
+                "rng": 1,
                 "false_alarm": 1e-3,
             },
         ),
@@ -520,16 +524,17 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
         "Stream.save": Call(updated().save, {"path": folder / "other.nc"}),
         "Stream.resume": Call(tb.Stream.resume, {**kept, "path": file, "record": None}),
         "StreamComparison": Call(
-            tb.StreamComparison,
+            tb.comparison.StreamComparison,
             {"families": ["parabola", "circle"], "x": [0.0, 0.1], "stop": None, **kept},
         ),
         "StreamComparison.update": Call(
-            tb.StreamComparison(families=["parabola", "circle"], **kept).update, {"samples": rest}
+            tb.comparison.StreamComparison(families=["parabola", "circle"], **kept).update, {"samples": rest}
         ),
         "StreamComparison.posterior": Call(streams().posterior, {"family": "circle"}),
         "StreamComparison.save": Call(streams().save, {"path": folder / "other.nc"}),
         "StreamComparison.resume": Call(
-            tb.StreamComparison.resume, {**kept, "families": ["parabola", "circle"], "path": both, "record": None}
+            tb.comparison.StreamComparison.resume,
+            {**kept, "families": ["parabola", "circle"], "path": both, "record": None},
         ),
         "reconstruct": Call(
             tb.reconstruct,
@@ -546,13 +551,17 @@ def _summary_calls() -> dict[str, Call]:
     x = [0.0, 0.1]
     return {
         "contour_band": Call(tb.contour_band, {"posterior": posterior(), "x": x, "probability": 0.9}),
-        "normal_band": Call(tb.normal_band, {"posterior": posterior(), "x": x, "probability": 0.9, "reference": None}),
-        "predictive_interval": Call(tb.predictive_interval, {"posterior": posterior(), "probability": 0.9}),
+        "normal_band": Call(
+            tb.uncertainty.normal_band, {"posterior": posterior(), "x": x, "probability": 0.9, "reference": None}
+        ),
+        "predictive_interval": Call(tb.uncertainty.predictive_interval, {"posterior": posterior(), "probability": 0.9}),
         "gap": Call(tb.gap, {"posterior": posterior(), "probability": 0.9, "without_events": posterior()}),
-        "implied_contacts": Call(tb.implied_contacts, {"posterior": posterior(), "draws": 5}),
-        "contact_moments": Call(tb.contact_moments, {"posterior": contacts_drawn()}),
-        "contact_region": Call(tb.contact_region, {"posterior": contacts_drawn(), "sample": 20, "probability": 0.9}),
-        "check_record": Call(tb.check_record, {"posterior": posterior(), "false_alarm": 1e-3}),
+        "implied_contacts": Call(tb.uncertainty.implied_contacts, {"posterior": posterior(), "draws": 5}),
+        "contact_moments": Call(tb.uncertainty.contact_moments, {"posterior": contacts_drawn()}),
+        "contact_region": Call(
+            tb.uncertainty.contact_region, {"posterior": contacts_drawn(), "sample": 20, "probability": 0.9}
+        ),
+        "check_record": Call(tb.diagnostics.check_record, {"posterior": posterior(), "false_alarm": 1e-3}),
         "verdicts": Call(tb.verdicts, {"posterior": posterior(), "contacts": contacts(), "trust": None}),
         "trust": Call(
             tb.trust,
@@ -563,7 +572,7 @@ def _summary_calls() -> dict[str, Call]:
                 "probability": None,
                 "family": None,
                 "rig": None,
-                "seed": 1,
+                "rng": 1,
                 "out": None,
                 "workers": 1,
             },
@@ -575,9 +584,9 @@ def _planning_calls() -> dict[str, Call]:
     sweep = {"rig": STATED, "family": None, "drive": tb.Rotation(drive_step=0.1)}
     tasks = {"out": None, "workers": 1}
     made = updated().posterior()
-    calibration = {"rig": STATED, "seed": 1, "family": "parabola", "settings": None, "drive": None, "truth": None}
+    calibration = {"rig": STATED, "rng": 1, "family": "parabola", "settings": None, "drive": None, "truth": None}
     return {
-        "Plan": Call(tb.Plan, {**sweep, "contour": PARABOLA}),
+        "Plan": Call(tb.planning.Plan, {**sweep, "contour": PARABOLA}),
         "Plan.reconstruct": Call(plan().reconstruct, {"record": measured(), "method": "raw"}),
         "Plan.with_noise": Call(plan().with_noise, {"factor": 2.0}),
         "Plan.certain": Call(plan().certain, {"record": ideal()}),
@@ -586,7 +595,7 @@ def _planning_calls() -> dict[str, Call]:
             {
                 **sweep,
                 "contour": PARABOLA,
-                "seed": 1,
+                "rng": 1,
                 "band_widths": [0.01],
                 "probability": 0.9,
                 "samples": 8,
@@ -598,7 +607,7 @@ def _planning_calls() -> dict[str, Call]:
             {
                 **tasks,
                 "known": posterior(),
-                "seed": 1,
+                "rng": 1,
                 "drives": [tb.Rotation(drive_step=0.2)],
                 "criterion": "band",
                 "nested": False,
@@ -607,12 +616,12 @@ def _planning_calls() -> dict[str, Call]:
             },
         ),
         "error_map": Call(
-            tb.error_map,
+            tb.planning.error_map,
             {
                 **tasks,
                 "contours": ["II"],
                 "rig": STATED,
-                "seed": 1,
+                "rng": 1,
                 "over": {"distance": [0.5], "noise_factor": [1.0]},
                 "drive": tb.Rotation(drive_step=0.2),
                 "replicates": 1,
@@ -620,10 +629,10 @@ def _planning_calls() -> dict[str, Call]:
             },
         ),
         "required_noise": Call(
-            tb.required_noise, {"plan": plan(), "band_width": 0.01, "where": "everywhere", "probability": 0.9}
+            tb.planning.required_noise, {"plan": plan(), "band_width": 0.01, "where": "everywhere", "probability": 0.9}
         ),
         "required_rod": Call(
-            tb.required_rod,
+            tb.planning.required_rod,
             {
                 "plan": plan_si(),
                 "lengths": [0.1],
@@ -636,20 +645,21 @@ def _planning_calls() -> dict[str, Call]:
             },
         ),
         "rest_of_sweep": Call(
-            tb.rest_of_sweep,
+            tb.planning.rest_of_sweep,
             {
                 "posterior": made,
                 "drive_angles": measured().drive_angle[10:20].values,
                 "x": [0.0, 0.1],
-                "seed": 1,
+                "rng": 1,
                 "probability": 0.9,
                 "draws": 2,
             },
         ),
         "calibrate": Call(tb.calibrate, {**calibration, **tasks, "replicates": 1}),
-        "calibration_replicate": Call(tb.calibration_replicate, {**calibration, "number": 0, "out": None}),
+        "calibration_replicate": Call(tb.calibration.calibration_replicate, {**calibration, "number": 0, "out": None}),
         "Misspecification": Call(
-            tb.Misspecification, {"rig": STATED, "base_shift": (0.0, 0.0), "flat_spot": (0.1, 2.0), "family": "circle"}
+            tb.calibration.Misspecification,
+            {"rig": STATED, "base_shift": (0.0, 0.0), "flat_spot": (0.1, 2.0), "family": "circle"},
         ),
     }
 
@@ -669,7 +679,7 @@ def _figure_calls(folder: Path) -> dict[str, Call]:
         "drive_step": 0.1,
         "rods": 3,
         "load_cell": None,
-        "seed": 1,
+        "rng": 1,
         "width": 7.0,
     }
     files = {
@@ -725,7 +735,7 @@ def _figure_calls(folder: Path) -> dict[str, Call]:
             p.predictive,
             {
                 "record": measured(),
-                "predicted": tb.predictive_interval(posterior()),
+                "predicted": tb.uncertainty.predictive_interval(posterior()),
                 "axes": None,
                 "residuals": None,
                 "label": "predicted",

@@ -34,12 +34,12 @@ VOID = {"meta", "input", "br", "hr", "img", "link"}
 def analysed_quickly(record: xr.Dataset, folder, **options) -> run.Run:
     """A run of few steps, without figures."""
     with mock.patch.object(run, "_draw", return_value={}):
-        return run.analyse(record, folder, settings=options.pop("settings", FEW), **options)
+        return run.analyse(record, folder, **({"rng": 1, "settings": FEW} | options))
 
 
 def coarse_record(step: float = float(np.radians(6.0)), **options) -> xr.Dataset:
     """The demonstration's record, in few samples, as it is measured."""
-    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=step, **options).record, seed=1)
+    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=step, **options).record, rng=1)
     return record.drop_vars([name for name in record.data_vars if str(name).startswith("truth_")])
 
 

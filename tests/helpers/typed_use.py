@@ -16,7 +16,7 @@ def contour_of(record: xr.Dataset) -> tuple[xr.DataTree, xr.Dataset, xr.Dataset]
     cell: tb.LoadCell = tb.LoadCell.from_zero_load(record)
     contacts: xr.Dataset = tb.reconstruct(record, Rig(load_cell=cell), method="constrained")
     posterior: xr.DataTree = tb.infer_contour(
-        record, family=Family("parabola", q=stats.uniform(0.3, 0.4)), rig=Rig(load_cell=cell), seed=1
+        record, family=Family("parabola", q=stats.uniform(0.3, 0.4)), rig=Rig(load_cell=cell), rng=1
     )
     band: xr.Dataset = tb.contour_band(posterior, x=[-0.5, 0.0, 0.5], probability=0.95)
     return posterior, contacts, band
@@ -27,7 +27,7 @@ def simulated(rod: tb.Rod | None = None) -> xr.Dataset:
     scan = tb.scan(contour, Rig(rod=rod), base=[(0.0, 0.0), (0.25, 0.0)], drive_step=float(np.radians(2.0)))
     angle: float = scan.sweeps[0].snap_off.drive_angle
     record: xr.Dataset = scan.record
-    return tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(record.where(record.drive_angle < angle), seed=1)
+    return tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(record.where(record.drive_angle < angle), rng=1)
 
 
 def drawn(posterior: xr.DataTree, band: xr.Dataset) -> Axes:
@@ -36,7 +36,7 @@ def drawn(posterior: xr.DataTree, band: xr.Dataset) -> Axes:
 
 
 def planned() -> tuple[xr.DataTree, xr.Dataset, xr.Dataset]:
-    plan = tb.Plan(tb.contours.paper_profile("II", q=0.5))
-    needed: xr.Dataset = tb.required_noise(plan, 0.005)
-    found: xr.Dataset = tb.design("parabola", draws=4, seed=1)
-    return tb.sensitivity(seed=1), needed, found
+    plan = tb.planning.Plan(tb.contours.paper_profile("II", q=0.5))
+    needed: xr.Dataset = tb.planning.required_noise(plan, 0.005)
+    found: xr.Dataset = tb.design("parabola", draws=4, rng=1)
+    return tb.sensitivity(rng=1), needed, found

@@ -167,13 +167,13 @@ def test_events_are_those_of_the_drawn_contours():
 
 def coarse(contour=None, cell=CELL, seed=3, **options):
     """A small record."""
-    return cell.measure(swept(contour or Parabola(**TRUTH), step=np.radians(8.0), **options), seed=seed)
+    return cell.measure(swept(contour or Parabola(**TRUTH), step=np.radians(8.0), **options), rng=seed)
 
 
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_draws():
     record, brief = coarse(), replace(BRIEF, block_steps=8, max_steps=8)
-    first, again, other = (infer_as_stated(record, seed=seed, settings=brief) for seed in (1, 1, 2))
+    first, again, other = (infer_as_stated(record, rng=seed, settings=brief) for seed in (1, 1, 2))
     for group in ("posterior", "prior", "posterior_predictive", "events"):
         xr.testing.assert_identical(first[group].to_dataset(), again[group].to_dataset())
     assert not np.any(first["posterior"].a.values == other["posterior"].a.values)
@@ -187,8 +187,8 @@ def test_units_do_not_matter():
     rod = Rod(length=0.25, flexural_rigidity=2.4e-3)
     plain = coarse(Circle(1.0, 0.4, 0.05))
     in_si = to_si(plain, rod)
-    expected = infer_as_stated(plain, family="circle", seed=1, settings=BRIEF)["posterior"].to_dataset()
-    found = infer_as_stated(in_si, family="circle", seed=1, settings=BRIEF)["posterior"].to_dataset()
+    expected = infer_as_stated(plain, family="circle", rng=1, settings=BRIEF)["posterior"].to_dataset()
+    found = infer_as_stated(in_si, family="circle", rng=1, settings=BRIEF)["posterior"].to_dataset()
     units = {"r": (rod.length, "m"), "q": (rod.length, "m"), "x_c": (rod.length, "m")}
     for name in expected.data_vars:
         factor, unit = units.get(name, (1.0, "1"))
@@ -200,7 +200,7 @@ def test_units_do_not_matter():
 def test_a_record_is_predicted_in_its_own_frame():
     """The other frame's forces are tens of standard deviations away."""
     record = in_frame(coarse(), "turning")
-    result = infer_as_stated(record, seed=1, settings=BRIEF)
+    result = infer_as_stated(record, rng=1, settings=BRIEF)
     assert result.attrs["load_cell_frame"] == "turning"
     predicted = result["posterior_predictive"].force_x.mean(("chain", "draw"))
     assert np.abs(predicted - record.force_x).max() < 6.0 * CELL.force_noise
@@ -214,7 +214,7 @@ def test_without_a_load_cell_both_noises_are_inferred_in_its_units():
     cell = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
     record = coarse(Parabola(2.5, 0.1), cell, rod=rod)
     record = without(record, "load_cell_force_noise", "load_cell_moment_noise")
-    result = infer_as_stated(record, seed=1, settings=MODEST)
+    result = infer_as_stated(record, rng=1, settings=MODEST)
     truth = {"a": 2.5, "q": 0.1, "x_c": 0.0, "moment_noise": 0.25e-3, "force_noise": 3e-3}
     assert list(result["posterior"].data_vars) == list(truth)
     assert_near(result, truth)
@@ -226,14 +226,14 @@ def test_without_a_load_cell_both_noises_are_inferred_in_its_units():
 @pytest.mark.slow
 def test_missing_channels(missing):
     """Within 4 standard deviations of the truth: false alarm 6e-5 a number."""
-    result = infer_as_stated(without(coarse(), *missing), seed=1, settings=MODEST)
+    result = infer_as_stated(without(coarse(), *missing), rng=1, settings=MODEST)
     assert_near(result, {**TRUTH, "noise_scale": 1.0})
     assert set(result["posterior_predictive"].data_vars) == set(CHANNELS) - set(missing)
 
 
 @pytest.mark.slow
 def test_moment_only_in_brief():
-    result = infer_as_stated(without(coarse(), "force_x", "force_y"), seed=1, settings=BRIEF)
+    result = infer_as_stated(without(coarse(), "force_x", "force_y"), rng=1, settings=BRIEF)
     assert list(result["posterior_predictive"].data_vars) == ["holding_moment"]
     assert float(abs(result["posterior"].a - 0.5).max()) < 0.05
     assert float(result["posterior"].noise_scale.max()) < 3.0
@@ -242,7 +242,7 @@ def test_moment_only_in_brief():
 @pytest.mark.slow
 def test_several_pivots():
     record = coarse(bases=((0.0, 0.0), (0.3, 0.1)))
-    result = infer_as_stated(record, seed=1, settings=BRIEF)
+    result = infer_as_stated(record, rng=1, settings=BRIEF)
     assert sorted(result["events"].stroke.values) == ["backward", "backward", "forward", "forward"]
     assert float(abs(result["posterior"].a - 0.5).max()) < 0.05
 
@@ -254,8 +254,8 @@ def test_no_walker_lives_on_noise(seed):
 
     The standard deviation of noise_scale is 1/√(2 n), n numbers; four times that would be a walker that holds out.
     """
-    record = CELL.measure(swept(Parabola(0.5, 0.7)), seed=seed)
-    result = infer_as_stated(record, seed=seed, settings=MODEST)
+    record = CELL.measure(swept(Parabola(0.5, 0.7)), rng=seed)
+    result = infer_as_stated(record, rng=seed, settings=MODEST)
     numbers = 3 * record.sizes["sample"]
     assert float(result["posterior"].noise_scale.std()) < 4.0 / np.sqrt(2.0 * numbers)
 
@@ -264,7 +264,7 @@ def test_no_walker_lives_on_noise(seed):
 def test_very_small_noise():
     """1e-4 of EI/L: within 4 standard deviations of the truth, the noise too; false alarm 6e-5 a number."""
     cell = LoadCell(force_noise=1e-4, moment_noise=1e-4)
-    result = infer_as_stated(coarse(Circle(1.0, 0.3), cell), family="circle", seed=1, settings=MODEST)
+    result = infer_as_stated(coarse(Circle(1.0, 0.3), cell), family="circle", rng=1, settings=MODEST)
     assert_near(result, {"r": 1.0, "q": 0.3, "x_c": 0.0, "noise_scale": 1.0})
 
 
@@ -272,7 +272,7 @@ def test_priors_that_allow_the_impossible_are_cut_off():
     """Normal priors reach below zero, where there is neither a contour nor a noise."""
     family = Family("parabola", a=stats.norm(0.3, 0.3), x_c=stats.cauchy(0.0, 0.1))
     unknown = {"noise_scale": stats.norm(0.5, 0.5)}
-    result = infer_as_stated(coarse(), family=family, unknown=unknown, seed=1, settings=BRIEF)
+    result = infer_as_stated(coarse(), family=family, unknown=unknown, rng=1, settings=BRIEF)
     assert float(result["posterior"].a.min()) > 0.0
     assert float(result["prior"].a.min()) > 0.0
     assert float(result["prior"].noise_scale.min()) > 0.0
@@ -291,7 +291,7 @@ def test_priors_that_allow_the_impossible_are_cut_off():
 def test_priors_that_exclude_the_truth_are_obeyed(name, prior):
     low, high = prior.support()
     said = {"unknown": {name: prior}} if name == "noise_scale" else {"family": Family("parabola", **{name: prior})}
-    values = infer_as_stated(coarse(), seed=1, settings=BRIEF, **said)["posterior"][name].values
+    values = infer_as_stated(coarse(), rng=1, settings=BRIEF, **said)["posterior"][name].values
     assert low <= values.min()
     assert values.max() <= high
 
@@ -299,7 +299,7 @@ def test_priors_that_exclude_the_truth_are_obeyed(name, prior):
 @pytest.mark.slow
 def test_priors_of_which_little_is_within_reach(monkeypatch):
     monkeypatch.setattr("tactile_bayes.inference.contour_model._MOST_TRIALS", 5)
-    result = infer_as_stated(coarse(), family=Family("parabola", q=stats.uniform(0.0, 150.0)), seed=1, settings=BRIEF)
+    result = infer_as_stated(coarse(), family=Family("parabola", q=stats.uniform(0.0, 150.0)), rng=1, settings=BRIEF)
     assert 0 < result["prior"].sizes["draw"] < 1000
     assert result["prior"].attrs["share_within_reach"] < 0.01
 
@@ -320,7 +320,7 @@ def test_one_draw_is_found_where_one_in_a_hundred_is_within_reach():
 )
 def test_what_cannot_be_is_refused(given, kind, named):
     with refused(kind, *named):
-        infer_as_stated(coarse(), seed=1, **given)
+        infer_as_stated(coarse(), rng=1, **given)
 
 
 def test_a_record_without_load_is_refused():
@@ -328,13 +328,13 @@ def test_a_record_without_load_is_refused():
     for name in CHANNELS:
         record[name] = 0.01 * record[name] / abs(record[name]).max()
     with refused(InferenceError, "no sample", "load"):
-        infer_as_stated(record, seed=1)
+        infer_as_stated(record, rng=1)
 
 
 @pytest.mark.slow
 def test_a_very_tight_prior_is_obeyed():
     """As if a were known: within 5 prior standard deviations, and the noise is not inflated."""
-    result = infer_as_stated(coarse(), family=Family("parabola", a=stats.norm(0.5, 1e-5)), seed=1, settings=BRIEF)
+    result = infer_as_stated(coarse(), family=Family("parabola", a=stats.norm(0.5, 1e-5)), rng=1, settings=BRIEF)
     assert float(abs(result["posterior"].a - 0.5).max()) < 1e-4
     assert float(result["posterior"].noise_scale.max()) < 2.0
 
@@ -361,10 +361,10 @@ def test_ranks_of_the_truth_are_uniform():
         scale = truth["noise_scale"]
         contour = Parabola(truth["a"], truth["q"], truth["x_c"])
         record = scan(contour, drive_angles=np.radians(np.arange(-60.0, 244.0, 4.0))).record
-        noisy = LoadCell(force_noise=0.05 * scale, moment_noise=0.02 * scale).measure(record, seed=rng)
+        noisy = LoadCell(force_noise=0.05 * scale, moment_noise=0.02 * scale).measure(record, rng=rng)
         unknown = {"noise_scale": priors["noise_scale"]}
         family = Family("parabola", **{name: priors[name] for name in TRUTH})
-        result = infer_as_stated(noisy, family=family, seed=k, load_cell=CELL, unknown=unknown, settings=settings)
+        result = infer_as_stated(noisy, family=family, rng=k, load_cell=CELL, unknown=unknown, settings=settings)
         row[:] = [float((result["posterior"][name] < truth[name]).mean()) for name in NAMES]
     for name, column in zip(NAMES, ranks.T, strict=True):
         assert stats.kstest(column, "uniform").pvalue > 1e-3, name
@@ -374,7 +374,7 @@ def test_ranks_of_the_truth_are_uniform():
 def test_samples_without_load_tell_where_contact_begins_and_ends():
     """Left out, the posterior is wider, and still right."""
     whole = posterior()["posterior"]
-    result = infer_as_stated(measured(), load_cell=CELL, seed=1, settings=replace(MODEST, events=False))
+    result = infer_as_stated(measured(), load_cell=CELL, rng=1, settings=replace(MODEST, events=False))
     assert result["observed_data"].sizes["sample"] < measured().sizes["sample"]
     assert result.attrs["events"] == 0
     assert result.attrs["data_sha256"] == posterior().attrs["data_sha256"]
@@ -402,8 +402,8 @@ def test_the_way_to_the_optimum_may_lead_where_the_prior_is_nothing():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.03, 0.02, -0.14))
     priors = {"r": stats.lognorm(s=0.4, scale=0.7), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
     for seed in range(4):
-        noisy = cell.measure(stiff, seed=seed)
-        result = infer_contour(noisy, family=Family("circle", **priors), rig=Rig(load_cell=CELL), seed=seed)
+        noisy = cell.measure(stiff, rng=seed)
+        result = infer_contour(noisy, family=Family("circle", **priors), rig=Rig(load_cell=CELL), rng=seed)
         assert result.attrs["converged"], result.attrs["message"]
         assert abs(result["posterior"].q.mean() - 0.313) < 0.01
 
@@ -415,7 +415,7 @@ def test_flat_ellipses_mix_although_only_a_ratio_is_told(a, b, q):
     record = scan(Ellipse(a, b, q, -0.05), drive_angles=np.radians(np.arange(0.0, 200.0, 2.0))).record
     size = stats.lognorm(s=0.4, scale=0.7)
     result = infer_contour(
-        CELL.measure(record, seed=1), family=Family("ellipse", a=size, b=size), rig=Rig(load_cell=CELL), seed=1
+        CELL.measure(record, rng=1), family=Family("ellipse", a=size, b=size), rig=Rig(load_cell=CELL), rng=1
     )
     assert result.attrs["converged"], result.attrs["message"]
     assert result["sample_stats"].attrs["evaluations"] < 60_000
@@ -427,9 +427,9 @@ def test_a_prior_that_ends_before_what_the_record_wants_is_named():
     record, deviation = coarse(), 3e-4  # by Fisher information
     narrow = Family("parabola", q=stats.uniform(TRUTH["q"] - 0.2, 0.15))
     with pytest.raises(InferenceError, match=r"q = 0\.\d+ .*0\.\d+ to 0\.\d+"):
-        infer_as_stated(measured(), family=narrow, seed=1, settings=BRIEF)
+        infer_as_stated(measured(), family=narrow, rng=1, settings=BRIEF)
     edged = Family("parabola", q=stats.uniform(TRUTH["q"] - 0.2, 0.2 - deviation))
-    found = infer_as_stated(record, family=edged, seed=1, settings=BRIEF)
+    found = infer_as_stated(record, family=edged, rng=1, settings=BRIEF)
     assert float(found["posterior"].q.max()) < TRUTH["q"] - deviation
     assert float(found["posterior"].q.mean()) == pytest.approx(TRUTH["q"] - deviation, abs=3.0 * deviation)
 
@@ -441,7 +441,7 @@ def test_a_prior_that_ends_before_what_the_record_wants_is_named():
 )
 def test_blocks_of_points_make_no_difference(cell, monkeypatch):
     """To the log-probability, and to all that is predicted: readings, densities, events."""
-    draw = {"load_cell": cell, "seed": 1, "settings": replace(BRIEF, max_steps=2, block_steps=2)}
+    draw = {"load_cell": cell, "rng": 1, "settings": replace(BRIEF, max_steps=2, block_steps=2)}
     whole = infer_as_stated(measured(), **draw)
     sizes = []
 
@@ -464,13 +464,13 @@ def test_blocks_of_points_make_no_difference(cell, monkeypatch):
 def test_of_a_long_record_fewer_predictions_are_stored(monkeypatch):
     """As few as the check of the record can do with, and the group says so; events are of as many draws as ever."""
     samples = measured().sizes["sample"]
-    whole = infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF)
+    whole = infer_as_stated(measured(), load_cell=CELL, rng=1, settings=BRIEF)
     assert whole["log_likelihood"].sizes["draw"] == 240
     assert "stored" not in whole["log_likelihood"].attrs
     monkeypatch.setattr(contour_groups, "_STORED_NUMBERS", 4 * 2 * samples * 120)
-    some = infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF)
+    some = infer_as_stated(measured(), load_cell=CELL, rng=1, settings=BRIEF)
     monkeypatch.setattr(contour_groups, "_STORED_NUMBERS", 1)
-    few = infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF)
+    few = infer_as_stated(measured(), load_cell=CELL, rng=1, settings=BRIEF)
     for result, stored in ((some, 120), (few, 50)):
         for group in ("posterior_predictive", "log_likelihood"):
             assert result[group].sizes["draw"] == stored
@@ -508,7 +508,7 @@ def test_the_time_bounds_the_search_too(family, seconds, monkeypatch):
         measured(),
         family=family,
         rig=Rig(load_cell=CELL),
-        seed=1,
+        rng=1,
         settings=settings,
         keep=lambda tree: drawn.append(clock.now),
     )
@@ -521,7 +521,7 @@ def test_the_time_bounds_the_search_too(family, seconds, monkeypatch):
         measured(),
         family=family,
         rig=Rig(load_cell=CELL),
-        seed=1,
+        rng=1,
         settings=free,
         keep=lambda tree: drawn.append(clock.now),
     )
@@ -535,7 +535,7 @@ def test_a_posterior_is_kept_before_anything_is_made_of_it(monkeypatch):
     monkeypatch.setattr("tactile_bayes.inference.contour.predicted_groups", fail)
     kept = []
     with pytest.raises(MemoryError):
-        infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF, keep=kept.append)
+        infer_as_stated(measured(), load_cell=CELL, rng=1, settings=BRIEF, keep=kept.append)
     (tree,) = kept
     assert set(tree.children) == {"posterior", "sample_stats", "observed_data", "constant_data"}
     assert tree["posterior"].sizes["draw"] == 240

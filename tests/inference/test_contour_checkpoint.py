@@ -18,11 +18,11 @@ SHORT = SamplerSettings(ensembles=2, walkers=12, block_steps=10, max_steps=30, m
 @cache
 def coarse():
     """A record of few samples, that is not to be changed."""
-    return CELL.measure(swept(Parabola(**TRUTH), step=0.15), seed=5)
+    return CELL.measure(swept(Parabola(**TRUTH), step=0.15), rng=5)
 
 
 def infer(checkpoint=None, **options):
-    options = {"load_cell": CELL, "seed": 1, "settings": SHORT} | options
+    options = {"load_cell": CELL, "rng": 1, "settings": SHORT} | options
     return infer_as_stated(coarse(), checkpoint=checkpoint, **options)
 
 
@@ -51,7 +51,7 @@ def test_a_run_out_of_time_goes_on_from_the_same_start(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"seed": 2}, "seed of the ensembles"),
+        ({"rng": 2}, "seed of the ensembles"),
         ({"family": "circle"}, "family"),
         ({"settings": replace(SHORT, events=False)}, "events"),
         ({"unknown": {"rigidity_scale": "default"}}, "nuisances"),

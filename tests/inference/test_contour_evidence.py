@@ -23,7 +23,7 @@ SETTINGS = SamplerSettings(ensembles=2, min_ess=400, max_r_hat=1.03)
 
 
 def problem_of(family, truth, noise=1.0):
-    measured = CELL.measure(swept(TRUTHS[truth], step=0.15), seed=4)
+    measured = CELL.measure(swept(TRUTHS[truth], step=0.15), rng=4)
     rig = Rig(load_cell=CELL, unknown=only(noise_scale=stats.lognorm(s=0.1, scale=noise)))
     return contour_problem(Experiment(measured, rig, Family(family, **NARROW[family])))
 

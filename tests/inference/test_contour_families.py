@@ -30,7 +30,7 @@ def test_posteriors_lie_about_the_truth(name):
     family = family_named(name)
     record = scan(family.build(*TRUTHS[name]), drive_step=np.radians(3.0)).record
     settings = BRIEF if name == "ellipse" else SETTINGS
-    result = infer_as_stated(CELL.measure(record, seed=3), family=name, seed=1, settings=settings)
+    result = infer_as_stated(CELL.measure(record, rng=3), family=name, rng=1, settings=settings)
     assert_near(result, dict(zip(family.parameters, TRUTHS[name], strict=True)), 4.5)
     contours = contours_of(result["posterior"].to_dataset().isel(draw=slice(None, None, 40)), name)
     many = scan_many(contours, np.full((contours.shape[0], 1), 1.5))
@@ -48,7 +48,7 @@ def test_contours_that_the_rod_would_cut_after_snap_off_are_not_usable():
     contours = family.build(*points)
     swept = [scan_many(contours, np.full((count, 1), 1.5), direction=way) for way in ("forward", "backward")]
     wanted = np.all([(many.status == "ok").values & many.clear.values.astype(bool) for many in swept], axis=0)
-    record = CELL.measure(scan(family.build(*TRUTHS["ellipse"])).record, seed=1)
+    record = CELL.measure(scan(family.build(*TRUTHS["ellipse"])).record, rng=1)
     usable = RecordLikelihood(record, CELL, is_always_clear=False).usable(contours)
     assert np.count_nonzero(usable != wanted) <= 1  # where snap-off is approximate
     reached = RecordLikelihood(record, CELL).usable(contours)

@@ -24,7 +24,7 @@ def upright():
         Translation((side * -0.5, 0.0), 0.0 if side > 0 else np.pi, 0.5 * np.pi, travel=1.0, drive_step=0.05)
         for side in (1, -1)
     ]
-    return CELL.measure(scan(Circle(0.3, q=0.8), drive=drives).record, seed=1)
+    return CELL.measure(scan(Circle(0.3, q=0.8), drive=drives).record, rng=1)
 
 
 def test_friction_that_excludes_every_path_is_named_with_the_way_out(upright, monkeypatch):

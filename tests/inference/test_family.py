@@ -39,7 +39,7 @@ CENTRED = Family("parabola", x_c=0.0)
 @pytest.fixture(scope="module")
 def tree():
     """A posterior whose vertex is known to be above the pivot, of few draws."""
-    return infer_as_stated(measured(), family=CENTRED, load_cell=CELL, seed=1, settings=BRIEF)
+    return infer_as_stated(measured(), family=CENTRED, load_cell=CELL, rng=1, settings=BRIEF)
 
 
 # --- What is said ---------------------------------------------------------------------------------------------------
@@ -107,7 +107,7 @@ def test_known_is_as_a_very_narrow_prior():
     expected = wide.log_probability(beside) - stats.norm(0.0, 1e-7).logpdf(0.0)
     np.testing.assert_allclose(known.log_probability(point), expected, rtol=1e-9)
     found = [
-        infer_as_stated(measured(), family=family, load_cell=CELL, seed=1, settings=MODEST)["posterior"]
+        infer_as_stated(measured(), family=family, load_cell=CELL, rng=1, settings=MODEST)["posterior"]
         for family in (CENTRED, narrow)
     ]
     for name in ("a", "q", "noise_scale"):
@@ -131,7 +131,7 @@ def test_known_parameters_are_constant_in_the_posterior(tree):
 def test_known_parameters_have_the_units_of_the_others():
     record = to_si(measured(), Rod(0.2, 2.4e-3))
     family = Family("parabola", a=2.5)
-    tree = infer_as_stated(record, family=family, seed=1, settings=replace(BRIEF, max_steps=2, block_steps=2))
+    tree = infer_as_stated(record, family=family, rng=1, settings=replace(BRIEF, max_steps=2, block_steps=2))
     units = {name: draws.attrs["units"] for name, draws in tree["posterior"].data_vars.items()}
     assert units == {"q": "m", "x_c": "m", "noise_scale": "1", "a": "1/m"}
 
@@ -165,7 +165,7 @@ def test_figures_of_it_are_drawn(tree, figure):
 
 @pytest.mark.slow
 def test_the_report_of_it_is_written(tmp_path):
-    record = record_of(infer_as_stated(measured(), family=CENTRED, load_cell=CELL, seed=1, settings=BRIEF))
+    record = record_of(infer_as_stated(measured(), family=CENTRED, load_cell=CELL, rng=1, settings=BRIEF))
     rig = Rig(load_cell=CELL, unknown="nothing")
     analysed_quickly(record, tmp_path, family=CENTRED, rig=rig, settings=BRIEF)
     page = write_report(tmp_path).read_text(encoding="utf-8")
@@ -175,7 +175,7 @@ def test_the_report_of_it_is_written(tmp_path):
 
 @pytest.mark.slow
 def test_a_stream_takes_known_numbers(tmp_path):
-    stream = Stream(family=CENTRED, rig=Rig(load_cell=CELL, unknown="nothing"), seed=1, particles=200)
+    stream = Stream(family=CENTRED, rig=Rig(load_cell=CELL, unknown="nothing"), rng=1, particles=200)
     for part in np.array_split(np.arange(measured().sizes["sample"]), 2):
         stream.update(measured().isel(sample=part))
     found = stream.posterior()

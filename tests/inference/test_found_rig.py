@@ -192,9 +192,9 @@ def test_noise_that_was_inferred_is_the_load_cells():
 def test_a_stiffer_rod_that_was_inferred_raises_no_alarm():
     """Its single samples agree with one another once its stiffness is known."""
     read, _ = read_with({"rigidity_scale": 1.05})
-    measured = CELL.measure(read, seed=1)
+    measured = CELL.measure(read, rng=1)
     settings = tb.SamplerSettings(ensembles=2, walkers=26, max_r_hat=1.1, min_ess=100.0, max_steps=400)
-    posterior = tb.infer_contour(measured, rig=Rig(load_cell=CELL), seed=1, settings=settings)
+    posterior = tb.infer_contour(measured, rig=Rig(load_cell=CELL), rng=1, settings=settings)
     assert tb.reconstruct(measured, method="constrained", rig=Rig(load_cell=CELL)).attrs["misfit_probability"] < 1e-6
     contacts = contact_points(measured, posterior, CELL)
     assert contacts.attrs["misfit_probability"] > 1e-3

@@ -68,7 +68,7 @@ NEVER_KNOWN = {*GROUPS["discrepancy"], "moment_noise", "force_noise"}
 
 @cache
 def record() -> xr.Dataset:
-    return CELL.measure(swept(PIN, bases=((0.0, 0.0), (0.01, 0.003)), rod=ROD, step=0.1), seed=1)
+    return CELL.measure(swept(PIN, bases=((0.0, 0.0), (0.01, 0.003)), rod=ROD, step=0.1), rng=1)
 
 
 FEW = replace(BRIEF, max_steps=2, block_steps=2)
@@ -165,7 +165,7 @@ def with_rig(tree, **rig):
 
 @cache
 def posterior() -> xr.DataTree:
-    return infer_as_stated(record(), family="circle", load_cell=CELL, unknown=OF_STEP_2, seed=1, settings=FEW)
+    return infer_as_stated(record(), family="circle", load_cell=CELL, unknown=OF_STEP_2, rng=1, settings=FEW)
 
 
 OF_STEP_2 = {name: value for name, value in KNOWN.items() if name not in (*GROUPS["gauge"], "noise_scale")}
@@ -189,9 +189,7 @@ def test_what_follows_from_a_posterior_takes_known_numbers_as_found_ones():
 
 
 def test_a_factor_of_the_noise_that_is_known_is_no_parameter():
-    tree = infer_as_stated(
-        record(), family="circle", load_cell=CELL, unknown={"noise_scale": 1.5}, seed=1, settings=FEW
-    )
+    tree = infer_as_stated(record(), family="circle", load_cell=CELL, unknown={"noise_scale": 1.5}, rng=1, settings=FEW)
     assert list(tree["posterior"].data_vars) == ["r", "q", "x_c"]
     assert tree.attrs["load_cell_force_noise"] == pytest.approx(1.5 * CELL.force_noise)
     assert tree["posterior_predictive"].sizes["sample"] == record().sizes["sample"]

@@ -115,14 +115,14 @@ def made_up_readings(seed):
 
 @pytest.fixture(scope="module")
 def made_up():
-    return infer_point_load(*made_up_readings(1), seed=2, settings=QUICK)
+    return infer_point_load(*made_up_readings(1), rng=2, settings=QUICK)
 
 
 @pytest.fixture(scope="module")
 def in_brief():
     """Enough for the layout of a result."""
     settings = SamplerSettings(ensembles=2, walkers=20, block_steps=20, max_steps=40)
-    return infer_point_load(*made_up_readings(1), seed=2, settings=settings)
+    return infer_point_load(*made_up_readings(1), rng=2, settings=settings)
 
 
 @pytest.mark.slow
@@ -205,14 +205,14 @@ def test_known_parameters_are_left_out_and_seeds_count():
     known = {"compliance": RIG["compliance"], "noise_sd": NOISE}
     data = made_up_readings(4)
     first, again, other = (
-        infer_point_load(*data, seed=seed, priors=known, settings=settings).posterior.to_dataset() for seed in (1, 1, 2)
+        infer_point_load(*data, rng=seed, priors=known, settings=settings).posterior.to_dataset() for seed in (1, 1, 2)
     )
     assert set(first.data_vars) == {"clamp_axial", "clamp_lateral", "clamp_angle", "sensor_coefficient"}
     xr.testing.assert_identical(first, again)
     assert not np.array_equal(first.clamp_axial, other.clamp_axial)
-    only_noise = infer_point_load(*data, seed=1, priors=RIG, settings=settings)
+    only_noise = infer_point_load(*data, rng=1, priors=RIG, settings=settings)
     assert set(only_noise.posterior.data_vars) == {"noise_sd", "sensor_coefficient"}
-    fixed = infer_point_load(*data, seed=1, priors=known, settings=settings)
+    fixed = infer_point_load(*data, rng=1, priors=known, settings=settings)
     assert 0.0 <= predictive_p_value(fixed) <= 1.0
 
 
@@ -228,12 +228,12 @@ def test_known_parameters_are_left_out_and_seeds_count():
         ({"priors": {"noise_sd": 0.0}}, ParameterError, ["noise_sd", 0]),
         ({"priors": RIG | {"noise_sd": 1.0}}, ParameterError, ["at least one"]),
         ({"full_scale": 0.0}, ParameterError, ["full_scale", 0.0]),
-        ({"seed": -1}, ParameterError, ["seed", -1]),
+        ({"rng": -1}, ParameterError, ["rng", -1]),
         ({"priors": {"clamp_axial": 100.0, "clamp_angle": 0.0}}, InferenceError, ["clamp"]),
     ],
 )
 def test_bad_input_is_refused(wrong, kind, named):
-    right = dict(zip(("axial", "lateral", "reading"), made_up_readings(5), strict=True)) | {"seed": 1}
+    right = dict(zip(("axial", "lateral", "reading"), made_up_readings(5), strict=True)) | {"rng": 1}
     with refused(kind, *named):
         infer_point_load(**(right | wrong))
 
@@ -248,13 +248,13 @@ def whisker():
 
 @pytest.fixture(scope="module")
 def whisker_posterior(whisker):
-    return infer_point_load(*whisker, seed=1)
+    return infer_point_load(*whisker, rng=1)
 
 
 @pytest.fixture(scope="module")
 def whisker_roughly(whisker):
     settings = SamplerSettings(ensembles=2, walkers=32, min_ess=150, max_r_hat=1.05)
-    return infer_point_load(*whisker, seed=1, settings=settings)
+    return infer_point_load(*whisker, rng=1, settings=settings)
 
 
 def rms_over_range(tree):
@@ -292,7 +292,7 @@ def test_the_suspension_of_a_real_whisker_is_soft(whisker_roughly):
     ids=["linear beam", "rigid clamp"],
 )
 def test_lesser_models_fit_a_real_whisker_worse(whisker, options, least, most):
-    tree = infer_point_load(*whisker, seed=1, settings=ROUGH, **options)
+    tree = infer_point_load(*whisker, rng=1, settings=ROUGH, **options)
     assert tree.attrs["converged"], tree.attrs["message"]
     assert least < rms_over_range(tree) < most
 
@@ -322,7 +322,7 @@ def test_posteriors_are_calibrated():
             continue
         reading = np.polynomial.polynomial.polyval(curvature, coefficients)
         reading = reading + rng.normal(scale=truth["noise_sd"], size=reading.size)
-        tree = infer_point_load(axial, lateral, reading, seed=len(ranks), priors=priors, full_scale=1.0, settings=QUICK)
+        tree = infer_point_load(axial, lateral, reading, rng=len(ranks), priors=priors, full_scale=1.0, settings=QUICK)
         assert tree.attrs["converged"], tree.attrs["message"]
         posterior = tree.posterior.to_dataset()
         rank = [float((posterior[name] < truth[name]).mean()) for name in priors]

@@ -27,20 +27,20 @@ def test_also_with_nuisances_a_rod_in_metres_and_unknown_noise():
     from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
     from tactile_bayes.sweep import scan
 
-    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.1).record, seed=1)
+    record = LOAD_CELL.measure(scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.1).record, rng=1)
     assert_same_density(
         infer_contour(
-            record, seed=1, rig=Rig(unknown={**NOTHING, "bias": "default", "friction": "default"}), settings=BRIEF
+            record, rng=1, rig=Rig(unknown={**NOTHING, "bias": "default", "friction": "default"}), settings=BRIEF
         )
     )
     record.attrs = {name: value for name, value in record.attrs.items() if not name.startswith("load_cell_")}
-    assert_same_density(infer_contour(record, seed=1, rig=Rig(unknown="nothing"), settings=BRIEF))
+    assert_same_density(infer_contour(record, rng=1, rig=Rig(unknown="nothing"), settings=BRIEF))
 
 
 def test_priors_and_known_numbers_follow_from_the_tree():
     family = Family("parabola", q=stats.uniform(0.4, 0.2), a=stats.lognorm(s=0.5, scale=0.7), x_c=0.01)
     unknown = {"noise_scale": stats.lognorm(s=1 / 3), "suspension_compliance": 0.01}
-    tree = infer_as_stated(measured(), family=family, load_cell=CELL, unknown=unknown, seed=1, settings=BRIEF)
+    tree = infer_as_stated(measured(), family=family, load_cell=CELL, unknown=unknown, rng=1, settings=BRIEF)
     assert_same_density(tree)
     assert experiment_of(tree).own_family == family
 
@@ -49,13 +49,13 @@ def test_priors_that_are_no_text_must_be_given_and_be_the_same():
     own = stats.rv_histogram((np.ones(4), np.linspace(0.3, 0.7, 5)))()
     rubbing = stats.rv_histogram((np.ones(4), np.linspace(0.0, 0.4, 5)))()
     family, rig = Family("parabola", q=own), Rig(load_cell=CELL, unknown=only(friction=rubbing))
-    of_family = infer_as_stated(measured(), family=family, load_cell=CELL, seed=1, settings=BRIEF)
+    of_family = infer_as_stated(measured(), family=family, load_cell=CELL, rng=1, settings=BRIEF)
     with pytest.raises(ParameterError, match="does not state its family"):
         experiment_of(of_family)
     assert_same_density(of_family, family=family)
     with pytest.raises(ParameterError, match="the prior of q was histogram"):
         experiment_of(of_family, family=Family("parabola", q=stats.uniform(0.3, 0.4)))
-    of_rig = infer_contour(measured(), rig=rig, seed=1, settings=BRIEF)
+    of_rig = infer_contour(measured(), rig=rig, rng=1, settings=BRIEF)
     with pytest.raises(ParameterError, match="does not state its rig"):
         experiment_of(of_rig)
     assert_same_density(of_rig, rig=rig)

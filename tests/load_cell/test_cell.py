@@ -24,12 +24,12 @@ def test_every_channel_has_its_standard_deviation():
 
 
 def test_the_data_sheet_goes_with_the_record():
-    assert LoadCell.from_record(CELL.measure(ideal(), seed=1)) == CELL
+    assert LoadCell.from_record(CELL.measure(ideal(), rng=1)) == CELL
 
 
 def test_the_data_sheet_is_converted_with_the_record():
     rod = Rod(0.2, 2.4e-3)
-    measured = CELL.measure(ideal(rod=rod), seed=1)
+    measured = CELL.measure(ideal(rod=rod), rng=1)
     assert LoadCell.from_record(to_dimensionless(measured)) == CELL.dimensionless(rod)
     assert CELL.dimensionless(Rod()) == CELL
 
@@ -39,21 +39,21 @@ def test_the_data_sheet_is_converted_with_the_record():
 
 def test_the_same_seed_gives_the_same_noise():
     record = ideal()
-    first = CELL.measure(record, seed=3)
-    assert CELL.measure(record, seed=3).identical(first)
-    assert CELL.measure(record, seed=np.random.default_rng(3)).identical(first)
-    assert not CELL.measure(record, seed=4).identical(first)
+    first = CELL.measure(record, rng=3)
+    assert CELL.measure(record, rng=3).identical(first)
+    assert CELL.measure(record, rng=np.random.default_rng(3)).identical(first)
+    assert not CELL.measure(record, rng=4).identical(first)
 
 
 def test_a_generator_goes_on():
     rng = np.random.default_rng(3)
-    assert not CELL.measure(ideal(), seed=rng).identical(CELL.measure(ideal(), seed=rng))
+    assert not CELL.measure(ideal(), rng=rng).identical(CELL.measure(ideal(), rng=rng))
 
 
 def test_truth_is_kept_and_the_argument_is_not_changed():
     record = ideal(note=["a"] * 5)
     before = record.copy(deep=True)
-    measured = CELL.measure(record, seed=1)
+    measured = CELL.measure(record, rng=1)
     assert record.identical(before)
     for name in CHANNELS:
         np.testing.assert_array_equal(measured[f"truth_{name}"], record[name])
@@ -67,8 +67,8 @@ def test_truth_is_kept_and_the_argument_is_not_changed():
 
 
 def test_measuring_twice_keeps_the_first_truth_and_adds_variances():
-    once = CELL.measure(ideal(), seed=1)
-    twice = LoadCell(force_noise=0.12).measure(once, seed=2)
+    once = CELL.measure(ideal(), rng=1)
+    twice = LoadCell(force_noise=0.12).measure(once, rng=2)
     for name in CHANNELS:
         assert twice[f"truth_{name}"].identical(once[f"truth_{name}"])
     assert twice.attrs["load_cell_force_noise"] == pytest.approx(0.13, rel=1e-15)
@@ -79,7 +79,7 @@ def test_measuring_twice_keeps_the_first_truth_and_adds_variances():
 def test_a_cell_that_turns_has_its_noise_on_what_it_measures():
     """The same numbers on axial and transversal force as on horizontal and vertical; turning leaves their law alone."""
     record = ideal()
-    fixed, turning = CELL.measure(record, seed=1), CELL.measure(in_frame(record, "turning"), seed=1)
+    fixed, turning = CELL.measure(record, rng=1), CELL.measure(in_frame(record, "turning"), rng=1)
     assert frame_of(turning) == "turning"
     for name in CHANNELS:
         noise = fixed[name] - record[name]
@@ -94,16 +94,16 @@ def test_a_cell_that_turns_has_its_noise_on_what_it_measures():
 
 
 def test_a_cell_without_noise_changes_nothing():
-    measured = LoadCell().measure(ideal(), seed=1)
+    measured = LoadCell().measure(ideal(), rng=1)
     for name in CHANNELS:
         np.testing.assert_array_equal(measured[name], ideal()[name])
 
 
 def test_a_missing_channel_stays_missing_and_the_others_have_the_same_noise():
-    measured = CELL.measure(ideal(missing=("force_x",)), seed=1)
+    measured = CELL.measure(ideal(missing=("force_x",)), rng=1)
     assert present_channels(measured) == ("holding_moment", "force_y")
     assert "truth_force_x" not in measured
-    whole = CELL.measure(ideal(), seed=1)
+    whole = CELL.measure(ideal(), rng=1)
     for name in ("holding_moment", "force_y"):
         assert measured[name].identical(whole[name])
 
@@ -112,7 +112,7 @@ def test_noise_has_the_stated_moments_and_is_independent():
     # n = 40000 samples of three channels. Under the stated law each of the statistics below is standard normal up
     # to O(1/√n); twelve of them beyond 5 happen once in 1.5 million seeds.
     n = 40_000
-    measured = CELL.measure(ideal(n), seed=20)
+    measured = CELL.measure(ideal(n), rng=20)
     noise = np.stack(
         [(measured[name] - measured[f"truth_{name}"]).values / CELL.standard_deviations[name] for name in CHANNELS]
     )
@@ -125,7 +125,7 @@ def test_noise_has_the_stated_moments_and_is_independent():
 
 def test_noise_is_normal():
     # Kolmogorov and Smirnov's test on 3 x 5000 numbers; it fails for one seed in a million.
-    measured = CELL.measure(ideal(5000), seed=21)
+    measured = CELL.measure(ideal(5000), rng=21)
     noise = [(measured[name] - measured[f"truth_{name}"]).values / CELL.standard_deviations[name] for name in CHANNELS]
     assert stats.kstest(np.concatenate(noise), "norm").pvalue > 1e-6
 
@@ -134,28 +134,28 @@ def test_noise_is_normal():
 def test_measuring_twice_is_refused_where_it_makes_no_load_cell(further):
     for first, second in ((cell(**further), CELL), (CELL, cell(**further))):
         with refused(ParameterError, "two load cells", "remove"):
-            second.measure(first.measure(ideal(), seed=1), seed=2)
+            second.measure(first.measure(ideal(), rng=1), rng=2)
 
 
 def test_an_ideal_cell_measures_what_was_measured():
-    once = cell(bias=(0.1, 0.0, 0.0), drift=WALK).measure(ideal(), seed=1)
-    assert LoadCell().measure(once, seed=2).identical(once)
+    once = cell(bias=(0.1, 0.0, 0.0), drift=WALK).measure(ideal(), rng=1)
+    assert LoadCell().measure(once, rng=2).identical(once)
 
 
 @pytest.mark.parametrize("name", NORMAL)
 def test_a_record_is_measured_as_arrays_are(name):
     record = ideal(30)
-    measured = NORMAL[name].measure(record, seed=5)
+    measured = NORMAL[name].measure(record, rng=5)
     loads = np.stack([record[c].values for c in CHANNELS], axis=-1)
     made = np.stack([measured[c].values for c in CHANNELS], axis=-1)
-    np.testing.assert_array_equal(made, NORMAL[name].simulate(loads, seed=5))
+    np.testing.assert_array_equal(made, NORMAL[name].simulate(loads, rng=5))
 
 
 def test_cross_talk_from_a_channel_that_is_missing_is_refused():
     partial = ideal(missing=("force_x",))
     with refused(ParameterError, "cross-talk", "holding_moment"):
-        cell(gain=GAIN).measure(partial, seed=1)
-    alone = cell(gain=np.diag([1.1, 1.2, 1.3])).measure(partial, seed=1)
+        cell(gain=GAIN).measure(partial, rng=1)
+    alone = cell(gain=np.diag([1.1, 1.2, 1.3])).measure(partial, rng=1)
     assert present_channels(alone) == ("holding_moment", "force_y")
     for sheet in (cell(gain=GAIN), cell(lever=(0.0, 0.1))):
         with refused(ParameterError, "cross-talk", "gain"):
@@ -168,13 +168,13 @@ def test_cross_talk_from_a_channel_that_is_missing_is_refused():
 
 def test_a_cell_that_turns_turns_the_record():
     sheet = cell(frame="turning", bias=(0.1, -0.2, 0.3), force_range=1.0, correlation=SHARED)
-    measured = sheet.measure(ideal(), seed=1)
+    measured = sheet.measure(ideal(), rng=1)
     turning = cell(bias=(0.1, -0.2, 0.3), force_range=1.0, correlation=SHARED)
-    assert measured.identical(turning.measure(in_frame(ideal(), "turning"), seed=1))
+    assert measured.identical(turning.measure(in_frame(ideal(), "turning"), rng=1))
     assert frame_of(measured) == "turning"
-    assert frame_of(cell(frame="fixed").measure(in_frame(ideal(), "turning"), seed=1)) == "fixed"
+    assert frame_of(cell(frame="fixed").measure(in_frame(ideal(), "turning"), rng=1)) == "fixed"
     with refused(RecordError, "force_x"):
-        sheet.measure(ideal(missing=("force_x",)), seed=1)
+        sheet.measure(ideal(missing=("force_x",)), rng=1)
     with refused(ParameterError, "fixed", "turning"):
         cell(frame="fixed", bias=(0.1, 0.0, 0.0)).corrected(measured)
 
@@ -185,7 +185,7 @@ def test_a_cell_that_turns_turns_the_record():
 def test_readings_of_the_encoder_go_back_but_the_rod_does_not():
     sheet = cell(drive_angle_offset=0.01, drive_angle_noise=0.005, drive_angle_resolution=0.0015)
     record = scan(paper_profile("II", q=0.5), drive_step=0.004).record
-    measured = sheet.measure(record, seed=1)
+    measured = sheet.measure(record, rng=1)
     for sweep, sense in ((0, 1), (1, -1)):
         own = record.sweep.values == sweep
         assert (sense * np.diff(measured.truth_drive_angle.values[own]) > 0).all()
@@ -195,7 +195,7 @@ def test_readings_of_the_encoder_go_back_but_the_rod_does_not():
         assert np.count_nonzero(np.diff(loaded.astype(int)) == -1) == 1
     np.testing.assert_array_equal(measured.truth_drive_angle, record.drive_angle)
     np.testing.assert_array_equal(measured.truth_force_y, record.force_y)
-    np.testing.assert_array_equal(measured.force_y, CELL.measure(record, seed=1).force_y)
+    np.testing.assert_array_equal(measured.force_y, CELL.measure(record, rng=1).force_y)
     off = measured.drive_angle - record.drive_angle - 0.01
     # Noise and rounding: a normal number and a uniform one; the test fails for one seed in a million.
     steps = np.linspace(-0.5, 0.5, 201)[:, None] * 0.0015
@@ -203,12 +203,12 @@ def test_readings_of_the_encoder_go_back_but_the_rod_does_not():
 
 
 def test_an_ideal_encoder_keeps_no_truth():
-    assert "truth_drive_angle" not in CELL.measure(ideal(), seed=1)
+    assert "truth_drive_angle" not in CELL.measure(ideal(), rng=1)
 
 
 def test_an_encoder_that_shows_no_sweep_is_refused():
     with refused(RecordError, "sweep 0", "'forward'"):
-        LoadCell(drive_angle_noise=1.0).measure(ideal(2), seed=13)
+        LoadCell(drive_angle_noise=1.0).measure(ideal(2), rng=13)
 
 
 # --- What is known, taken out again -----------------------------------------------------------------------------
@@ -220,7 +220,7 @@ def test_a_cell_beside_the_pivot_takes_the_moment_of_the_contact_force_there(fra
     """By equilibrium of the rod between the contact and the lever's end."""
     record = scan(Parabola(0.5 / rod.length, 0.5 * rod.length), drive_step=0.1, rig=Rig(rod=rod)).record
     lever = np.array([0.03, -0.02]) * rod.length
-    measured = LoadCell(lever=tuple(lever), frame=frame).measure(record, seed=1)
+    measured = LoadCell(lever=tuple(lever), frame=frame).measure(record, rng=1)
     cos, sin = np.cos(record.drive_angle.values), np.sin(record.drive_angle.values)
     x, y = lever if frame == "fixed" else (lever[0] * cos - lever[1] * sin, lever[0] * sin + lever[1] * cos)
     along, across = record.truth_contact_x - record.base_x - x, record.truth_contact_y - record.base_y - y
@@ -240,7 +240,7 @@ def test_step_2_of_a_record_with_known_errors_is_that_of_the_ideal_one(frame, ro
     further["moment_curve"] = (0.05 / unit[0], 0.02 / unit[0] ** 2)
     sheet = LoadCell(bias=bias, gain=gain, **further, frame=frame)
     clean = reconstruct(record)
-    measured = sheet.measure(record, seed=1)
+    measured = sheet.measure(record, rng=1)
     for given in (None, sheet):
         contacts = reconstruct(measured, rig=Rig(load_cell=given))
         # A sample whose load is rounding has no contact to speak of.
@@ -256,7 +256,7 @@ def test_step_2_of_a_record_with_known_errors_is_that_of_the_ideal_one(frame, ro
 def test_taking_out_leaves_noise_and_what_is_unknown():
     known = {"lever": (0.1, 0.2), "drive_angle_offset": 0.02, "drive_angle_backlash": 0.01}
     sheet = cell(bias=(0.1, -0.2, 0.3), gain=GAIN, bias_uncertainty=UNKNOWN, **known)
-    measured = sheet.measure(ideal(20), seed=1)
+    measured = sheet.measure(ideal(20), rng=1)
     before = measured.copy(deep=True)
     back = sheet.corrected(measured)
     assert measured.identical(before)
@@ -268,5 +268,5 @@ def test_taking_out_leaves_noise_and_what_is_unknown():
 
 
 def test_nothing_to_take_out_changes_nothing():
-    measured = cell(drift=WALK, bias_uncertainty=UNKNOWN).measure(ideal(), seed=1)
+    measured = cell(drift=WALK, bias_uncertainty=UNKNOWN).measure(ideal(), rng=1)
     assert cell(drift=WALK).corrected(measured) is measured

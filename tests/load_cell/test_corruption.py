@@ -15,7 +15,7 @@ LOADS = np.array([[0.0, 0.0, 0.0], [0.1, -0.2, 0.3], [0.4, 0.1, 1.0], [0.5, -0.5
 
 
 def replicates(sheet, seed, loads=LOADS, count=REPLICATES):
-    return sheet.simulate(np.broadcast_to(loads, (count, *loads.shape)), seed=seed)
+    return sheet.simulate(np.broadcast_to(loads, (count, *loads.shape)), rng=seed)
 
 
 def refuse_moments(sheet, made, loads=LOADS):
@@ -95,7 +95,7 @@ def test_drift_starts_from_nothing_or_stationary():
 
 
 def test_no_samples_are_none():
-    assert cell(drift=WALK, bias_uncertainty=UNKNOWN).simulate(np.empty((0, 3)), seed=1).shape == (0, 3)
+    assert cell(drift=WALK, bias_uncertainty=UNKNOWN).simulate(np.empty((0, 3)), rng=1).shape == (0, 3)
 
 
 # --- Range, then steps ------------------------------------------------------------------------------------------
@@ -105,7 +105,7 @@ def test_readings_are_cut_off_and_then_rounded():
     sheet = LoadCell(moment_range=1.0, moment_resolution=0.3, force_range=2.0, gain=GAIN, bias=(0.0, 0.0, 0.5))
     loads = np.array([[1.0, 0.0, 0.0], [-5.0, 0.0, 0.0], [0.2, 3.0, 1.6], [0.1, -2.5, -9.0]])
     expected = np.array([[0.9, -0.02, 0.5], [-0.9, 0.1, 0.5], [0.3, 2.0, 2.0], [0.0, -2.0, -2.0]])
-    np.testing.assert_allclose(sheet.simulate(loads, seed=1), expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(sheet.simulate(loads, rng=1), expected, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("further", [{}, {"degrees_of_freedom": 3.0}, {"correlation": SHARED, "drift": WALK}])
@@ -171,16 +171,16 @@ def test_an_encoder_with_backlash_reads_more_forward_than_backward():
 def test_a_factor_is_on_white_noise_only(name):
     sheet = NORMAL[name]
     loads = np.broadcast_to(LOADS, (3, N, 3))
-    one, two = (sheet.simulate(loads, seed=44, noise_scale=f) for f in ((1.0, 1.0, 1.0), [[1.0, 2.0, 3.0]] * 3))
-    none = sheet.simulate(loads, seed=44, noise_scale=1e-300)
+    one, two = (sheet.simulate(loads, rng=44, noise_scale=f) for f in ((1.0, 1.0, 1.0), [[1.0, 2.0, 3.0]] * 3))
+    none = sheet.simulate(loads, rng=44, noise_scale=1e-300)
     np.testing.assert_allclose(two - none, (one - none) * [1.0, 2.0, 3.0], rtol=0, atol=1e-14)
 
 
 def test_white_noise_is_the_same_whatever_else_there_is():
-    plain = CELL.simulate(LOADS, seed=45) - LOADS
+    plain = CELL.simulate(LOADS, rng=45) - LOADS
     further = cell(bias=(0.1, 0.2, 0.3), bias_uncertainty=UNKNOWN, drift=WALK)
     wandering = LoadCell(bias=(0.1, 0.2, 0.3), bias_uncertainty=UNKNOWN, drift=WALK)
-    both = [sheet.simulate(LOADS, seed=45) for sheet in (further, wandering)]
+    both = [sheet.simulate(LOADS, rng=45) for sheet in (further, wandering)]
     np.testing.assert_allclose(both[0] - both[1], plain, rtol=0, atol=1e-15)
 
 
@@ -188,19 +188,19 @@ def test_channels_that_are_missing_stay_missing():
     loads = LOADS.copy()
     loads[:, 1] = np.nan
     every = cell(drift=WALK, bias_uncertainty=UNKNOWN, correlation=SHARED, relative_noise=0.1, force_resolution=0.01)
-    made = every.simulate(loads, seed=46)
+    made = every.simulate(loads, rng=46)
     assert np.isnan(made).tolist() == [[False, True, False]] * N
-    np.testing.assert_array_equal(made[:, [0, 2]], every.simulate(LOADS, seed=46)[:, [0, 2]])
+    np.testing.assert_array_equal(made[:, [0, 2]], every.simulate(LOADS, rng=46)[:, [0, 2]])
 
 
 def test_loads_and_factors_that_do_not_fit_are_refused():
     for shape in ((3,), (4, 2), ()):
         with refused(ParameterError, "shape", shape):
-            CELL.simulate(np.zeros(shape), seed=1)
+            CELL.simulate(np.zeros(shape), rng=1)
     with refused(ParameterError, "noise_scale", -1.0):
-        CELL.simulate(LOADS, seed=1, noise_scale=-1.0)
-    assert CELL.simulate(LOADS, seed=1, noise_scale=np.ones((4, 3))).shape == (4, N, 3)
+        CELL.simulate(LOADS, rng=1, noise_scale=-1.0)
+    assert CELL.simulate(LOADS, rng=1, noise_scale=np.ones((4, 3))).shape == (4, N, 3)
     with refused(ParameterError, "noise_scale", "(4, 2)", "(3,)"):
-        CELL.simulate(LOADS, seed=1, noise_scale=np.ones((4, 2)))
-    with refused(ParameterError, "seed", "'1'"):
-        CELL.simulate(LOADS, seed="1")
+        CELL.simulate(LOADS, rng=1, noise_scale=np.ones((4, 2)))
+    with refused(ParameterError, "rng", "'1'"):
+        CELL.simulate(LOADS, rng="1")

@@ -48,14 +48,14 @@ def test_the_end_is_at_the_extremum_of_the_cubic():
 def test_a_saturated_sensor_reads_the_same_from_there_on():
     record = ideal()
     strong = record.assign(holding_moment=record.holding_moment * 100.0)
-    measured = LoadCell(moment_curve=(0.0, -1.0)).measure(strong, seed=1)
+    measured = LoadCell(moment_curve=(0.0, -1.0)).measure(strong, rng=1)
     assert float(measured.holding_moment.max()) == pytest.approx(2.0 / np.sqrt(27.0))
 
 
 def test_the_moment_alone_is_straightened():
     sheet = LoadCell(gain=((2.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), moment_curve=(0.3, 0.1))
     record = ideal(missing=("force_x", "force_y"))
-    measured = sheet.measure(record, seed=1)
+    measured = sheet.measure(record, rng=1)
     moment = record.holding_moment.values
     np.testing.assert_allclose(measured.holding_moment, 2.0 * (moment + 0.3 * moment**2 + 0.1 * moment**3), rtol=1e-14)
     np.testing.assert_allclose(sheet.corrected(measured).holding_moment, moment, rtol=1e-12, atol=1e-14)

@@ -128,7 +128,7 @@ def test_the_data_sheet_goes_with_the_record():
 @settings(max_examples=4, deadline=None)
 @given(sheet=load_cells(), rod=rods)
 def test_files_keep_the_data_sheet(tmp_path_factory, ending, sheet, rod):
-    measured = sheet.measure(ideal(20, rod=rod), seed=1)
+    measured = sheet.measure(ideal(20, rod=rod), rng=1)
     assert frame_of(measured) == (sheet.frame or "fixed")
     path = tmp_path_factory.mktemp("measured") / f"record.{ending}"
     write_record(measured, path)
@@ -142,7 +142,7 @@ def test_files_keep_the_data_sheet(tmp_path_factory, ending, sheet, rod):
 @pytest.mark.parametrize("ending", ["csv", "nc"])
 def test_a_lever_and_a_backlash_are_kept_with_their_units(tmp_path, ending):
     sheet, path = LoadCell(lever=(0.001, -0.002), drive_angle_backlash=-0.003), tmp_path / f"record.{ending}"
-    write_record(sheet.measure(ideal(20, rod=Rod(0.2, 2.4e-3)), seed=1), path)
+    write_record(sheet.measure(ideal(20, rod=Rod(0.2, 2.4e-3)), rng=1), path)
     assert LoadCell.from_record(read_record(path)) == sheet
     if ending == "csv":
         header = path.read_text(encoding="utf-8")
@@ -155,7 +155,7 @@ def test_a_lever_and_a_backlash_are_kept_with_their_units(tmp_path, ending):
 @pytest.mark.parametrize(("name", "value"), [("noise", 1e3), ("offset", 57.3)])
 def test_an_encoder_in_degrees_is_refused_where_it_measures(name, value):
     with refused(ParameterError, "encoder", "radians"):
-        LoadCell(**{f"drive_angle_{name}": value}).measure(ideal(), seed=1)
+        LoadCell(**{f"drive_angle_{name}": value}).measure(ideal(), rng=1)
 
 
 # --- Units ------------------------------------------------------------------------------------------------------
@@ -165,8 +165,8 @@ def test_an_encoder_in_degrees_is_refused_where_it_measures(name, value):
 @given(load_cells(), rods, st.integers(0, 2**31))
 def test_what_it_does_is_the_same_in_all_units(sheet, rod, seed):
     record = ideal(20, rod=rod)
-    si = sheet.measure(record, seed=seed)
-    dimensionless = sheet.dimensionless(rod).measure(to_dimensionless(record), seed=seed)
+    si = sheet.measure(record, rng=seed)
+    dimensionless = sheet.dimensionless(rod).measure(to_dimensionless(record), rng=seed)
     converted = to_dimensionless(si)
     assert set(converted.data_vars) == set(dimensionless.data_vars)
     for name in (*CHANNELS, "drive_angle"):
@@ -184,7 +184,7 @@ def entries_of(sheet):
 @given(load_cells(frames=(None,)), rods, st.integers(0, 2**31))
 def test_the_likelihood_is_the_same_in_all_units_but_for_their_jacobian(sheet, rod, seed):
     loads = np.random.default_rng(seed).normal(size=(4, 6, 3))
-    measured = sheet.simulate(loads[0], seed=seed)
+    measured = sheet.simulate(loads[0], rng=seed)
     units = rod.load_units
     try:
         si = sheet.log_likelihood(measured, loads, pointwise=True)

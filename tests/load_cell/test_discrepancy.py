@@ -180,8 +180,8 @@ def test_draws_have_the_covariance_of_the_likelihood():
 
 def test_readings_are_drawn_with_it_and_without_it_as_before():
     discrepancy, _, _, _, loads, _ = drawn(8)
-    plain = CELL.simulate(loads, seed=1)
-    smooth = CELL.simulate(loads, seed=1, discrepancy=discrepancy)
+    plain = CELL.simulate(loads, rng=1)
+    smooth = CELL.simulate(loads, rng=1, discrepancy=discrepancy)
     off = smooth - plain
     assert np.all(off[discrepancy.deviation == 0.0] == 0.0)
     assert np.all(off[discrepancy.deviation > 0.0] != 0.0)

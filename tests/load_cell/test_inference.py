@@ -29,8 +29,8 @@ def posterior_of(told: LoadCell | None):
     ideal = swept(Parabola(**TRUTH), step=float(np.radians(6.0)))
     loaded = ideal.isel(sample=np.flatnonzero(ideal.force_y.values))
     steps = {"force_resolution": 0.02, "moment_resolution": 0.01} if told is UNKNOWN_BIAS else {}
-    measured = replace(FLAWED, **steps).measure(loaded, seed=7)
-    return measured, infer_as_stated(measured, load_cell=told, seed=1, settings=QUICK)
+    measured = replace(FLAWED, **steps).measure(loaded, rng=7)
+    return measured, infer_as_stated(measured, load_cell=told, rng=1, settings=QUICK)
 
 
 def off_by(result):
@@ -100,7 +100,7 @@ def test_what_is_predicted_has_the_law_of_the_load_cell():
 
 
 def test_an_encoder_that_is_not_exact_beside_a_drift_is_refused():
-    record = CELL.measure(swept(Parabola(**TRUTH), step=0.2), seed=1)
+    record = CELL.measure(swept(Parabola(**TRUTH), step=0.2), rng=1)
     for further in ({"drift": WALK}, {"bias_uncertainty": (0.1, 0.0, 0.0)}):
         with refused(ParameterError, "drift", "bias_uncertainty"):
             RecordLikelihood(record, cell(drive_angle_noise=0.001, **further))
@@ -108,7 +108,7 @@ def test_an_encoder_that_is_not_exact_beside_a_drift_is_refused():
 
 def test_a_drift_goes_on_through_all_sweeps():
     """The likelihood of a record is that of its samples in their order, whatever the sweep segments."""
-    record = cell(drift=WALK).measure(swept(Parabola(**TRUTH), step=0.1), seed=1)
+    record = cell(drift=WALK).measure(swept(Parabola(**TRUTH), step=0.1), rng=1)
     likelihood = RecordLikelihood(record, cell(drift=WALK))
     contour = Parabola(*(np.array([value]) for value in TRUTH.values()))
     predicted, _ = likelihood.predict(contour)

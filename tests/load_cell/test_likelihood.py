@@ -286,7 +286,7 @@ def test_the_approximation_is_as_good_as_stated(step, stated, stated_ratio):
     for _ in range(300):
         loads = np.zeros((2, 10, 3))
         loads[..., 0] = rng.uniform(-3.0, 3.0, 10)
-        measured = sheet.simulate(loads[0], seed=rng)
+        measured = sheet.simulate(loads[0], rng=rng)
         measured[:, 1:] = np.nan
         loads[1, :, 0] += shift
         approximate = sheet.log_likelihood(measured, loads) + 10 * np.log(step)

@@ -173,7 +173,7 @@ def test_readings_are_as_frequent_as_they_are_likely(degrees_of_freedom):
     """Pearson's χ² over all readings that 50 000 samples gave; it fails for one seed in a million."""
     sheet = cell(moment_range=0.1, moment_resolution=0.02, degrees_of_freedom=degrees_of_freedom, bias=(0.01, 0.0, 0.0))
     n = 50_000
-    made = sheet.simulate(np.tile([0.05, 0.0, 0.0], (n, 1)), seed=4)[:, 0]
+    made = sheet.simulate(np.tile([0.05, 0.0, 0.0], (n, 1)), rng=4)[:, 0]
     readings = 0.02 * np.arange(-5, 6)
     counts = np.array([np.count_nonzero(np.abs(made - r) < 1e-9) for r in readings])
     assert counts.sum() == n

@@ -77,7 +77,7 @@ WHITE = {
 def test_where_noise_is_white_it_is_the_likelihood_of_the_load_cell(name):
     sheet = WHITE[name]
     _, loads = drawn(4)
-    readings = sheet.simulate(loads[0], seed=4)
+    readings = sheet.simulate(loads[0], rng=4)
     expected = sheet.log_likelihood(readings, loads, pointwise=True)
     np.testing.assert_array_equal(LoneSamples(sheet, readings).log_density(loads), expected)
 

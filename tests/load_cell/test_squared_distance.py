@@ -14,7 +14,7 @@ SAMPLES = 10
 def alarms(sheet, missing=()):
     """Which samples of records without load look loaded, shape (records, samples)."""
     walks = isinstance(sheet.drift, RandomWalk)
-    made = sheet.simulate(np.zeros((1_000 if walks else 10_000, SAMPLES, 3)), seed=51)
+    made = sheet.simulate(np.zeros((1_000 if walks else 10_000, SAMPLES, 3)), rng=51)
     made[..., list(missing)] = np.nan
     # Only what walks makes a difference between the first sample and others.
     together = made if walks else made.reshape(1, -1, 3)
@@ -87,7 +87,7 @@ def test_loads_beyond_all_bounds_are_far():
 def test_loaded_samples_of_a_record(sheet):
     record = ideal(40, holding_moment=[0.0] * 30 + [1.0] * 10, force_x=0.0, force_y=[0.0] * 30 + [2.0] * 10)
     for given in (None, sheet):
-        loaded = loaded_samples(sheet.measure(record, seed=53), given)
+        loaded = loaded_samples(sheet.measure(record, rng=53), given)
         assert loaded[30:].all()
         assert loaded[:30].sum() <= 2
 
@@ -95,4 +95,4 @@ def test_loaded_samples_of_a_record(sheet):
 def test_a_channel_that_never_moves_is_loaded_where_it_differs_from_its_bias():
     record = ideal(5, holding_moment=[0, 0, 1, 0, 0], force_x=0.0, force_y=0.0)
     for sheet in (LoadCell(bias=(0.1, 0.2, 0.3)), LoadCell(force_noise=0.05, bias=(0.1, 0.2, 0.3))):
-        assert loaded_samples(sheet.measure(record, seed=54)).tolist() == [False, False, True, False, False]
+        assert loaded_samples(sheet.measure(record, rng=54)).tolist() == [False, False, True, False, False]

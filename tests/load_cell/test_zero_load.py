@@ -140,7 +140,7 @@ def test_events_of_real_sweeps_are_bracketed(contour, step, noise):
     ideal = scan(contour, drive_step=np.radians(step)).record
     bias = (0.3, -2.0, 5.0)
     cell = LoadCell(force_noise=noise, moment_noise=0.4 * noise, bias=bias, drive_angle_noise=1e-3)
-    measured = cell.measure(ideal, seed=3)
+    measured = cell.measure(ideal, rng=3)
     found = zero_load(measured)
     assert found.contact.all()
     assert_bracketed(found, ideal)
@@ -239,7 +239,7 @@ def test_a_few_samples_tell_nothing(samples):
     "missing", [("holding_moment",), ("force_x", "force_y"), pytest.param(("force_y",), marks=pytest.mark.slow)]
 )
 def test_missing_channels_stay_missing(missing):
-    measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, rng=1)
     complete = zero_load(measured)
     for name in missing:
         measured[name][:] = np.nan
@@ -255,7 +255,7 @@ def test_missing_channels_stay_missing(missing):
 
 
 def test_without_noise_everything_is_exact():
-    ideal = LoadCell(bias=RIG.bias).measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    ideal = LoadCell(bias=RIG.bias).measure(scan(paper_profile("II", q=0.5)).record, rng=1)
     found = zero_load(ideal)
     for sweep in (0, 1):
         first, last = loaded_of(ideal, sweep)
@@ -280,7 +280,7 @@ def test_steps_are_seen_and_bound_what_is_known(noise):
     step, bias = 0.1, (0.037, -0.311, 0.049)
     cell = LoadCell(force_noise=noise, moment_noise=noise, bias=bias, force_resolution=step, moment_resolution=step)
     ideal = scan(paper_profile("II", q=0.5)).record
-    found = zero_load(cell.measure(ideal, seed=1))
+    found = zero_load(cell.measure(ideal, rng=1))
     np.testing.assert_allclose(found.resolution, step, rtol=1e-6)
     assert (found.noise >= step / np.sqrt(12.0) * (1.0 - 1e-9)).all()
     assert (found.noise < 1.5 * np.hypot(noise, step / np.sqrt(12.0)) + 0.5 * step * (noise < step)).all()
@@ -297,7 +297,7 @@ def test_outliers_leave_the_events_where_they_are():
     cell = LoadCell(force_noise=0.02, moment_noise=0.01, degrees_of_freedom=4.0)
     ideal = scan(paper_profile("II", q=0.5)).record
     for seed in range(10):
-        found = zero_load(cell.measure(ideal, seed=seed))
+        found = zero_load(cell.measure(ideal, rng=seed))
         assert (found.snap_off.values[:, 0] == [loaded_of(ideal, sweep)[1] for sweep in (0, 1)]).all()
         assert (found.unloaded.groupby(ideal.sweep).sum() > 20).all()
 
@@ -339,7 +339,7 @@ def test_a_zero_that_stays_is_not_said_to_move():
 
 def test_units_make_no_difference():
     rod = Rod(0.2, 2.4e-3)
-    measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, rng=1)
     cell, si = LoadCell.from_zero_load(measured), LoadCell.from_zero_load(to_si(measured, rod))
     np.testing.assert_allclose(si.dimensionless(rod).bias, cell.bias, rtol=1e-9)
     np.testing.assert_allclose(si.dimensionless(rod).noise, cell.noise, rtol=1e-9)
@@ -350,7 +350,7 @@ def test_units_make_no_difference():
 
 def test_a_turning_cell_has_its_bias_in_its_own_frame():
     turning = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.1, -0.3, 0.7), frame="turning")
-    measured = turning.measure(in_frame(scan(paper_profile("II", q=0.5)).record, "turning"), seed=1)
+    measured = turning.measure(in_frame(scan(paper_profile("II", q=0.5)).record, "turning"), rng=1)
     cell = LoadCell.from_zero_load(measured)
     assert cell.frame == "turning"
     assert (np.abs(np.subtract(cell.bias, turning.bias)) < 5.0 * np.array(cell.bias_uncertainty)).all()
@@ -367,7 +367,7 @@ def test_forces_share_their_noise_unless_they_differ():
 
 
 def test_samples_of_sweeps_may_be_mixed():
-    measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, rng=1)
     count = measured.sizes["sample"] // 2
     order = np.arange(2 * count).reshape(2, count).T.ravel()
     found, mixed = zero_load(measured), zero_load(measured.isel(sample=order))
@@ -388,7 +388,7 @@ def stopped(record, readings, between, seed):
     """A record with several readings at each angle, and noise of some deviations that is the same for all of them."""
     rng, cell = np.random.default_rng(seed), LoadCell(force_noise=0.05, moment_noise=0.02)
     held = record.isel(sample=np.repeat(np.arange(record.sizes["sample"]), readings))
-    measured = cell.measure(held, seed=rng)
+    measured = cell.measure(held, rng=rng)
     deviations = between * np.array(list(cell.standard_deviations.values()))
     common = np.repeat(rng.standard_normal((record.sizes["sample"], 3)) * deviations, readings, axis=0)
     angle = measured.drive_angle + 1e-3 * rng.standard_normal(measured.sizes["sample"])
@@ -419,7 +419,7 @@ def test_a_sweep_of_loaded_samples_alone_is_in_contact(steps, samples, part):
     loaded = np.flatnonzero((steps.truth_contact_phase.values != "none") & (steps.sweep.values == 0))
     begin = {"first": 0, "middle": (loaded.size - samples) // 2, "last": loaded.size - samples}[part]
     cropped = steps.isel(sample=loaded[begin : begin + samples])
-    found = zero_load(LoadCell(force_noise=0.02, moment_noise=0.008).measure(cropped, seed=1))
+    found = zero_load(LoadCell(force_noise=0.02, moment_noise=0.008).measure(cropped, rng=1))
     assert found.contact.all()
     assert not found.unloaded.any()
 

@@ -179,8 +179,8 @@ def test_points_without_noise_lie_on_the_arc_that_the_sweep_touched():
 
 def test_points_with_noise_are_those_of_step_two():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    ax = made(11, BACK, distances=[0.5], load_cell=cell, seed=3).axes[1]
-    measured = cell.measure(swept("II", 0.5, BACK).record, seed=3)
+    ax = made(11, BACK, distances=[0.5], load_cell=cell, rng=3).axes[1]
+    measured = cell.measure(swept("II", 0.5, BACK).record, rng=3)
     contacts = reconstruct(measured, rig=Rig(load_cell=cell))
     found = np.isfinite(contacts.contact_x.values)
     (line,) = (each for each in ax.lines if each.get_marker() == "^" and len(each.get_xdata()))

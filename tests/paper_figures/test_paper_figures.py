@@ -289,8 +289,8 @@ def test_points_without_noise_lie_on_the_contour_beside_the_gap(points):
 
 def test_points_with_noise_are_those_of_step_two():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    ax = made(11, distances=[0.5], load_cell=cell, seed=3, drive_step=COARSER).axes[1]
-    measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=COARSER).record, seed=3)
+    ax = made(11, distances=[0.5], load_cell=cell, rng=3, drive_step=COARSER).axes[1]
+    measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=COARSER).record, rng=3)
     contacts = reconstruct(measured, rig=Rig(load_cell=cell))
     forward = (contacts.direction.values == "forward") & np.isfinite(contacts.contact_x.values)
     x, y = points_of(ax, "o")
@@ -307,7 +307,7 @@ def test_captions_say_what_was_chosen():
         "q = 0.3, 0.4, 0.5, 0.6 L."
     )
     assert "without noise" in caption(11)
-    assert "noise (seed 7)" in caption(11, load_cell=LoadCell(force_noise=0.1, moment_noise=0.1), seed=7)
+    assert "noise (seed 7)" in caption(11, load_cell=LoadCell(force_noise=0.1, moment_noise=0.1), rng=7)
 
 
 def test_files_are_named_by_number_and_carry_their_caption(tmp_path):

@@ -138,7 +138,7 @@ def test_standard_deviations_are_those_of_noise_that_is_drawn(name):
     every = np.arange(0, count, 3)
     record, grown = record.isel(sample=every), grown.isel(sample=every)
     cell = replace(plan.cell, bias=(0.0, 0.0, 0.0), gain=tb.LoadCell().gain)
-    noise = cell.simulate(np.zeros((draws, every.size, 3)), seed=rng).reshape(-1, 3)
+    noise = cell.simulate(np.zeros((draws, every.size, 3)), rng=rng).reshape(-1, 3)
     many = record.isel(sample=np.tile(np.arange(every.size), draws))
     noisy = {name: many[name] + noise[:, k] for k, name in enumerate(tb.record.CHANNELS)}
     noisy["drive_angle"] = many.drive_angle + cell.drive_angle_noise * rng.standard_normal(noise.shape[0])

@@ -53,19 +53,19 @@ def test_distances_are_along_the_drive():
 
 
 def test_noise_shares_are_of_either_kind_of_drive():
-    shares = noise_shares(Plan(CIRCLE, Rig(load_cell=CELL), drive=SHIFTS), seed=1, samples=16, states=4)
+    shares = noise_shares(Plan(CIRCLE, Rig(load_cell=CELL), drive=SHIFTS), rng=1, samples=16, states=4)
     assert shares.sizes["sample"] == 8
     assert np.all(shares.after_first_contact >= 0.0)
     with refused(ParameterError, "noise_shares"):
-        noise_shares(Plan(CIRCLE, Rig(load_cell=CELL), drive=[tb.Rotation(), SHIFTS[0]]), seed=1, samples=16, states=4)
+        noise_shares(Plan(CIRCLE, Rig(load_cell=CELL), drive=[tb.Rotation(), SHIFTS[0]]), rng=1, samples=16, states=4)
 
 
 @pytest.mark.parametrize("drive", [SHIFTS, [tb.Rotation(), SHIFTS[0]]])
 def test_sensitivity_tells_what_a_band_would_be(drive):
-    found = tb.sensitivity(CIRCLE, seed=1, drive=drive, parts=["information", "required_noise"])
+    found = tb.sensitivity(CIRCLE, rng=1, drive=drive, parts=["information", "required_noise"])
     bounds = found["information"].bound
     assert np.all(np.isfinite(bounds.sel(parameter=["r", "q", "x_c"])))
-    both = tb.sensitivity(CIRCLE, seed=1, drive=[*drive, SHIFTS[1]], parts=["information"])["information"].bound
+    both = tb.sensitivity(CIRCLE, rng=1, drive=[*drive, SHIFTS[1]], parts=["information"])["information"].bound
     assert np.all(both.sel(parameter=["r", "q", "x_c"]) <= bounds.sel(parameter=["r", "q", "x_c"]) + 1e-12)
 
 
@@ -73,7 +73,7 @@ def test_sensitivity_tells_what_a_band_would_be(drive):
 def test_drives_are_candidates_of_a_design():
     """Two translations tell more than one of them, and a pivot among drives is what it is among pivots."""
     known = tb.Family("circle", r=stats.uniform(0.25, 0.1), q=stats.uniform(0.75, 0.1), x_c=stats.norm(0.0, 0.02))
-    options = {"draws": 4, "seed": 1, "criterion": Criterion(span=(-0.2, 0.2))}
+    options = {"draws": 4, "rng": 1, "criterion": Criterion(span=(-0.2, 0.2))}
     found = tb.design(known, drives=[SHIFTS[0], SHIFTS, tb.Rotation()], **options)
     assert found.drive.values[0] == "carried from (0.8, 0) to (-0.8, 0) at 63°"
     assert found.width[1] < found.width[0]
@@ -87,12 +87,12 @@ def test_drives_are_candidates_of_a_design():
 @pytest.mark.slow
 def test_a_posterior_of_a_carried_rod_is_what_is_known():
     """Its drive is none of the pivots so far, and what it touched leaves no gap."""
-    measured = CELL.measure(tb.scan(CIRCLE, drive=replace(SHIFTS[0], drive_step=0.04)).record, seed=1)
+    measured = CELL.measure(tb.scan(CIRCLE, drive=replace(SHIFTS[0], drive_step=0.04)).record, rng=1)
     settings = tb.SamplerSettings(walkers=32, ensembles=2)
     posterior = tb.infer_contour(
-        measured, family="circle", rig=Rig(load_cell=CELL, unknown="nothing"), seed=1, settings=settings
+        measured, family="circle", rig=Rig(load_cell=CELL, unknown="nothing"), rng=1, settings=settings
     )
-    found = tb.design(posterior, drives=[tb.Rotation(), SHIFTS[1]], draws=4, seed=1)
+    found = tb.design(posterior, drives=[tb.Rotation(), SHIFTS[1]], draws=4, rng=1)
     assert found.sizes["pivot"] == 0
     assert np.all(found.width < found.present_width)
     assert np.all(found.gap == 0.0)

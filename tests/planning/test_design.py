@@ -39,19 +39,19 @@ def pivots(*bases, step=2.5 * STEP):
 
 
 def designed(known=FAMILY, **options):
-    asked = {"drives": pivots((0.0, 0.0), (0.2, 0.0)), "draws": 3, "seed": 1}
+    asked = {"drives": pivots((0.0, 0.0), (0.2, 0.0)), "draws": 3, "rng": 1}
     own = {} if isinstance(known, xr.DataTree) else {"rig": AS_STATED}
     return design(known, **(asked | own | options))
 
 
 @pytest.fixture(scope="module")
 def measured():
-    return CELL.measure(scan(Parabola(0.5, q=0.5), drive_step=STEP).record, seed=1)
+    return CELL.measure(scan(Parabola(0.5, q=0.5), drive_step=STEP).record, rng=1)
 
 
 @pytest.fixture(scope="module")
 def posterior(measured):
-    return infer_contour(measured, rig=Rig(load_cell=CELL, unknown="nothing"), seed=1, settings=QUICK)
+    return infer_contour(measured, rig=Rig(load_cell=CELL, unknown="nothing"), rng=1, settings=QUICK)
 
 
 def known():
@@ -220,7 +220,7 @@ def test_a_posterior_is_known_by_its_own_rig(posterior):
 def test_what_a_posterior_knows_of_rig_and_contour_is_known(measured):
     rig = Rig(load_cell=CELL, unknown={**NOTHING, "friction": 0.1, "moment_bias": "default", "noise_scale": 1.0})
     known = Family("parabola", q=0.5, a=stats.norm(0.5, 0.1))
-    posterior = infer_contour(measured, family=known, rig=rig, seed=1, settings=QUICK)
+    posterior = infer_contour(measured, family=known, rig=rig, rng=1, settings=QUICK)
     told = known_from_posterior(posterior, draws=5, rng=np.random.default_rng(1))
     assert told.experiment.model.names == ("a", "x_c", "moment_bias")
     assert dict(told.experiment.own_family.known) == {"q": 0.5}
@@ -261,7 +261,7 @@ def test_weighted_bands():
     [
         {"criterion": "best"},
         {"draws": 1},
-        {"seed": -1},
+        {"rng": -1},
         {"drives": []},
         {"drives": pivots((0.0, 0.0), (0.0, 0.0))},
         {"drives": Rotation()},

@@ -12,21 +12,20 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, StudyError
-from tactile_bayes.planning import error_map as module
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.bands import Bands
 from tactile_bayes.planning.error_cell import CellOutcome
-from tactile_bayes.planning.error_map import CELLS, error_map
+from tactile_bayes.planning.error_map import CELLS, _identity, error_map
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.tasks import Workers
+from tactile_bayes.tasks import Workers, open_results_store
 
 SMALL = {
     "contours": ["II"],
     "over": {"noise_factor": [1.0], "distance": [0.4, 0.5]},
     "replicates": 2,
-    "seed": 3,
+    "rng": 3,
     "drive": tb.Rotation(drive_step=0.1),
     "rig": Rig(unknown="nothing"),
     "workers": 1,
@@ -45,7 +44,7 @@ def test_cells_are_the_same_for_any_number_of_workers():
 
 def test_another_seed_draws_other_noise_and_expects_the_same():
     over = {"noise_factor": [1.0], "distance": [0.4]}
-    other, nearer = error_map(**{**SMALL, "seed": 4, "over": over}), small().sel(distance=[0.4])
+    other, nearer = error_map(**{**SMALL, "rng": 4, "over": over}), small().sel(distance=[0.4])
     drawn = "rms_along"
     assert np.all(other[drawn].values != nearer[drawn].values)
     np.testing.assert_array_equal(other.expected_gap_width.values, nearer.expected_gap_width.values)
@@ -67,14 +66,13 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         error_map(**{**SMALL, "workers": Workers(1, kill)}, out=tmp_path)
     rows = json.loads((tmp_path / "cells.json").read_text(encoding="utf-8"))["cells"]
     assert [row["number"] for row in rows] == [0]
-    made, seen = [], []
+    made, seen, original = [], [], error_map.__globals__["error_cell"]
 
     def counted(task):
         made.append(task[1])
         return original(task)
 
-    original = module.error_cell
-    monkeypatch.setattr(module, "error_cell", counted)
+    monkeypatch.setitem(error_map.__globals__, "error_cell", counted)
     found = error_map(**{**SMALL, "workers": Workers(1, seen.append)}, out=tmp_path)
     assert made == [1]
     assert [(p.done, p.wanted, p.made) for p in seen] == [(2, 2, 1)]
@@ -87,7 +85,7 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "other",
     [
-        {"seed": 4},
+        {"rng": 4},
         {"replicates": 3},
         {"over": {**SMALL["over"], "noise_factor": [2.0]}},
         {"contours": {"II": Parabola(0.6, 0.5)}},
@@ -101,7 +99,7 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
 )
 def test_the_folder_of_another_study_is_refused(tmp_path_factory, other):
     folder = tmp_path_factory.mktemp("study")
-    with module.open_results_store(module._identity(task_of(SMALL)), folder, CELLS) as store:
+    with open_results_store(_identity(task_of(SMALL)), folder, CELLS) as store:
         store.outcomes[0] = CellOutcome({"gap_width": 0.1}, "ok")
     before = (folder / "cells.json").read_bytes()
     with refused(StudyError, "another experiment", "there", "here"):
@@ -118,16 +116,16 @@ def task_of(options):
         return {number: CellOutcome({}, "not made") for number in range(count)}
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "keep_outcomes", keep)
+        patch.setitem(error_map.__globals__, "keep_outcomes", keep)
         error_map(**options)
     return kept["task"]
 
 
 def test_an_outcome_comes_back_from_its_row(tmp_path):
     outcome = CellOutcome({"gap_width": 0.1 + 0.2, "posterior_gap_width": np.nan}, "ok")
-    with module.open_results_store({}, tmp_path, CELLS) as store:
+    with open_results_store({}, tmp_path, CELLS) as store:
         store.outcomes[0] = outcome
-    with module.open_results_store({}, tmp_path, CELLS) as store:
+    with open_results_store({}, tmp_path, CELLS) as store:
         back = store.outcomes[0]
     assert back.message == "ok"
     assert back.numbers["gap_width"] == 0.1 + 0.2
@@ -148,7 +146,7 @@ def test_first_order_is_what_small_noise_gives():
         over={"noise_factor": [0.01]},
         replicates=replicates,
         drive=tb.Rotation(drive_step=step),
-        seed=1,
+        rng=1,
         workers=1,
         rig=Rig(unknown="nothing"),
     ).squeeze()
@@ -174,7 +172,7 @@ def test_first_order_is_not_what_large_noise_gives():
         over={"noise_factor": [0.01, 100.0]},
         replicates=3,
         drive=tb.Rotation(drive_step=0.1),
-        seed=1,
+        rng=1,
         workers=1,
         rig=Rig(unknown="nothing"),
     ).squeeze()
@@ -258,7 +256,7 @@ def test_bad_axes_are_refused(axis, numbers):
         {"contours": []},
         {"replicates": 0},
         {"replicates": 2.0},
-        {"seed": -1},
+        {"rng": -1},
         {"rig": "bias"},
         {"drive": None},
         {"drive": tb.Rotation((0.0, 0.1))},

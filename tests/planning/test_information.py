@@ -66,7 +66,9 @@ def swept(a, q, x_c, less, direction):
 def readings(plan, values, by_angle=0.0):
     """What the plan's cell would read, by `scan`: shape (samples, 3)."""
     of = dict(zip(plan.model.forward_parameters, map(float, values), strict=True))
-    loads, angles = swept(of["a"], of["q"], of["x_c"], of.get("drive_angle_offset", 0.0) - by_angle, plan.drive.direction)
+    loads, angles = swept(
+        of["a"], of["q"], of["x_c"], of.get("drive_angle_offset", 0.0) - by_angle, plan.drive.direction
+    )
     if plan.cell.frame == "turning":
         cos, sin = np.cos(angles), np.sin(angles)
         moment, x, y = loads.T
@@ -449,8 +451,8 @@ def posterior_ratios(factor, seed):
     """
     louder = DOUBLE.with_noise(factor)
     plan = replace(louder, rig=louder.rig.with_unknown(friction=0.0))
-    measured = plan.cell.measure(plan.scan.record, seed=seed)
-    posterior = tb.infer_contour(measured, rig=plan.rig, seed=seed, settings=SETTINGS)
+    measured = plan.cell.measure(plan.scan.record, rng=seed)
+    posterior = tb.infer_contour(measured, rig=plan.rig, rng=seed, settings=SETTINGS)
     bounds = information(plan).bound_with_priors
     draws = posterior["posterior"].to_dataset()
     # The posterior is as wide as the noise that it finds, which is off by some 3 % in a record of 600 readings.

@@ -57,7 +57,7 @@ def test_indices_of_known_functions():
 def test_indices_of_normal_and_outlying_numbers():
     """Of a linear function: shares of the variances. Squares of Student's t converge slowly: to 0.03 for ν = 10."""
     laws = [stats.norm(0.0, 2.0), stats.t(10.0, scale=1.0)]
-    first, total = first_and_total(lambda x: (x[0] - x[1])[None], laws, 4096, seed=1)
+    first, total = first_and_total(lambda x: (x[0] - x[1])[None], laws, 4096, rng=1)
     variances = np.array([4.0, 10.0 / 8.0])
     np.testing.assert_allclose(first[0], variances / variances.sum(), atol=0.03)
     np.testing.assert_allclose(total[0], variances / variances.sum(), atol=0.03)
@@ -65,7 +65,7 @@ def test_indices_of_normal_and_outlying_numbers():
 
 def test_shares_at_small_noise_are_those_of_first_order():
     """Of a linear function with the gains for slopes, by the same random numbers: bends are of the order of 1e-5."""
-    found = noise_shares(QUIET, seed=1, samples=64, states=3)
+    found = noise_shares(QUIET, rng=1, samples=64, states=3)
     grown = amplification(QUIET.at_angles(found.drive_angle.values))
     keys = list(zip(grown.sweep.values, grown.drive_angle.values, strict=True))
     where = [keys.index(key) for key in zip(found.sweep.values, found.drive_angle.values, strict=True)]
@@ -89,16 +89,16 @@ def test_shares_do_not_depend_on_the_unit():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     cell = tb.LoadCell(force_noise=5e-6 * rod.force_unit, moment_noise=2e-6 * rod.moment_unit, drive_angle_noise=2e-6)
     si = noise_shares(
-        Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod)), seed=1, samples=64, states=2, methods=("raw",)
+        Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod)), rng=1, samples=64, states=2, methods=("raw",)
     )
-    plain = noise_shares(QUIET, seed=1, samples=64, states=2, methods=("raw",))
+    plain = noise_shares(QUIET, rng=1, samples=64, states=2, methods=("raw",))
     np.testing.assert_allclose(si.share.values, plain.share.values, rtol=0.0, atol=1e-4)
     np.testing.assert_allclose(si.rms_error.values, 0.2 * plain.rms_error.values, rtol=1e-4)
     assert si.rms_error.attrs["units"] == "m"
 
 
 def test_first_order_fails_at_large_noise_and_this_says_so():
-    found = noise_shares(Plan(PROFILE).with_noise(10.0), seed=1, samples=64, states=4, methods=("raw",))
+    found = noise_shares(Plan(PROFILE).with_noise(10.0), rng=1, samples=64, states=4, methods=("raw",))
     assert found.without_answer.values.max() > 0.05
     lost = found.without_answer.values > 0.0
     assert np.isnan(found.share.values[lost]).all()
@@ -107,14 +107,14 @@ def test_first_order_fails_at_large_noise_and_this_says_so():
 
 def test_a_noise_of_zero_is_left_out():
     cell = replace(QUIET.cell, drive_angle_noise=0.0)
-    found = noise_shares(replace(QUIET, rig=Rig(load_cell=cell)), seed=1, samples=128, states=2, methods=("raw",))
+    found = noise_shares(replace(QUIET, rig=Rig(load_cell=cell)), rng=1, samples=128, states=2, methods=("raw",))
     assert list(found.source.values) == ["holding_moment", "force_x", "force_y"]
     # Of additive noises, shares sum to one: but for the estimators' scatter, three times 0.02.
     np.testing.assert_allclose(found.share.sum("source").values, 1.0, atol=0.06)
 
 
 def test_places_are_evenly_within_the_sweeps():
-    found = noise_shares(QUIET, seed=1, samples=4, states=6, methods=("raw",))
+    found = noise_shares(QUIET, rng=1, samples=4, states=6, methods=("raw",))
     assert found.sizes["sample"] == 12
     for k, sweep in enumerate(QUIET.scan.sweeps):
         of = found.sweep.values == k
@@ -125,7 +125,7 @@ def test_places_are_evenly_within_the_sweeps():
 
 def test_the_same_seed_gives_the_same_and_another_one_not():
     def made(seed):
-        return noise_shares(QUIET, seed=seed, samples=16, states=2, methods=("raw",)).share.values
+        return noise_shares(QUIET, rng=seed, samples=16, states=2, methods=("raw",)).share.values
 
     np.testing.assert_array_equal(made(1), made(1))
     assert np.any(made(1) != made(2))
@@ -134,10 +134,10 @@ def test_the_same_seed_gives_the_same_and_another_one_not():
 @pytest.mark.parametrize("samples", [1000, 1, 0, -4, 64.0, True, "64"])
 def test_samples_that_are_no_power_of_two_are_refused(samples):
     with refused(ParameterError, samples=samples):
-        noise_shares(QUIET, seed=1, samples=samples)
+        noise_shares(QUIET, rng=1, samples=samples)
 
 
 @pytest.mark.parametrize("states", [1, 0, 2.0, True])
 def test_too_few_states_are_refused(states):
     with refused(ParameterError, states=states):
-        noise_shares(QUIET, seed=1, samples=16, states=states)
+        noise_shares(QUIET, rng=1, samples=16, states=states)

@@ -264,7 +264,7 @@ def test_whitened_slopes_have_the_products_of_the_dense_covariance(name, present
 def test_errors_that_are_drawn_become_independent():
     """Covariance of 20000 records: every entry within five standard errors of the identity's, of 231 in all."""
     cell = replace(SHARED["all"], drive_angle_noise=0.0)
-    draws = cell.simulate(np.zeros((20000, SAMPLES, 3)), seed=1)
+    draws = cell.simulate(np.zeros((20000, SAMPLES, 3)), rng=1)
     white = whitening(cell, np.zeros((SAMPLES, 3)), np.zeros((SAMPLES, 3)), np.ones(3, dtype=bool))
     flat = white(np.moveaxis(draws, 0, -1)).reshape(3 * SAMPLES, -1)
     error = 5.0 * np.sqrt((1.0 + np.eye(3 * SAMPLES)) / 20000)

@@ -15,13 +15,13 @@ SO_FAR = 40
 @pytest.fixture(scope="module")
 def measured():
     scan = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.05)
-    return CELL.measure(scan.record, seed=1)
+    return CELL.measure(scan.record, rng=1)
 
 
 @pytest.fixture(scope="module")
 def stream(measured):
     stream = tb.Stream(
-        rig=Rig(load_cell=CELL, unknown={**NOTHING, "force_x_bias": "default"}), seed=1, particles=500, x=X
+        rig=Rig(load_cell=CELL, unknown={**NOTHING, "force_x_bias": "default"}), rng=1, particles=500, x=X
     )
     stream.update(measured.isel(sample=slice(0, SO_FAR)))
     return stream
@@ -34,10 +34,10 @@ def width(now):
 @pytest.mark.slow
 def test_it_is_what_the_rest_then_adds(measured, stream):
     end = int((measured.direction == "forward").sum())
-    rest = tb.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, seed=1)
+    rest = tb.planning.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, rng=1)
     np.testing.assert_allclose(rest.present_width, width(stream.latest()), rtol=0.15)
     whole = tb.Stream(
-        rig=Rig(load_cell=CELL, unknown={**NOTHING, "force_x_bias": "default"}), seed=1, particles=500, x=X
+        rig=Rig(load_cell=CELL, unknown={**NOTHING, "force_x_bias": "default"}), rng=1, particles=500, x=X
     )
     np.testing.assert_allclose(rest.width, width(whole.update(measured.isel(sample=slice(0, end)))), rtol=0.3)
     assert np.all(rest.width < 0.5 * rest.present_width)
@@ -47,7 +47,8 @@ def test_it_is_what_the_rest_then_adds(measured, stream):
 @pytest.mark.slow
 def test_fewer_samples_add_less(measured, stream):
     few, more = (
-        tb.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, seed=1).width for end in (44, 56)
+        tb.planning.rest_of_sweep(stream.posterior(), measured.drive_angle[SO_FAR:end], X, rng=1).width
+        for end in (44, 56)
     )
     assert np.all(more < few)
 
@@ -55,7 +56,7 @@ def test_fewer_samples_add_less(measured, stream):
 @pytest.mark.slow
 def test_no_more_draws_are_taken_than_there_are(measured, stream):
     angles = measured.drive_angle[SO_FAR:44]
-    every, more = (tb.rest_of_sweep(stream.posterior(), angles, X, seed=1, draws=count) for count in (500, 600))
+    every, more = (tb.planning.rest_of_sweep(stream.posterior(), angles, X, rng=1, draws=count) for count in (500, 600))
     np.testing.assert_allclose(more.width, every.width, rtol=1e-12)
     np.testing.assert_allclose(more.width_error, every.width_error, rtol=1e-12)
 
@@ -63,4 +64,4 @@ def test_no_more_draws_are_taken_than_there_are(measured, stream):
 @pytest.mark.parametrize("angles", [[0.1, 0.2], [np.nan], "all"])
 def test_angles_that_cannot_come_are_refused(stream, angles):
     with pytest.raises(ParameterError):
-        tb.rest_of_sweep(stream.posterior(), angles, X, seed=1)
+        tb.planning.rest_of_sweep(stream.posterior(), angles, X, rng=1)

@@ -26,12 +26,12 @@ STEP = 0.1
 
 @cache
 def plain():
-    return tb.sensitivity(seed=1, samples=4, drive=tb.Rotation(drive_step=STEP))
+    return tb.sensitivity(rng=1, samples=4, drive=tb.Rotation(drive_step=STEP))
 
 
 @cache
 def in_si():
-    return tb.sensitivity(seed=1, samples=4, drive=tb.Rotation(drive_step=STEP), rig=Rig(rod=ROD))
+    return tb.sensitivity(rng=1, samples=4, drive=tb.Rotation(drive_step=STEP), rig=Rig(rod=ROD))
 
 
 def words(tree):
@@ -45,7 +45,7 @@ def test_the_groups_are_those_of_single_analyses():
     singly = {
         "amplification": amplification(plan),
         "information": information(plan),
-        "noise_shares": noise_shares(plan, seed=1, samples=4),
+        "noise_shares": noise_shares(plan, rng=1, samples=4),
         "required_noise": required_noise(plan, [0.0005, 0.001, 0.0025, 0.005, 0.01]),
     }
     for name, right in singly.items():
@@ -99,7 +99,7 @@ def test_words_name_the_channel_that_is_missed_most():
 
 
 def test_only_what_is_asked_for_is_made():
-    tree = sensitivity(seed=1, parts=["required_noise"], band_widths=[0.002])
+    tree = sensitivity(rng=1, parts=["required_noise"], band_widths=[0.002])
     assert set(tree.children) == {"required_noise"}
     assert [line[:11] for line in words(tree)] == ["A mean band"]
     needed = tree["required_noise"]
@@ -117,40 +117,40 @@ def test_an_answer_can_be_written_and_read(tmp_path):
 
 
 def test_a_wide_band_is_what_priors_give():
-    tree = sensitivity(seed=1, parts=["required_noise"], band_widths=[100.0])
+    tree = sensitivity(rng=1, parts=["required_noise"], band_widths=[100.0])
     assert words(tree) == ["A mean band of 100 L follows from the priors without any record."]
 
 
 def test_where_first_order_does_not_hold_the_words_say_so():
     loud = tb.LoadCell(force_noise=50.0, moment_noise=20.0)
-    tree = sensitivity(seed=1, parts=["amplification"], rig=Rig(load_cell=loud))
+    tree = sensitivity(rng=1, parts=["amplification"], rig=Rig(load_cell=loud))
     assert "First order holds for no raw contact point at this noise." in words(tree)
 
 
 @pytest.mark.parametrize("parts", [["informations"], "information", [], ["information", "gap"]])
 def test_parts_that_are_none_are_refused(parts):
     with refused(ParameterError, parts=parts):
-        sensitivity(seed=1, parts=parts)
+        sensitivity(rng=1, parts=parts)
 
 
 def test_a_channel_without_noise_is_refused_by_name():
     with refused(ParameterError, "force_x, force_y"):
-        sensitivity(seed=1, rig=Rig(load_cell=tb.LoadCell(moment_noise=0.02)))
+        sensitivity(rng=1, rig=Rig(load_cell=tb.LoadCell(moment_noise=0.02)))
 
 
 def test_a_contour_of_no_family_is_refused_with_the_correction():
     x = np.linspace(-1.0, 1.0, 41)
     for parts in (PARTS, ["information"]):
         with refused(ParameterError, "family", "parabola, circle, ellipse"):
-            sensitivity(tb.contours.from_points(x, 0.5 * x**2 + 0.5), seed=1, parts=parts)
+            sensitivity(tb.contours.from_points(x, 0.5 * x**2 + 0.5), rng=1, parts=parts)
 
 
 def test_a_contour_out_of_reach_is_refused():
     with refused(ReachError, "out of reach"):
-        sensitivity(Parabola(0.5, 1.5), seed=1)
+        sensitivity(Parabola(0.5, 1.5), rng=1)
 
 
 def test_one_sweep_has_no_gap_to_speak_of():
-    tree = sensitivity(PROFILE, seed=1, drive=tb.Rotation(direction="backward", drive_step=STEP), parts=["information"])
+    tree = sensitivity(PROFILE, rng=1, drive=tb.Rotation(direction="backward", drive_step=STEP), parts=["information"])
     (line,) = [line for line in words(tree) if "expected width" in line]
     assert "gap" not in line

@@ -21,7 +21,7 @@ BRIEF = SamplerSettings(ensembles=2, max_steps=20)
 
 @pytest.fixture(scope="module")
 def posterior(measured):
-    return infer_contour(measured, family="parabola", rig=Rig(unknown="nothing"), seed=1, settings=BRIEF)
+    return infer_contour(measured, family="parabola", rig=Rig(unknown="nothing"), rng=1, settings=BRIEF)
 
 
 def title(ax):

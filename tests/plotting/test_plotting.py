@@ -43,7 +43,7 @@ def si():
 
 @pytest.fixture(scope="module")
 def noisy(plain):
-    return LoadCell(force_noise=0.05, moment_noise=0.02).measure(plain.record, seed=1)
+    return LoadCell(force_noise=0.05, moment_noise=0.02).measure(plain.record, rng=1)
 
 
 @pytest.fixture(scope="module")

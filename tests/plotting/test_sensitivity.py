@@ -8,8 +8,9 @@ from matplotlib.colors import same_color
 
 from helpers.pictures import labels, texts
 from helpers.refusals import refused
-from tactile_bayes import LoadCell, Rig, Rod, error_map, plotting, sensitivity
+from tactile_bayes import LoadCell, Rig, Rod, plotting, sensitivity
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.planning import error_map
 from tactile_bayes.plotting.sweep_plans import METHOD_COLOURS, READING_COLOURS
 from tactile_bayes.sweep import Rotation
 
@@ -18,14 +19,14 @@ ROD = Rod(0.1, 1e-5)
 
 @pytest.fixture(scope="module")
 def found():
-    return sensitivity(seed=1, drive=Rotation(drive_step=0.1), samples=8)
+    return sensitivity(rng=1, drive=Rotation(drive_step=0.1), samples=8)
 
 
 @pytest.fixture(scope="module")
 def in_si():
     cell = LoadCell(force_noise=2e-5, moment_noise=1e-6)
     return sensitivity(
-        seed=1,
+        rng=1,
         rig=Rig(rod=ROD, load_cell=cell, unknown="nothing"),
         drive=Rotation(drive_step=0.2),
         parts=["information", "required_noise"],
@@ -35,7 +36,7 @@ def in_si():
 @pytest.fixture(scope="module")
 def study():
     """Profile II at three distances, of which the last is out of reach."""
-    options = {"noise_factors": [1.0, 0.1], "replicates": 1, "seed": 1, "workers": 1, "drive_step": 0.2}
+    options = {"noise_factors": [1.0, 0.1], "replicates": 1, "rng": 1, "workers": 1, "drive_step": 0.2}
     return error_map(["II"], distances=[0.4, 0.8, 1.5], rig=Rig(unknown="nothing"), **options)
 
 

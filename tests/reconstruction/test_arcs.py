@@ -109,7 +109,7 @@ def test_misfits_are_those_of_noise_and_tell_of_a_rod_that_is_curved(with_rest_c
     """False alarms: 1 in 1000 of each number."""
     made = swept(curvature)
     cell = cell_of(made.rod, 0.3)
-    measured = cell.measure(made.record, seed=1)
+    measured = cell.measure(made.record, rng=1)
     known = {"method": "constrained", "rig": Rig(load_cell=cell, unknown={"friction": FRICTION})}
     with_rest_curvature(Rod())
     straight = reconstruct(measured, **known)
@@ -130,10 +130,10 @@ def test_contact_posteriors_are_near_the_constrained_contacts(with_rest_curvatur
     """Where errors are small; the mean of 1000 draws is near the most likely contact, and so is their spread."""
     made = swept(-0.7)
     cell = cell_of(made.rod, 0.1)
-    measured = cell.measure(made.record.isel(sample=slice(None, None, 12)), seed=2)
+    measured = cell.measure(made.record.isel(sample=slice(None, None, 12)), rng=2)
     with_rest_curvature(made.rod)
     fitted = reconstruct(measured, method="constrained", rig=Rig(load_cell=cell, unknown={"friction": FRICTION}))
-    tree = infer_contacts(measured, rig=Rig(load_cell=cell, unknown={"friction": FRICTION}), seed=1)
+    tree = infer_contacts(measured, rig=Rig(load_cell=cell, unknown={"friction": FRICTION}), rng=1)
     ok = fitted.status.values == "ok"
     assert ok.sum() >= 4
     assert tree["sample_stats"].converged.values[ok].all()

@@ -20,7 +20,7 @@ def swept(rod, step=4.0, friction=0.0):
 
 
 def score(record, seed, cell=CELL, rod=None, friction=0.0):
-    measured = cell.measure(record, seed=seed)
+    measured = cell.measure(record, rng=seed)
     rig = Rig(rod=rod, load_cell=cell, unknown={"friction": friction})
     return reconstruct(measured, rig, method="constrained").attrs["axial_score"]
 

@@ -27,7 +27,7 @@ CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 def simulated(family, count, spread=0.3, seed=7):
     """Records of the default prior, biases having three times its standard deviation."""
     unknown = {"lever": 0.0, "backlash": 0.0, "friction": 0.0, "bias": stats.norm(0.0, spread)}
-    experiment = experiment_of(family, Rig(load_cell=CELL, unknown=unknown), seed=1)
+    experiment = experiment_of(family, Rig(load_cell=CELL, unknown=unknown), rng=1)
     for number in range(count):
         yield simulate(experiment, np.random.default_rng([seed, number])).measured
 
@@ -52,7 +52,7 @@ def test_biases_do_not_turn_a_side(family, count):
 @pytest.mark.parametrize("bias", [-0.3, 0.0, 0.3])
 def test_a_label_that_the_moment_contradicts_is_not_believed(bias):
     record = scan(paper_profile("II", q=0.5), direction="forward").record
-    measured = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, 0.0, 0.0)).measure(record, seed=1)
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, 0.0, 0.0)).measure(record, rng=1)
     wrong = measured.assign(direction=("sample", np.full(measured.sizes["sample"], "backward")))
     assert np.all(contact_sides(wrong, CELL) == 1.0)
     assert not doubtful_sweeps(wrong, CELL)
@@ -62,7 +62,7 @@ def test_a_label_that_the_moment_contradicts_is_not_believed(bias):
 def test_a_zero_before_and_after_contact_is_one_however_far_off(bias):
     """A load that does not change would not come back to the same level; contact is a third of the record here."""
     record = scan(paper_profile("II", q=0.8), drive_angles=np.radians(np.arange(-30.0, 210.0, 2.0))).record
-    measured = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, 0.0, 0.0)).measure(record, seed=1)
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, 0.0, 0.0)).measure(record, rng=1)
     np.testing.assert_array_equal(contact_sides(measured, CELL) > 0.0, measured.direction.values == "forward")
     assert not doubtful_sweeps(measured, CELL)
 
@@ -82,7 +82,7 @@ def test_a_drive_that_turns_back_in_contact_stays_on_its_side():
         "base_y": np.zeros(2 * count),
         **both,
     }
-    measured = CELL.measure(make_record(columns), seed=1)
+    measured = CELL.measure(make_record(columns), rng=1)
     assert np.all(contact_sides(measured, CELL) == 1.0)
 
 
@@ -92,7 +92,7 @@ def in_contact_throughout(moment):
     loaded = np.flatnonzero(record.holding_moment.values > 0.15)[:40]
     part = record.isel(sample=loaded)
     shift = moment - float(part.holding_moment.mean())
-    return LoadCell(force_noise=0.05, moment_noise=0.02, bias=(shift, 0.0, 0.0)).measure(part, seed=1)
+    return LoadCell(force_noise=0.05, moment_noise=0.02, bias=(shift, 0.0, 0.0)).measure(part, rng=1)
 
 
 def test_without_a_zero_the_prior_of_a_bias_decides():
@@ -123,7 +123,7 @@ def test_in_doubt_evidence_decides_which_side_it_was():
     record = scan(Parabola(0.5, 0.5), direction="forward", drive_step=0.03).record
     start = int(np.argmax(record.holding_moment.values > 0.1))
     part = record.isel(sample=slice(start, None))
-    whole = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(-0.9, 0.0, 0.0)).measure(part, seed=1)
+    whole = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(-0.9, 0.0, 0.0)).measure(part, rng=1)
     loaded = whole.isel(sample=np.flatnonzero(part.holding_moment.values > 0.0))
     moment = float(loaded.holding_moment.mean())
     shifted = loaded.assign(holding_moment=loaded.holding_moment - moment - 0.3)
@@ -131,7 +131,7 @@ def test_in_doubt_evidence_decides_which_side_it_was():
     found = infer_contour(
         shifted,
         rig=Rig(load_cell=CELL, unknown={**NOTHING, "bias": "default", "moment_bias": stats.norm(0.0, 1.0)}),
-        seed=1,
+        rng=1,
         settings=SamplerSettings(ensembles=2, max_steps=50),
     )
     assert json.loads(found.attrs["doubtful_sides"]) == {"0": "forward"}

@@ -202,7 +202,7 @@ def test_small_noise_makes_proportionate_errors(swept):
     firm = np.abs(swept.holding_moment.values) > 0.2
     errors = []
     for noise in (1e-5, 1e-7):
-        contacts = reconstruct(LoadCell(force_noise=noise, moment_noise=noise).measure(swept, seed=1))
+        contacts = reconstruct(LoadCell(force_noise=noise, moment_noise=noise).measure(swept, rng=1))
         assert np.isin(
             contacts.status.values[firm], ("ok", "nonlinear", "beyond the tip")
         ).all()  # where the tip touches, s1 = 1 ± ε
@@ -216,7 +216,7 @@ def test_a_noisy_record_scatters_about_the_contour():
     contour = Parabola(2.5, 0.1)
     record = scan(contour, rig=Rig(rod=WIRE)).record
     cell = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
-    contacts = reconstruct(cell.measure(record, seed=1))
+    contacts = reconstruct(cell.measure(record, rng=1))
     assert_statuses_tell_the_truth(contacts)
     firm = np.abs(record.holding_moment.values) > 20 * cell.moment_noise
     assert np.isin(contacts.status.values[firm], ("ok", "nonlinear", "beyond the tip")).all()
@@ -225,7 +225,7 @@ def test_a_noisy_record_scatters_about_the_contour():
 
 
 def test_the_data_sheet_in_the_record_is_the_default(swept):
-    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(swept, seed=1)
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(swept, rng=1)
     by_default = reconstruct(measured)
     assert by_default.identical(reconstruct(measured, rig=Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02))))
     assert (reconstruct(measured, rig=Rig(load_cell=LoadCell())).status.values != "no contact").all()
@@ -237,7 +237,7 @@ def test_unloaded_samples_are_taken_for_loaded_as_rarely_as_stated(missing):
     columns = {"sweep": 0, "direction": "forward", "drive_angle": np.full(50_000, 1.2)}
     columns |= {name: 0.0 for name in ("holding_moment", "force_x", "force_y") if name not in missing}
     unloaded = make_record(columns, missing=missing)
-    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(unloaded, seed=1)
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(unloaded, rng=1)
     alarms = int(loaded_samples(measured).sum())
     assert binomtest(alarms, 50_000, FALSE_ALARM).pvalue > 1e-6
     if not missing:

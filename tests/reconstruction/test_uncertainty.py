@@ -129,7 +129,7 @@ def test_contacts_scatter_as_stated(scenes, method, sensor, phase, direction):
     record, friction = scenes[name]
     copies = record.isel(sample=np.full(COPIES, pick(record, phase, direction)))
     seed = [sum(map(ord, sensor + phase + direction))]
-    measured = load_cell.measure(copies, seed=np.random.default_rng(seed))
+    measured = load_cell.measure(copies, rng=np.random.default_rng(seed))
     contacts = reconstruct(measured, method=method, rig=Rig(unknown={"friction": friction}))
     assert set(contacts.status.values) <= {"ok", "beyond the tip"}
     if method == "constrained":
@@ -164,7 +164,7 @@ def test_errors_that_samples_share_are_in_each(swept, method, kind):
     for phase in ("tip", "tangential"):
         one = swept.isel(sample=np.full(late + 1, pick(swept, phase)))
         loads = np.stack([one[name].values for name in CHANNELS], axis=-1)
-        readings = load_cell.simulate(np.broadcast_to(loads, (records, late + 1, 3)), seed=1)[:, -1]
+        readings = load_cell.simulate(np.broadcast_to(loads, (records, late + 1, 3)), rng=1)[:, -1]
         angles = one.drive_angle.values[0] + load_cell.drive_angle_noise * np.random.default_rng(2).normal(size=records)
         stated = reconstruct(one, method=method, rig=Rig(load_cell=load_cell)).isel(sample=-1)
         table = {"sweep": 0, "direction": "forward", "drive_angle": angles}
@@ -189,7 +189,7 @@ def test_errors_that_samples_share_are_in_each(swept, method, kind):
 
 
 def noisy_records(record, load_cell, count, first=0):
-    return [load_cell.measure(record, seed=first + seed) for seed in range(count)]
+    return [load_cell.measure(record, rng=first + seed) for seed in range(count)]
 
 
 def in_contact(record, *, weak=0.3):
@@ -220,21 +220,21 @@ def test_the_probability_of_the_misfit_is_uniform_where_the_model_holds(swept):
 
 
 def test_the_attributes_sum_up_the_misfits(swept):
-    contacts = reconstruct(FAMILIAR.measure(swept, seed=1), method="constrained")
+    contacts = reconstruct(FAMILIAR.measure(swept, rng=1), method="constrained")
     clear = contacts.edge_distance.values > 3.0
     assert contacts.attrs["misfit_samples"] == clear.sum()
     assert contacts.attrs["misfit_sum"] == pytest.approx(contacts.misfit.values[clear].sum(), rel=1e-12)
     shared = LoadCell(force_noise=0.05, moment_noise=0.02, bias_uncertainty=(0.01, 0.0, 0.0))
-    contacts = reconstruct(shared.measure(swept, seed=1), method="constrained")
+    contacts = reconstruct(shared.measure(swept, rng=1), method="constrained")
     assert np.isnan(contacts.attrs["misfit_probability"])
-    raw = reconstruct(FAMILIAR.measure(swept, seed=1))
+    raw = reconstruct(FAMILIAR.measure(swept, rng=1))
     assert not {"misfit", "edge_distance"} & set(raw.data_vars)
     assert "misfit_sum" not in raw.attrs
 
 
 def test_the_misfit_tells_of_friction_that_is_ignored():
     record = scan(paper_profile("II", q=0.3), rig=Rig(unknown={"friction": 0.3}), drive_step=0.05).record
-    measured = FAMILIAR.measure(record, seed=1)
+    measured = FAMILIAR.measure(record, rng=1)
     assert reconstruct(measured, method="constrained").attrs["misfit_probability"] < 1e-12
     assert (
         reconstruct(measured, method="constrained", rig=Rig(unknown={"friction": 0.3})).attrs["misfit_probability"]
@@ -245,7 +245,7 @@ def test_the_misfit_tells_of_friction_that_is_ignored():
 def test_the_misfit_tells_of_a_rod_that_is_stiffer_than_stated():
     record = scan(Parabola(1.5, 0.06), rig=Rig(rod=WIRE), drive_step=0.05).record
     load_cell = LoadCell(force_noise=0.05 * WIRE.force_unit, moment_noise=0.02 * WIRE.moment_unit)
-    measured = load_cell.measure(record, seed=1)
+    measured = load_cell.measure(record, rng=1)
     wrong = Rod(WIRE.length, 0.8 * WIRE.flexural_rigidity, diameter=WIRE.diameter)
     assert reconstruct(measured, method="constrained", rig=Rig(rod=wrong)).attrs["misfit_probability"] < 1e-12
     assert reconstruct(measured, method="constrained").attrs["misfit_probability"] > 1e-4
@@ -276,7 +276,7 @@ def test_the_constrained_contact_is_nearer_to_the_true_one(profile, q, phase):
 
 
 def test_a_tip_contact_is_at_the_tip(swept):
-    contacts = reconstruct(FAMILIAR.measure(swept, seed=1), method="constrained")
+    contacts = reconstruct(FAMILIAR.measure(swept, rng=1), method="constrained")
     tip = contacts.contact_phase.values == "tip"
     assert tip.sum() > 10
     assert (contacts.contact_arclength.values[tip] == 1.0).all()
@@ -286,7 +286,7 @@ def test_a_tip_contact_is_at_the_tip(swept):
 
 def test_the_constrained_estimate_states_less_spread(swept):
     """Far from the edge, and of what is far from the edge with both methods."""
-    measured = cell().measure(in_contact(swept), seed=1)
+    measured = cell().measure(in_contact(swept), rng=1)
     raw, constrained = (reconstruct(measured, method=method) for method in ("raw", "constrained"))
     clear = constrained.edge_distance.values > 10.0
     for name in SPREADS:
@@ -300,7 +300,7 @@ def test_the_constrained_estimate_states_less_spread(swept):
 def test_a_channel_at_the_end_of_its_range_is_cut_off(swept, method):
     limit = 0.6 * float(np.abs(swept.force_y).max())
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, force_range=limit)
-    measured = load_cell.measure(swept, seed=1)
+    measured = load_cell.measure(swept, rng=1)
     over = np.abs(measured.force_y.values) >= limit * (1.0 - 1e-12)
     contacts = reconstruct(measured, method=method)
     assert 3 < over.sum() < 40
@@ -343,7 +343,7 @@ def test_samples_near_the_edge_are_at_the_edge(swept):
 
 @METHODS
 def test_unloaded_samples_are_no_contact(swept, method):
-    contacts = reconstruct(FAMILIAR.measure(swept, seed=1), method=method)
+    contacts = reconstruct(FAMILIAR.measure(swept, rng=1), method=method)
     free = swept.truth_contact_phase.values == "none"
     none = contacts.status.values == "no contact"
     assert none[free].mean() > 0.95
@@ -367,7 +367,7 @@ def test_the_constrained_method_needs_noise_on_every_channel(swept, load_cell):
 @pytest.mark.parametrize("nu", [1.0, 2.0])
 def test_outliers_without_variance_have_no_weights(swept, nu):
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, degrees_of_freedom=nu)
-    measured = load_cell.measure(swept, seed=1)
+    measured = load_cell.measure(swept, rng=1)
     with refused(ParameterError, "method='raw'", "degrees of freedom"):
         reconstruct(measured, method="constrained")
 
@@ -392,7 +392,7 @@ def test_units_do_not_matter(method):
     rod = Rod(length=0.2, flexural_rigidity=2.4e-3)
     record = scan(paper_profile("II", q=0.5), drive_step=0.1).record
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=0.003, correlation=SHARED)
-    measured = load_cell.measure(record, seed=1)
+    measured = load_cell.measure(record, rng=1)
     table = {name: measured[name].values for name in ("sweep", "direction", "drive_angle")}
     table |= {name: measured[name].values * rod.force_unit for name in ("force_x", "force_y")}
     in_si = make_record(table | {"holding_moment": measured.holding_moment.values * rod.moment_unit}, rod=rod)
@@ -415,7 +415,7 @@ def test_units_do_not_matter(method):
 def test_a_mirrored_record_has_mirrored_contacts(method, frame):
     record = scan(paper_profile("II", q=0.5), direction="forward", drive_step=0.05).record
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=0.003, correlation=(0.5, -0.3, 0.2))
-    measured = load_cell.measure(in_frame(record, frame), seed=1)
+    measured = load_cell.measure(in_frame(record, frame), rng=1)
     table = {"sweep": measured.sweep.values, "direction": "backward"}
     table["drive_angle"] = np.pi - measured.drive_angle.values
     # Seen in the turning frame, what points along the rod is mirrored onto itself, and what points across it is not.
@@ -438,7 +438,7 @@ def test_a_mirrored_record_has_mirrored_contacts(method, frame):
 
 @METHODS
 def test_the_order_of_samples_does_not_matter_for_white_noise(swept, method):
-    measured = FAMILIAR.measure(swept.assign(sweep=swept.sweep), seed=1)
+    measured = FAMILIAR.measure(swept.assign(sweep=swept.sweep), rng=1)
     order = np.random.default_rng(1).permutation(measured.sizes["sample"])
     shuffled = reconstruct(measured.isel(sample=order), method=method)
     assert_same(shuffled, reconstruct(measured, method=method).isel(sample=order))
@@ -454,7 +454,7 @@ def test_the_order_of_samples_does_not_matter_for_white_noise(swept, method):
     ],
 )
 def test_one_bad_sample_leaves_the_others_as_they_are(swept, method, bad):
-    measured = FAMILIAR.measure(swept, seed=1)
+    measured = FAMILIAR.measure(swept, rng=1)
     place = pick(swept, "tip")
     spoiled = measured.copy(deep=True)
     for name, value in zip(CHANNELS, bad, strict=True):
@@ -470,7 +470,7 @@ def test_the_radius_of_the_rod_moves_points_and_their_spread():
     thin, thick = Rod(0.2, 2.4e-3), Rod(0.2, 2.4e-3, diameter=0.02)
     record = scan(Parabola(2.5, 0.1), rig=Rig(rod=thin), drive_step=0.1).record
     load_cell = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
-    measured = load_cell.measure(record, seed=1)
+    measured = load_cell.measure(record, rng=1)
     for method in ("raw", "constrained"):
         axis, surface = (reconstruct(measured, method=method, rig=Rig(rod=rod)) for rod in (thin, thick))
         alpha = axis.slope_angle
@@ -495,7 +495,7 @@ def test_the_force_along_the_rod_agrees_with_the_moment(frame, drive_angle_noise
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, frame=frame, drive_angle_noise=drive_angle_noise)
     record = scan(Parabola(0.5, 0.5), drive_step=np.radians(8.0)).record
     scores = [
-        reconstruct(load_cell.measure(record, seed=k), method="constrained", rig=Rig(load_cell=load_cell)).attrs[
+        reconstruct(load_cell.measure(record, rng=k), method="constrained", rig=Rig(load_cell=load_cell)).attrs[
             "axial_score"
         ]
         for k in range(count)
@@ -507,7 +507,7 @@ def test_the_force_along_the_rod_agrees_with_the_moment(frame, drive_angle_noise
 def test_friction_makes_it_disagree_unless_it_is_known():
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     record = scan(Parabola(0.5, 0.5), drive_step=np.radians(4.0), rig=Rig(unknown={"friction": 0.1})).record
-    measured = load_cell.measure(record, seed=1)
+    measured = load_cell.measure(record, rng=1)
     unknown, known = (
         reconstruct(measured, method="constrained", rig=Rig(load_cell=load_cell, unknown={"friction": mu})).attrs[
             "axial_score"

@@ -170,8 +170,8 @@ def _free_end(slope, angle, moment, arclength, ends):
 def test_a_contact_posterior_of_a_tapered_rod_holds_the_truth():
     record = tb.scan(tb.contours.Circle(0.3, 0.5), rig=Rig(rod=RODS["tapered"]), drive_step=np.radians(10.0)).record
     cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-    measured = cell.measure(record, seed=3)
-    contacts = tb.infer_contacts(measured, rig=Rig(load_cell=cell), seed=1)["posterior"].to_dataset()
+    measured = cell.measure(record, rng=3)
+    contacts = tb.infer_contacts(measured, rig=Rig(load_cell=cell), rng=1)["posterior"].to_dataset()
     contacts = contacts.isel(sample=np.isfinite(contacts["contact_x"].values).all(axis=(0, 1)))
     truth = record["truth_contact_x"].values[contacts["sample"].values]
     low, high = contacts["contact_x"].quantile([0.005, 0.995], dim=("chain", "draw")).values

@@ -105,16 +105,16 @@ def test_travels_are_ways_where_the_base_is_carried():
 
 def test_unloaded_stretches_end_at_travels():
     scan = tb.scan(CIRCLE, drive=[tb.Rotation(), THERE])
-    found = zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(scan.record, seed=1))
+    found = zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(scan.record, rng=1))
     for number, event in ((0, "snap_off"), (2, "snap_off")):
         before, after = found[f"{event}_travel"].sel(sweep=number).values
         assert before <= scan.sweeps[number].snap_off.travel <= after
     turned = tb.scan(CIRCLE).record
-    assert "onset_travel" not in zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(turned, seed=1))
+    assert "onset_travel" not in zero_load(tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(turned, rng=1))
 
 
 def test_an_inspection_reports_travels_and_finds_lost_samples():
-    measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(tb.scan(CIRCLE, drive=BACK).record, seed=1)
+    measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(tb.scan(CIRCLE, drive=BACK).record, rng=1)
     found = tb.inspect_record(measured)
     sweeps = found.sweeps.isel(sweep=0)
     assert bool(sweeps.carried)

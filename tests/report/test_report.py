@@ -468,7 +468,7 @@ def test_the_frames_are_those_rods_in_the_drawing(page, posterior):
 @pytest.mark.slow
 def test_a_rig_that_measures_the_moment_only_has_no_contact_points(tmp_path):
     ideal = tb.scan(tb.contours.Parabola(0.5, 0.5), direction="backward", drive_step=0.1).record
-    record = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(ideal, seed=1)
+    record = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(ideal, rng=1)
     record["force_x"][:] = record["force_y"][:] = np.nan
     analysed_quickly(record, tmp_path, rig=tb.Rig(unknown="nothing"))
     page = Page(write_report(tmp_path).read_text(encoding="utf-8"))

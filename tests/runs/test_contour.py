@@ -76,7 +76,7 @@ def test_where_no_contour_is_found_the_former_run_stays_whole(measured, tmp_path
     monkeypatch.setattr(module, "infer_contour", infer_nothing)
     (tmp_path / "report.html").write_text("of the posterior beside it", encoding="utf-8")
     with pytest.raises(InferenceError):
-        analyse(measured, tmp_path)
+        analyse(measured, tmp_path, rng=1)
     assert (tmp_path / "report.html").exists()
 
 
@@ -87,9 +87,9 @@ def test_where_no_contour_is_found_wrong_units_are_suspected(measured, tmp_path,
     monkeypatch.setattr(module, "infer_contour", infer_nothing)
     wrong = measured.assign(force_x=1e3 * measured.force_x, force_y=1e3 * measured.force_y)
     with pytest.raises(InferenceError, match=r"^no parabola was found\. .*Forces.* units"):
-        analyse(wrong, tmp_path)
+        analyse(wrong, tmp_path, rng=1)
     with pytest.raises(InferenceError, match=r"^no parabola was found\.$"):
-        analyse(measured, tmp_path)
+        analyse(measured, tmp_path, rng=1)
 
 
 def test_the_estimate_is_near_the_truth(analysed):
@@ -105,9 +105,9 @@ def test_the_estimate_is_near_the_truth(analysed):
 @pytest.mark.slow
 def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
     record = scan(Parabola(0.5, 0.5), direction="backward", base=(0.1, 0.0), drive_step=0.05).record
-    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, rng=1)
     measured["force_x"][:] = measured["force_y"][:] = np.nan
-    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK)
+    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK, rng=1)
     assert run.contacts is None
     assert list(run.files) == ["posterior", "band", "verdicts", "summary", *(f for f in FIGURES if f != "gap")]
     assert_every_file_is_there(run, tmp_path)
@@ -118,10 +118,10 @@ def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
 def test_a_dimensionless_record_with_unknown_noise(tmp_path):
     contour = Circle(1.0, 0.5)
     record = scan(contour, direction="forward", drive_step=0.05).record
-    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, rng=1)
     for name in ("load_cell_force_noise", "load_cell_moment_noise"):
         del measured.attrs[name]
-    run = analyse(measured, tmp_path, family="circle", rig=Rig(unknown="nothing"), settings=QUICK, truth=contour)
+    run = analyse(measured, tmp_path, family="circle", rig=Rig(unknown="nothing"), settings=QUICK, truth=contour, rng=1)
     assert_every_file_is_there(run, tmp_path)
     table = summary(run.posterior)
     assert table.quantity.values.tolist() == ["r", "q", "x_c", "moment_noise", "force_noise"]
@@ -141,7 +141,7 @@ def test_a_second_run_replaces_the_files_of_the_first(measured, tmp_path):
     (tmp_path / "band.csv").write_text("old", encoding="utf-8")
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     (tmp_path / "report.html").write_text("of another posterior", encoding="utf-8")
-    analyse(measured, tmp_path)
+    analyse(measured, tmp_path, rng=1)
     assert not (tmp_path / "report.html").exists()
     assert (tmp_path / "band.csv").read_text(encoding="utf-8") != "old"
     assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
@@ -173,7 +173,7 @@ def test_the_posterior_removes_what_belongs_to_a_former_one_at_once(analysed, tm
 @pytest.mark.usefixtures("quick")
 def test_another_rod_is_that_of_all_results(measured, tmp_path):
     wrong = measured.assign_attrs(rod_length=0.21, rod_diameter=0.0)
-    run = analyse(wrong, tmp_path, rod=ROD)
+    run = analyse(wrong, tmp_path, rod=ROD, rng=1)
     assert run.posterior.attrs["rod_length"] == ROD.length
     expected = contact_points(measured, None, run.posterior)
     np.testing.assert_array_equal(run.contacts.contact_x, expected.contact_x)
@@ -183,7 +183,7 @@ def test_another_rod_is_that_of_all_results(measured, tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_units_do_not_matter(analysed, measured, tmp_path):
     """To the rounding of the conversion; priors and random numbers scale with the rod."""
-    si, plain = analysed[0], analyse(to_dimensionless(measured), tmp_path, rig=Rig(unknown="nothing"))
+    si, plain = analysed[0], analyse(to_dimensionless(measured), tmp_path, rig=Rig(unknown="nothing"), rng=1)
     ratio = si.contacts.contact_x / plain.contacts.contact_x
     np.testing.assert_allclose(ratio[si.contacts.status == "ok"], ROD.length, rtol=1e-9)
     medians = [summary(run.posterior)["median"].sel(quantity="q").item() for run in (si, plain)]
@@ -193,7 +193,7 @@ def test_units_do_not_matter(analysed, measured, tmp_path):
 def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
     few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
-    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=few)
+    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=few, rng=1)
     assert not run.posterior.attrs["converged"]
     assert "not converged, the steps allowed ran out after 1 steps" in run.posterior.attrs["message"]
 
@@ -201,7 +201,7 @@ def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
 @pytest.mark.parametrize("probability", [0.0, 1.0, 95.0, float("nan")])
 def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_path, probability):
     with refused(ParameterError, probability=probability):
-        analyse(measured, tmp_path / "run", probability=probability)
+        analyse(measured, tmp_path / "run", probability=probability, rng=1)
     assert not (tmp_path / "run").exists()
 
 
@@ -233,9 +233,9 @@ def broken(*arguments, **options):
 @pytest.mark.usefixtures("drawn_before")
 def test_what_fails_is_named_and_left_out_and_all_else_is_there(function, what, file, measured, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
-    whole = analyse(measured, tmp_path)
+    whole = analyse(measured, tmp_path, rng=1)
     monkeypatch.setattr(module, function, broken)
-    run = analyse(measured, tmp_path)
+    run = analyse(measured, tmp_path, rng=1)
     assert list(run.left_out) == [what]
     assert str(run.left_out[what]) == "it broke"
     said = f"Left out: {what}. Unexpected error, RuntimeError: it broke"
@@ -256,7 +256,7 @@ def test_what_fails_is_named_and_left_out_and_all_else_is_there(function, what, 
 def test_a_figure_that_fails_is_named_and_the_others_are_drawn(measured, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "scan", broken)
     monkeypatch.setattr(module, "predictive_interval", broken)
-    run = analyse(measured, tmp_path)
+    run = analyse(measured, tmp_path, rng=1)
     failed = ("observables", "predictive", "rods")
     assert list(run.left_out) == [f"figure {name}" for name in failed]
     assert list(run.files)[5:] == [name for name in FIGURES if name not in failed]
@@ -269,7 +269,7 @@ def test_a_posterior_outlives_its_predictions(measured, tmp_path, monkeypatch):
     """Its draws and what is made of them alone are there; all else says what it lacks."""
     monkeypatch.setattr("tactile_bayes.inference.contour.predicted_groups", broken)
     monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
-    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK)
+    run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK, rng=1)
     assert list(run.left_out) == ["predictions", "band", "gap", "verdicts"]
     assert run.verdicts[0] == "Left out: predictions. Unexpected error, RuntimeError: it broke"
     assert run.verdicts[1].startswith("Left out: band. the posterior holds no events")
@@ -284,5 +284,5 @@ def test_a_posterior_outlives_its_predictions(measured, tmp_path, monkeypatch):
 def test_what_fails_before_a_posterior_is_drawn_is_passed_on(measured, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "infer_contour", broken)
     with pytest.raises(RuntimeError, match="it broke"):
-        analyse(measured, tmp_path)
+        analyse(measured, tmp_path, rng=1)
     assert not any(tmp_path.iterdir())

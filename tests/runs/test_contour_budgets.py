@@ -47,7 +47,7 @@ def record_of(contour: Contour, samples: int) -> xr.Dataset:
         angles = np.linspace(begin - margin, end + margin, samples)
         part = scan(contour, direction=direction, drive_angles=angles).record
         parts.append(part.assign(sweep=part.sweep + k))
-    return CELL.measure(xr.concat(parts, "sample", combine_attrs="override"), seed=1)
+    return CELL.measure(xr.concat(parts, "sample", combine_attrs="override"), rng=1)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from tactile_bayes.runs import contour, many
 from tactile_bayes.runs.contour import analyse
 
 STATED = Rig(unknown="nothing")
-OPTIONS = {"seed": 3, "settings": FEW, "workers": 1}
+OPTIONS = {"rng": 3, "settings": FEW, "workers": 1}
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_a_run_is_that_of_the_record_alone(made, records, tmp_path):
     _, out = made
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contour, "_draw", lambda *_: {})
-        alone = analyse(many.read_record(records / "one.csv"), tmp_path, rig=STATED, seed=3, settings=FEW)
+        alone = analyse(many.read_record(records / "one.csv"), tmp_path, rig=STATED, rng=3, settings=FEW)
     assert read_result(out / "one" / "posterior.nc")["posterior"].equals(alone.posterior["posterior"])
 
 
@@ -68,7 +68,7 @@ def test_what_is_done_is_not_made_again_and_records_may_be_added(made, records, 
     assert seen == ["broken.csv"]  # what failed is tried again
     assert again["median"].sel(record="one").equals(table["median"].sel(record="one"))
     seen.clear()
-    many.infer_contours(records / "one.csv", STATED, out=out, **(OPTIONS | {"seed": 4}))
+    many.infer_contours(records / "one.csv", STATED, out=out, **(OPTIONS | {"rng": 4}))
     many.infer_contours(records / "one.csv", Rig(unknown={"lever": 0.0}), out=out, **OPTIONS)
     assert seen == ["one.csv", "one.csv"]
 

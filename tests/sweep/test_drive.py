@@ -177,7 +177,7 @@ def test_what_cannot_be_scanned_is_refused(error, arguments, values):
 
 def test_records_survive_files_and_noise(tmp_path):
     record = tb.scan(CIRCLE, drive=[tb.Rotation(), COMBINED]).record
-    measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
+    measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, rng=1)
     for name in ("one.csv", "one.nc"):
         tb.write_record(measured, tmp_path / name)
         read = tb.read_record(tmp_path / name)

@@ -20,6 +20,7 @@ from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.parameters.nuisances import belongs, stated_values
+from tactile_bayes.numerics.random_numbers import Seed, child, seed_words
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import STANDARD
 from tactile_bayes.rig.rig import DEFAULT
@@ -64,7 +65,7 @@ class _Study:
     alternatives: tuple[Alternative, ...]
     x: Floats
     probability: float
-    seed: int
+    seed: Seed
     settings: SamplerSettings = field(default=_SETTINGS)
 
     @property
@@ -73,7 +74,7 @@ class _Study:
         return {each.name: repr(sorted(each.experiment.about.items())) for each in self.alternatives} | {
             "x": repr(self.x.tolist()),
             "probability": repr(self.probability),
-            "seed": repr(self.seed),
+            "seed": seed_words(self.seed),
             "settings": repr(self.settings),
             "version of tactile-bayes": version("tactile-bayes"),
         }
@@ -85,7 +86,7 @@ def band_by_assumption(
     x: Floats,
     probability: float = 0.95,
     *,
-    seed: int,
+    seed: Seed,
     out: str | os.PathLike[str] | None = None,
     workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
@@ -201,7 +202,7 @@ def _inferred(task: tuple[_Study, int]) -> _Outcome:
     study, number = task
     try:
         problem = contour_problem(study.alternatives[number].experiment)
-        seed = np.random.SeedSequence(study.seed, spawn_key=(number,))
+        seed = child(study.seed, number)
         found = sampled(problem, seed=seed, settings=study.settings, with_prior=False)
         found.draws.refuse_interrupted(study.alternatives[number].name)
         band = contour_band(found.tree, study.x, study.probability)

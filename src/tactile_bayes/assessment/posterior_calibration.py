@@ -38,6 +38,7 @@ from tactile_bayes.inference.ensembles.proposal import flattened
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.starts.contour_start import Walk
 from tactile_bayes.inference.stored_experiment import points_of, predicted_points
+from tactile_bayes.numerics.random_numbers import Seed, child, seed_words, words
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.tasks import Workers, keep_outcomes, open_results_store
@@ -101,7 +102,7 @@ class PosteriorExperiment:
     readings: Floats
     starts: Floats
     probability: float
-    seed: int
+    seed: Seed
     settings: SamplerSettings = field(default=_SETTINGS)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -126,7 +127,7 @@ class PosteriorExperiment:
         return {name: str(value) for name, value in self.experiment.about.items()} | {
             "draws": hashlib.sha256(self.starts.tobytes()).hexdigest(),
             "probability": repr(self.probability),
-            "seed": repr(self.seed),
+            "seed": seed_words(self.seed),
             "settings": repr(self.settings),
             "version of tactile-bayes": version("tactile-bayes"),
         }
@@ -136,7 +137,7 @@ def posterior_calibration(
     posterior: xr.DataTree,
     experiment: Experiment,
     *,
-    seed: int,
+    seed: Seed,
     replicates: int = 100,
     probability: float = 0.95,
     out: str | os.PathLike[str] | None = None,
@@ -186,7 +187,7 @@ def posterior_calibration(
 
 
 def _task(
-    posterior: xr.DataTree, experiment: Experiment, replicates: int, probability: float, seed: int
+    posterior: xr.DataTree, experiment: Experiment, replicates: int, probability: float, seed: Seed
 ) -> PosteriorExperiment:
     """Return the truths and their records, from the predictions of the posterior."""
     names = experiment.model.names
@@ -195,7 +196,7 @@ def _task(
     available = predicted.sizes["chain"] * predicted.sizes["draw"]
     if available < replicates:
         raise InferenceError(f"the posterior holds {available} predictions of the record, {replicates} are needed")
-    chosen = np.random.default_rng([seed, 1]).permutation(available)[:replicates]
+    chosen = np.random.default_rng([*words(seed), 1]).permutation(available)[:replicates]
     readings = np.full((replicates, predicted.sizes["sample"], len(CHANNELS)), np.nan)
     for i, name in enumerate(CHANNELS):
         if name in predicted:
@@ -224,7 +225,7 @@ def _replicate(task: tuple[PosteriorExperiment, int]) -> Outcome:
 
 
 def _made(experiment: PosteriorExperiment, number: int) -> Outcome:
-    for_start, for_posterior, for_ranks = np.random.SeedSequence(experiment.seed, spawn_key=(number,)).spawn(3)
+    for_start, for_posterior, for_ranks = child(experiment.seed, number).spawn(3)
     model, rng = experiment.model, np.random.default_rng(for_ranks)
     simulation = _simulation(experiment, number)
     joint = JointModel(model, replace(experiment.experiment, record=simulation.measured).model)

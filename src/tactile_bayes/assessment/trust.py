@@ -20,7 +20,6 @@ from tactile_bayes.assessment.wording import conclusion, sentences
 from tactile_bayes.checks import (
     check_path,
     check_probability,
-    check_seed,
     check_switch,
     check_whole_number,
 )
@@ -29,6 +28,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import contour_draws, read_result
 from tactile_bayes.inference.stored_experiment import experiment_of
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.tasks import TaskProgress, Workers, workers_of
 from tactile_bayes.uncertainty.band import contour_band
@@ -58,7 +58,7 @@ def trust(
     probability: float | None = None,
     family: Family | None = None,
     rig: Rig | None = None,
-    seed: int = 1,
+    rng: Rng,
     out: str | os.PathLike[str] | None = None,
     workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
@@ -86,7 +86,7 @@ def trust(
         Probability of the band, in (0, 1); by default that of the run, or 0.95.
     family, rig : Family and Rig, optional
         Arguments of `infer_contour`, needed only if one of their distributions is none of SciPy's, like a histogram.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of all random numbers; the results do not depend on the number of workers.
     out : path-like, optional
         Folder of the replicates and alternatives: a run that was killed resumes.
@@ -141,16 +141,16 @@ def trust(
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> quick = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.05)
     >>> for friction in (0.0, 0.005):
-    ...     rough = Rig(unknown={"friction": friction})
-    ...     sweep = scan(paper_profile("II", q=0.5), rough, drive_step=0.1).record
-    ...     posterior = infer_contour(cell.measure(sweep, seed=1), rig=Rig(unknown="nothing"), seed=1, settings=quick)
-    ...     print(trust(posterior, replicates=0, assumptions=False).attrs["conclusion"])
+    ...     real = Rig(unknown={"friction": friction})
+    ...     sweep = scan(paper_profile("II", q=0.5), real, drive_step=0.1).record
+    ...     posterior = infer_contour(cell.measure(sweep, rng=1), rig=Rig(unknown="nothing"), rng=1, settings=quick)
+    ...     print(trust(posterior, rng=1, replicates=0, assumptions=False).attrs["conclusion"])
     holds
     do not rely on it
     """
     check_whole_number("replicates", replicates, 0)
     check_switch("assumptions", assumptions)
-    seed = check_seed(seed)
+    seed = seed_sequence(rng)
     workers = workers_of(workers)
     if out is not None:
         check_path("out", out, "give the path of a folder, or None")
@@ -214,7 +214,7 @@ def trust(
         "summary": summary,
         "words": "\n".join(sentences(found, parts, calibrated, mute=experiment.contours.roughness)),
         "probability": chance,
-        "seed": seed,
+        "seed": seed_words(seed),
         "replicates": replicates,
         "calibration": "" if calibrated is None else str(calibrated.attrs["conclusion"]),
         "draws_sha256": draws_digest(posterior),

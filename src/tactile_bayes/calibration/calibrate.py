@@ -18,7 +18,6 @@ from tactile_bayes.calibration.summary import summary
 from tactile_bayes.checks import (
     check_optional,
     check_path,
-    check_seed,
     check_switch,
     check_whole_number,
     refused,
@@ -27,6 +26,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive, Rotation, drives_of, record_template
 from tactile_bayes.tasks import ResultsStore, Workers, keep_outcomes, open_results_store
@@ -48,7 +48,7 @@ def calibrate(
     family: Family | str = "parabola",
     rig: Rig | None = None,
     *,
-    seed: int,
+    rng: Rng,
     replicates: int = 200,
     drive: Drive | Sequence[Drive] | None = None,
     settings: SamplerSettings | None = None,
@@ -73,7 +73,7 @@ def calibrate(
     rig : Rig, optional
         As in `infer_contour`; what is unknown of it is drawn from the same priors. Its load cell, with noise, is by
         default one of force_noise 0.05 EI/L² and moment_noise 0.02 EI/L, and its rod the dimensionless one.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of all random numbers; the results, except the seconds, do not depend on the number of workers.
     replicates : int
         Number of replicates; each takes some two seconds on one core.
@@ -141,14 +141,14 @@ def calibrate(
     --------
     >>> from scipy import stats
     >>> family = Family("parabola", a=stats.uniform(0.4, 0.4))
-    >>> found = calibrate(family, Rig(unknown="nothing"), replicates=2, seed=1, workers=1)
+    >>> found = calibrate(family, Rig(unknown="nothing"), replicates=2, rng=1, workers=1)
     >>> found.quantity.values.tolist()
     ['a', 'q', 'x_c', 'noise_scale', 'log_likelihood', 'snap_off_forward', 'snap_off_backward']
     >>> found.attrs["verdict"].partition(":")[0]
     'Too few replicates to judge'
     """
     check_whole_number("replicates", replicates, 1)
-    experiment = experiment_of(family, rig, seed=seed, drive=drive, settings=settings, truth=truth)
+    experiment = experiment_of(family, rig, rng=rng, drive=drive, settings=settings, truth=truth)
     with open_results_store(experiment.identity, out, REPLICATES) as store:
         kept = keep_outcomes(store, replicate, experiment, int(replicates), workers=workers)
     return summary(experiment, kept)
@@ -194,7 +194,7 @@ def calibration_replicate(
     --------
     >>> from scipy import stats
     >>> family = Family("parabola", a=stats.uniform(0.4, 0.4))
-    >>> again = calibration_replicate(1, family, Rig(unknown="nothing"), seed=1)
+    >>> again = calibration_replicate(1, family, Rig(unknown="nothing"), rng=1)
     >>> list(again.truth), "posterior" in again.posterior
     (['a', 'q', 'x_c', 'noise_scale'], True)
     """
@@ -210,7 +210,7 @@ def experiment_of(
     family: Family | str = "parabola",
     rig: Rig | None = None,
     *,
-    seed: int,
+    rng: Rng,
     drive: Drive | Sequence[Drive] | None = None,
     settings: SamplerSettings | None = None,
     truth: Rig | Misspecification | None = None,
@@ -231,7 +231,7 @@ def experiment_of(
         Experiment(template, rig, family, (settings or _SETTINGS).events),
         drives,
         settings=settings or _SETTINGS,
-        seed=check_seed(seed),
+        seed=seed_sequence(rng),
         truth=truth,
     )
     default = replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS))

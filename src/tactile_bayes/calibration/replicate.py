@@ -19,6 +19,7 @@ from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.numerics.random_numbers import child
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
@@ -109,7 +110,7 @@ def make_replicate(experiment: SimulatedExperiment, number: int, *, throw: bool 
     throw : bool
         Whether an error is raised; otherwise it is the outcome. An interrupt is always raised.
     """
-    for_record, for_posterior, for_ranks = np.random.SeedSequence(experiment.seed, spawn_key=(number,)).spawn(3)
+    for_record, for_posterior, for_ranks = child(experiment.seed, number).spawn(3)
     simulation: Simulation | None = None
     result: Sampled | None = None
     began = time.perf_counter()

@@ -18,6 +18,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record import bases_of, rod_of
 from tactile_bayes.sweep import Drive
 
@@ -38,7 +39,7 @@ class SimulatedExperiment:
     again: SamplerSettings | None = None
     """Settings of a second run if the first has not converged; None for no second run."""
     probability: float = 0.9
-    seed: int = 0
+    seed: Seed = 0
     truth: Misspecification = field(default_factory=Misspecification)
 
     def __post_init__(self) -> None:
@@ -116,7 +117,7 @@ class SimulatedExperiment:
             "settings": json.dumps(asdict(self.settings), default=_plain),
             "again": "never" if self.again is None else json.dumps(asdict(self.again), default=_plain),
             "probability": repr(self.probability),
-            "seed": repr(self.seed),
+            "seed": seed_words(self.seed),
         }
         return entries | self._differences | {f"version of {name}": version(name) for name in _LIBRARIES}
 

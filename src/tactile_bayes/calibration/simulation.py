@@ -72,7 +72,7 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     discrepancy = model.discrepancy(point, loads)
     sensed = model.nuisances.sensed(loads, values, cell)
     scale = model.noise_scale(point)
-    readings = cell.simulate(sensed, seed=rng, noise_scale=scale, discrepancy=discrepancy)[0]
+    readings = cell.simulate(sensed, rng=rng, noise_scale=scale, discrepancy=discrepancy)[0]
     readings = readings * likelihood.rod.load_units
     template, cell = experiment.assumed.record, experiment.simulated.noise.cell
     # The template has the readings without noise and resolution; systematic errors are in the angles of the rod.

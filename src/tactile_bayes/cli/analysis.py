@@ -96,7 +96,7 @@ def infer(
             rig=of_record,
             checkpoint=checkpoint,
             probability=probability,
-            seed=seed,
+            rng=seed,
             settings=settings,
             record_file=paths[0],
             command=ctx.meta["words"],
@@ -130,7 +130,7 @@ def _of_many(
             of_all,
             out=out,
             family=family,
-            seed=seed,
+            rng=seed,
             settings=settings,
             probability=probability,
             workers=Workers(progress=lambda made: note(made.done)),
@@ -175,7 +175,7 @@ def demo(
     from tactile_bayes.runs.contour import analyse
     from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 
-    path, of_rig = measure_demo(out, seed=seed)
+    path, of_rig = measure_demo(out, rng=seed)
     if not output.is_silent:
         print(
             f"A wire of {ROD.length * 1e3:g} mm and {ROD.diameter * 1e3:g} mm diameter has swept forward and backward "
@@ -192,7 +192,7 @@ def demo(
             out,
             family="parabola",
             rig=rig,
-            seed=seed,
+            rng=seed,
             truth=CONTOUR,
             record_file=path,
             command=ctx.meta["words"],

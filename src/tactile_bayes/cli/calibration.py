@@ -72,7 +72,7 @@ def calibrate(
         "rig": rig.stated,
         "drive": [Rotation(pivot, drive_angles=angles) for pivot in pivots_in(base)],
         "truth": None if truth is None else Rig.read(truth),
-        "seed": seed,
+        "rng": seed,
     }
     if replicate is not None:
         from tactile_bayes.calibration.calibrate import calibration_replicate

@@ -70,7 +70,7 @@ def compare(
             families=family or SHAPES,
             rig=of_record,
             leave_one_out=leave_one_out,
-            seed=seed,
+            rng=seed,
             settings=SamplerSettings(max_seconds=max_seconds),
             progress=note,
         )

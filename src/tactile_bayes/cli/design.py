@@ -101,7 +101,7 @@ def design(
         made = design_into(
             out,
             known,
-            seed=seed,
+            rng=seed,
             drives=drives,
             criterion=criterion,
             nested=nested,

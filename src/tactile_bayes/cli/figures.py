@@ -124,7 +124,7 @@ def figures(
         "drive_step": None if carried else drive.rotation_step,
         "rods": rods,
         "load_cell": noise.load_cell,
-        "seed": seed,
+        "rng": seed,
         "width": COLUMN_WIDTH if column else PAGE_WIDTH,
     }
     numbers = list(dict.fromkeys(only or NUMBERS))

@@ -58,7 +58,7 @@ def measure(
                 "give --force-noise 0.05 --moment-noise 0.02"
             )
         show(1, 2)
-        measured = cell.measure(ideal, seed=seed)
+        measured = cell.measure(ideal, rng=seed)
         if not keep_truth:
             measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -48,7 +48,7 @@ def calibrate_rig(
             contour=contour,
             probability=probability,
             rig=read[0][1],
-            seed=seed,
+            rng=seed,
             progress=progress,
         )
     return Answer([*run.messages, "", quantities(run.summary, {}), "", run.files], lambda: _numbers(run))

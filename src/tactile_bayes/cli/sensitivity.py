@@ -92,7 +92,7 @@ def sensitivity(
     stated = rig.stated
     for name in profiles:
         paper_profile(name, q=0.5)  # type: ignore[arg-type]  # refuses any other
-    common: dict[str, Any] = {"rig": stated, "seed": seed}
+    common: dict[str, Any] = {"rig": stated, "rng": seed}
     drives = [Rotation(pivot, drive_step=math.radians(drive_step)) for pivot in pivots_in(base)]
     material = _material(stated) if best_rod else None
     first: Any = profiles[0]

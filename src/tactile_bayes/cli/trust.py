@@ -69,7 +69,7 @@ def trust(
             replicates=replicates,
             assumptions=assumptions,
             probability=probability,
-            seed=seed,
+            rng=seed,
             workers=work.reporting(note),
         )
     found = made.result

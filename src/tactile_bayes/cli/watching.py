@@ -110,7 +110,7 @@ def watch(
         families=family or ["parabola"],
         record_file=record,
         command=ctx.meta["words"],
-        seed=seed,
+        rng=seed,
         particles=particles,
         rig=stated.without_bare_cell,
     ) as watched:

@@ -25,12 +25,13 @@ from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, settings_of, spawn
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, settings_of
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.parameters.matched_priors import matched_priors
 from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
+from tactile_bayes.numerics.random_numbers import Rng, spawn
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import record_hash, rod_of
 from tactile_bayes.rig.rig import Rig, rig_of
@@ -75,7 +76,7 @@ def compare_families(
     families: Sequence[Family | str] = SHAPES,
     rig: Rig | None = None,
     *,
-    seed: Seed,
+    rng: Rng,
     leave_one_out: bool = True,
     false_alarm: float = 1e-3,
     settings: SamplerSettings | None = None,
@@ -97,8 +98,8 @@ def compare_families(
         Two or more families of `infer_contour`; the distributions of a `Family` replace default priors (see Notes).
     rig : Rig, optional
         As in `infer_contour`, the same for all families.
-    seed : int or numpy.random.SeedSequence
-        Seed of all random numbers; the same seed gives the same result.
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
+        Random numbers; the same seed gives the same result.
     leave_one_out : bool
         If True, leave-one-out densities are computed, which doubles the time.
     false_alarm : float
@@ -173,10 +174,10 @@ def compare_families(
     >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, scan
     >>> from tactile_bayes.contours import Circle
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(Circle(1.0, q=0.5), drive_step=0.04).record, seed=1)
+    >>> measured = cell.measure(scan(Circle(1.0, q=0.5), drive_step=0.04).record, rng=1)
     >>> quick = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.1)
     >>> options = {"rig": Rig(load_cell=cell, unknown="nothing"), "leave_one_out": False, "settings": quick}
-    >>> found = compare_families(measured, ["circle", "ellipse", "parabola"], seed=1, **options)
+    >>> found = compare_families(measured, ["circle", "ellipse", "parabola"], rng=1, **options)
     >>> found.attrs["most_probable"], found.fits.values.tolist()
     ('circle', [True, True, False])
     """
@@ -190,7 +191,7 @@ def compare_families(
     if experiment.rig.calibration is not None:
         refuse_other_rig(experiment.rig.calibration, experiment.about)
     length = rod_of(experiment.record).length
-    seeds = dict(zip(names, spawn(seed, len(names)), strict=True))
+    seeds = dict(zip(names, spawn(rng, len(names)), strict=True))
     tried: dict[str, _Tried] = {}
     problems = {
         name: contour_problem(replace(experiment, family=matched(family, length))) for name, family in compared.items()
@@ -232,13 +233,7 @@ def _ceiling(model: ContourModel, walk: Walk) -> float:
 
 
 def checked_families(families: Sequence[Family | str]) -> list[Family]:
-    """Return the families that are to be compared.
-
-    Raises
-    ------
-    ParameterError
-        If they are fewer than two different ones, or unknown.
-    """
+    """Return the families that are to be compared."""
     if isinstance(families, str | Family):
         raise ParameterError(f"families is {families!r}: give several, like ['parabola', {families!r}]")
     listed: Any = families.tolist() if isinstance(families, np.ndarray) else families

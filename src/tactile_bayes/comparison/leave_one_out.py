@@ -80,11 +80,6 @@ def largest_k(draws: int) -> float:
     """Return the Pareto k̂ above which so many draws do not represent the posterior without a sample.
 
     It is the smaller of 1 − 1 / log₁₀ draws and 0.7 (Vehtari et al. 2024, JMLR 25(72)).
-
-    Examples
-    --------
-    >>> largest_k(1000), largest_k(100_000)
-    (0.6666666666666667, 0.7)
     """
     return min(1.0 - 1.0 / math.log10(draws), 0.7)
 
@@ -96,32 +91,7 @@ def left_out(log_densities: Floats) -> LeftOut:
     allows for the autocorrelation of the densities. A small k̂ is no proof where the posterior without a sample extends
     to values that the whole posterior excludes, as beside a jump: see `left_out_from_wider`.
 
-    Parameters
-    ----------
-    log_densities : ndarray, shape (chains, draws, samples)
-        Log-density of each sample under each posterior draw; at least 25 draws.
-
-    Returns
-    -------
-    LeftOut
-
-    Raises
-    ------
-    ParameterError
-        If the shape is another, there are too few draws, or some log-density is not finite.
-
-    Examples
-    --------
-    Predict each of 50 normal numbers of standard deviation 1 and unknown mean from the others:
-
-    >>> rng = np.random.default_rng(1)
-    >>> y = rng.normal(size=50)
-    >>> mean = rng.normal(y.mean(), 50**-0.5, (4, 500, 1))
-    >>> found = left_out(-0.5 * (y - mean) ** 2 - 0.5 * np.log(2 * np.pi))
-    >>> predicted = (50 * y.mean() - y) / 49
-    >>> exact = -0.5 * np.log(2 * np.pi * 50 / 49) - 0.5 * (y - predicted) ** 2 * 49 / 50
-    >>> bool(np.all(abs(found.log_density - exact) < 4 * found.standard_error)), bool(found.pareto_k.max() < 0.5)
-    (True, True)
+    Shapes: log_densities (chains, draws, samples).
     """
     logs = _checked(log_densities)
     chains, draws, samples = logs.shape
@@ -153,32 +123,7 @@ def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
 
         p(y_i | all other y) = Σ_s w_s p(y_i | θ_s) / Σ_s w_s,   w_s = Π_{j in E, j ≠ i} p(y_j | θ_s).
 
-    Parameters
-    ----------
-    log_densities : ndarray, shape (chains, draws, events)
-        Log-density of each sample in E under each draw of the posterior without E; −∞ where a draw excludes the sample.
-        The samples must be independent of all others given θ; for correlated samples use `reweighted`.
-    chosen : int
-        Index in E of the sample to be predicted.
-
-    Returns
-    -------
-    FromWider
-
-    Raises
-    ------
-    ParameterError
-        If the shape is another, there is no such sample, or some log-density is NaN or +∞.
-
-    Examples
-    --------
-    The place of a jump is uniform between 0 and 3, and samples at 1 and 2 found the jump between them:
-
-    >>> jump = np.random.default_rng(1).uniform(0.0, 3.0, (4, 1000))
-    >>> passed = np.stack([jump > 1.0, jump < 2.0], axis=-1)
-    >>> found = left_out_from_wider(np.log(np.where(passed, 1.0, 1e-9)), 1)
-    >>> bool(abs(found.log_density - np.log(0.5)) < 4 * found.standard_error), round(found.effective / 4000, 1)
-    (True, 0.7)
+    Shapes: log_densities (chains, draws, events).
     """
     logs = _checked(log_densities)
     if not 0 <= chosen < logs.shape[-1]:
@@ -192,28 +137,7 @@ def reweighted(log_weights: Floats, log_density: Floats) -> FromWider:
     It serves for correlated samples: draws of a posterior without several samples are weighted by the likelihood of all
     samples except one over the likelihood of those that the posterior was given.
 
-    Parameters
-    ----------
-    log_weights : ndarray, shape (chains, draws)
-        Logarithms of the weights, up to a constant; −∞ where the narrower distribution excludes a draw.
-    log_density : ndarray, shape (chains, draws)
-        Log-density of the predicted sample under each draw.
-
-    Returns
-    -------
-    FromWider
-
-    Raises
-    ------
-    ParameterError
-        If the shapes differ, or a value is NaN or +∞.
-
-    Examples
-    --------
-    >>> weights, densities = np.array([[2.0, 2.0, 1e-9, 1e-9]]), np.array([[0.1, 0.3, 0.9, 0.9]])
-    >>> found = reweighted(np.log(weights), np.log(densities))
-    >>> round(math.exp(found.log_density), 3), round(found.effective, 3), found.standard_error
-    (0.2, 2.0, inf)
+    Shapes: log_weights (chains, draws), log_density (chains, draws).
     """
     weights, density = np.asarray(log_weights, dtype=np.float64), np.asarray(log_density, dtype=np.float64)
     if weights.ndim != 2 or weights.shape != density.shape or not weights.size:
@@ -243,24 +167,7 @@ def difference(one: Floats, other: Floats) -> Difference:
     doi 10.1007/s11222-016-9696-4. Below 4 or so a difference says little, and its standard error is too small (Sivula
     et al. 2020, arXiv 2008.10296).
 
-    Parameters
-    ----------
-    one, other : ndarray, shape (samples,)
-        `LeftOut.log_density` of the two models for the same samples.
-
-    Returns
-    -------
-    Difference
-
-    Raises
-    ------
-    ParameterError
-        If the shapes differ, or there are fewer than 2 samples.
-
-    Examples
-    --------
-    >>> difference(np.array([-1.0, -2.0, -1.5]), np.array([-1.5, -2.0, -2.5]))
-    Difference(difference=1.5, standard_error=0.8660254037844386)
+    Shapes: one, other (samples,).
     """
     one, other = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
     if one.ndim != 1 or one.shape != other.shape or one.size < 2:
@@ -277,29 +184,7 @@ def stacking_weights(log_densities: Floats) -> Floats:
     They maximise Σ_i log Σ_k w_k p_k(y_i | all other y) over w ≥ 0 with sum one, a convex problem: Yao et al. 2018, doi
     10.1214/17-BA1091. The result is within 1e-5 per sample of the optimum.
 
-    Parameters
-    ----------
-    log_densities : ndarray, shape (models, samples)
-        `LeftOut.log_density` of each model; −∞ where a model excludes a sample that another allows.
-
-    Returns
-    -------
-    ndarray, shape (models,)
-
-    Raises
-    ------
-    ParameterError
-        If the shape is another, some value is NaN or +∞, or all models exclude a sample.
-    InferenceError
-        If the best weights cannot be found.
-
-    Examples
-    --------
-    Two coins, of which one shows heads in a quarter of throws and the other in three quarters, and 12 heads in 20:
-
-    >>> heads = np.repeat([True, False], [12, 8])
-    >>> stacking_weights(np.log([np.where(heads, 0.25, 0.75), np.where(heads, 0.75, 0.25)])).round(3)
-    array([0.3, 0.7])
+    Shapes: log_densities (models, samples) → (models,).
     """
     logs = np.asarray(log_densities, dtype=np.float64)
     if logs.ndim != 2 or not logs.size:

@@ -11,8 +11,9 @@ from tactile_bayes.comparison.leave_one_out import left_out, left_out_from_wider
 from tactile_bayes.inference.contour import Sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, sample, spawn
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, sample
 from tactile_bayes.inference.starts.contour_start import walk_of
+from tactile_bayes.numerics.random_numbers import Seed, spawn
 
 __all__ = ["PredictedSamples", "predicted_samples"]
 
@@ -40,11 +41,6 @@ def predicted_samples(
     There the record without a sample allows contours that would have been touched later, or let go earlier, of which
     the posterior has none: these samples are predicted from a posterior that is inferred again without any of them,
     weighted by the likelihood of all of them except one.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If an interrupt ends the sampling without these samples.
     """
     model = problem.model
     logs = _densities(model, sampled.draws)

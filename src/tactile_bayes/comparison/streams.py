@@ -18,10 +18,10 @@ from tactile_bayes.checks import check_function, check_numbers, check_path
 from tactile_bayes.comparison.families import GIVEN_UP, checked_families, matched, with_known
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
-from tactile_bayes.inference.ensembles import Seed
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.streams.stream import LEVELS, Stream
 from tactile_bayes.inference.streams.stream_state import read_tree
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.record import rod_of, validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig.rig import Rig, rig_of
@@ -49,7 +49,7 @@ class StreamComparison:
     ----------
     families : sequence of str or Family
         Two or more families, as in `compare_families`.
-    rig, seed, particles
+    rig, rng, particles
         As in `Stream`, the same for all families.
     x : array_like, optional
         Positions at which every update states quantiles of the contour's height, averaged over families [length].
@@ -72,9 +72,9 @@ class StreamComparison:
     >>> from tactile_bayes import LoadCell, Rig, scan
     >>> from tactile_bayes.contours import Circle
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(Circle(0.3, q=0.5), drive_step=0.05).record, seed=1)
+    >>> measured = cell.measure(scan(Circle(0.3, q=0.5), drive_step=0.05).record, rng=1)
     >>> rig = Rig(load_cell=cell, unknown="nothing")
-    >>> streams = StreamComparison(["circle", "parabola"], rig=rig, seed=1, particles=200)
+    >>> streams = StreamComparison(["circle", "parabola"], rig=rig, rng=1, particles=200)
     >>> now = streams.update(measured)
     >>> now.attrs["most_probable"]
     'circle'
@@ -85,7 +85,7 @@ class StreamComparison:
         families: Sequence[Family | str],
         *,
         rig: Rig | None = None,
-        seed: Seed,
+        rng: Rng,
         particles: int = 1000,
         x: ArrayLike | None = None,
         stop: Callable[[xr.Dataset], object] | None = None,
@@ -93,7 +93,7 @@ class StreamComparison:
         check_function("stop", stop)
         self._compared = {family.name: family for family in checked_families(families)}
         self._families = list(self._compared)
-        self._rig, self._seed, self._particles, self._stop = rig_of(rig), seed, particles, stop
+        self._rig, self._seed, self._particles, self._stop = rig_of(rig), seed_sequence(rng), particles, stop
         self._x = None if x is None else check_numbers("x", x, "give a list of finite numbers", shape=(None,))
         for family in self._compared.values():
             self._stream(family)  # refuses what it can before the first sample
@@ -298,7 +298,7 @@ class StreamComparison:
         return {name: self._stream(matched(family, length)) for name, family in self._compared.items()}
 
     def _stream(self, family: Family) -> Stream:
-        return Stream(family=family, rig=self._rig, seed=self._seed, particles=self._particles)
+        return Stream(family=family, rig=self._rig, rng=self._seed, particles=self._particles)
 
     def _left(self) -> list[str]:
         """Return the families that are not lost."""

@@ -180,13 +180,7 @@ FLANKS: dict[str, Flank] = {
 
 
 def sides_of(family: str) -> dict[str, str]:
-    """Names of the flanks of a family, by the prefix of the names of their parameters.
-
-    Examples
-    --------
-    >>> sides_of("circle"), sides_of("circle/ellipse")
-    ({'': 'circle'}, {'left_': 'circle', 'right_': 'ellipse'})
-    """
+    """Names of the flanks of a family, by the prefix of the names of their parameters."""
     names = family.split("/")
     return dict(zip(("left_", "right_") if len(names) > 1 else ("",), names, strict=True))
 
@@ -204,20 +198,7 @@ FAMILIES: dict[str, ContourFamily] = {
 
 
 def family_named(name: str) -> ContourFamily:
-    """Return the family with a name.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such family.
-
-    Examples
-    --------
-    >>> family_named("circle").parameters
-    ('r', 'q', 'x_c')
-    >>> family_named("parabola/power-law").parameters
-    ('left_a', 'right_w', 'right_n', 'q', 'x_c')
-    """
+    """Return the family with a name."""
     if not isinstance(name, str) or name not in FAMILIES:
         raise ParameterError(
             f"there is no family {shown(name)}: choose {', '.join(FLANKS)}, one for each flank, like "

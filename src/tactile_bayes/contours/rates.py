@@ -56,12 +56,7 @@ def mismatch(rate: Rate, of: Rate, stops: Floats) -> Mismatch | None:
 
     A rate may jump at stops only; a jump elsewhere is returned if there is nothing worse.
 
-    Parameters
-    ----------
-    rate, of : callable
-        Map arguments of shape (k, ...) to values of that shape.
-    stops : ndarray, shape (n, ...)
-        Arguments, not decreasing along the first axis; the other axes are those of many functions.
+    Shapes: stops (n, ...).
     """
     change, miss = _misses(rate, of, stops)
     excess = miss - _MISS * np.abs(change).max(axis=0) - _ROUNDING * np.abs(of(stops)).max(axis=0)

@@ -132,8 +132,8 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=100)
     >>> for profile in ("II", "III"):
     ...     ideal = scan(paper_profile(profile, q=0.5), drive_step=0.03).record
-    ...     measured = cell.measure(ideal, seed=1)
-    ...     result = infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), seed=1, settings=quick)
+    ...     measured = cell.measure(ideal, rng=1)
+    ...     result = infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), rng=1, settings=quick)
     ...     print(profile, bool(check_record(result).passed))
     II True
     III False

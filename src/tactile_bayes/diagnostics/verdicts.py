@@ -106,9 +106,9 @@ def verdicts(
     >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.02, moment_noise=0.008)
-    >>> measured = cell.measure(scan(paper_profile("III", q=0.5), drive_step=0.03).record, seed=1)
+    >>> measured = cell.measure(scan(paper_profile("III", q=0.5), drive_step=0.03).record, rng=1)
     >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=50)
-    >>> found = verdicts(infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), seed=1, settings=quick))
+    >>> found = verdicts(infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), rng=1, settings=quick))
     >>> print(found[0].split(":")[0])
     The family parabola and the rig as assumed do not describe the record
     """

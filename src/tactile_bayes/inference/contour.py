@@ -18,17 +18,7 @@ from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import (
-    Coordinates,
-    Draws,
-    Progress,
-    SamplerSettings,
-    Seed,
-    sample,
-    seed_sequence,
-    settings_of,
-    spawn,
-)
+from tactile_bayes.inference.ensembles import Coordinates, Draws, Progress, SamplerSettings, sample, settings_of
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.gauge import Gauge
@@ -36,6 +26,7 @@ from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.parameters.rig_prior import rig_prior
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
+from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
 from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rig.rig import Rig, expanded, rig_of
 
@@ -50,7 +41,7 @@ def infer_contour(
     *,
     family: Family | str = "parabola",
     rig: Rig | None = None,
-    seed: Seed,
+    rng: Rng,
     settings: SamplerSettings | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
@@ -78,8 +69,8 @@ def infer_contour(
     rig : Rig, optional
         Rod, load cell, and the unknowns of the rig, which are inferred beside the contour; by default those that the
         record states, with the unknowns of a real rig.
-    seed : int or numpy.random.SeedSequence
-        Seed of all random numbers; the same seed gives the same draws.
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
+        Random numbers. The same seed gives the same draws; a generator goes on, so that the next call has others.
     settings : SamplerSettings, optional
         Criteria of convergence, and limits of steps and time.
     checkpoint : path-like, optional
@@ -108,7 +99,7 @@ def infer_contour(
     RecordError
         If `measured` is no record.
     ParameterError
-        If the family is unknown, the seed is no whole number from 0 up, the load cell has noise on some channels, and
+        If the family is unknown, `rng` is none of these, the load cell has noise on some channels, and
         none on another, two unknowns have the same effect, or the calibration of the rig is of another rod, load cell
         or unit.
     InferenceError
@@ -147,15 +138,15 @@ def infer_contour(
     >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> rig = Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02), unknown="nothing")
-    >>> measured = rig.load_cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> measured = rig.load_cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> result = infer_contour(measured, family="parabola", rig=rig, seed=1, settings=quick)
+    >>> result = infer_contour(measured, family="parabola", rig=rig, rng=1, settings=quick)
     >>> bool(result.attrs["converged"]), list(result["posterior"].data_vars)
     (True, ['a', 'q', 'x_c', 'noise_scale'])
     """
     settings = settings_of(settings)
     experiment = Experiment(measured, rig_of(rig), family, settings.events)
-    return _posterior_of(experiment, seed, settings, checkpoint, progress, keep)
+    return _posterior_of(experiment, rng, settings, checkpoint, progress, keep)
 
 
 def calibrate_rig(
@@ -163,7 +154,7 @@ def calibrate_rig(
     *,
     contour: Contour,
     rig: Rig | None = None,
-    seed: Seed,
+    rng: Rng,
     settings: SamplerSettings | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
@@ -187,7 +178,7 @@ def calibrate_rig(
     rig : Rig, optional
         The rig so far. If it has been calibrated by another record, of this gauge or of another one, the result rests
         on both.
-    seed, settings, checkpoint, progress, keep
+    rng, settings, checkpoint, progress, keep
         As in `infer_contour`.
 
     Returns
@@ -213,14 +204,14 @@ def calibrate_rig(
     >>> from tactile_bayes.contours import Circle
     >>> from tactile_bayes.rig import NOTHING
     >>> pin, cell = Circle(r=0.2, q=0.5), LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(pin, drive_step=0.1).record, seed=1)
+    >>> measured = cell.measure(scan(pin, drive_step=0.1).record, rng=1)
     >>> rig = Rig(load_cell=cell, unknown={**NOTHING, "rigidity_scale": "default"})
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> list(calibrate_rig(measured, contour=pin, rig=rig, seed=1, settings=quick).calibration.priors)
+    >>> list(calibrate_rig(measured, contour=pin, rig=rig, rng=1, settings=quick).calibration.priors)
     ['rigidity_scale']
     """
     settings, rig = settings_of(settings), rig_of(rig)
-    posterior = rig_posterior(records, contour, rig, seed, settings, checkpoint, progress, keep)
+    posterior = rig_posterior(records, contour, rig, rng, settings, checkpoint, progress, keep)
     found = rig_prior(posterior)
     left = {name: value for name, value in expanded(rig.entries).items() if name not in found.priors}
     return replace(rig, unknown=left, calibration=found)
@@ -230,7 +221,7 @@ def rig_posterior(
     records: xr.Dataset,
     contour: Contour,
     rig: Rig,
-    seed: Seed,
+    rng: Rng,
     settings: SamplerSettings,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
@@ -240,12 +231,12 @@ def rig_posterior(
     experiment = Experiment(records, rig, events=settings.events, gauge=Gauge(contour))
     if not experiment.nuisances.names:
         raise ParameterError("nothing of the rig is unknown: say that one of its parameters is, like rigidity_scale")
-    return _posterior_of(experiment, seed, settings, checkpoint, progress, keep)
+    return _posterior_of(experiment, rng, settings, checkpoint, progress, keep)
 
 
 def _posterior_of(
     experiment: Experiment,
-    seed: Seed,
+    rng: Rng,
     settings: SamplerSettings,
     checkpoint: str | os.PathLike[str] | None,
     progress: Callable[[Progress], object] | None,
@@ -256,7 +247,7 @@ def _posterior_of(
         check_path("checkpoint", checkpoint, "give the path of a folder, or None")
     check_function("progress", progress)
     check_function("keep", keep)
-    seed_sequence(seed)
+    seed = seed_sequence(rng)
     problem = contour_problem(experiment)
     return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress, keep=keep).tree
 
@@ -280,23 +271,7 @@ def sampled(
     walk: Walk | None = None,
     with_prior: bool = True,
 ) -> Sampled:
-    """Return the posterior of a problem.
-
-    Parameters
-    ----------
-    problem : ContourProblem
-    seed, settings, checkpoint, progress, keep
-        As in `infer_contour`.
-    walk : Walk, optional
-        Start and coordinates of the walkers, in place of those from a search for the optimum.
-    with_prior : bool
-        Whether the result has a group of draws from the prior.
-
-    Raises
-    ------
-    InferenceError, ReachError
-        As in `infer_contour`.
-    """
+    """Return the posterior of a problem."""
     seeds = spawn(seed, 4)
     deadline = Deadline.after(settings.max_seconds)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another

@@ -17,23 +17,7 @@ def events_of(
 ) -> dict[str, Floats]:
     """Return drive angle and contact point of first contact and snap-off in every sweep segment.
 
-    Parameters
-    ----------
-    likelihood : RecordLikelihood
-    contours : Contour
-        Contours with parameters of shape (n,).
-    rig : RigValues, optional
-        Deviations from the stated rig.
-    exact : bool
-        Whether events are exact to rounding; otherwise their errors are below 1e-6 rad and 1e-5 rod lengths, at a
-        quarter of the cost.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n, segments)
-        first_drive_angle and snap_off_drive_angle [rad]; first_contact_x, first_contact_y, snap_off_contact_x and
-        snap_off_contact_y [length]. If a drive carries the base, also first_travel and snap_off_travel: ways of the
-        base [length] where it does so, and else drive angles [rad].
+    Returns shape (n, segments).
     """
     count = contours.shape[0]
     paths = likelihood.paths(contours, rig, exact=exact)

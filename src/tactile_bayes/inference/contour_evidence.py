@@ -42,18 +42,6 @@ def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Gener
 
     The prior is restricted to contours within reach, as in the generator, so that the integral over all contours is
     divided by their share. With priors of other widths, the evidence follows from the same draws by importance weights.
-
-    Parameters
-    ----------
-    model : ContourModel
-    sampled : Sampled
-        Posterior of the model.
-    rng : np.random.Generator
-
-    Raises
-    ------
-    InferenceError
-        If the draws are too few, or the posterior is too far from normal for an estimate.
     """
     coordinates, (chains, _, size) = sampled.coordinates, sampled.draws.samples.shape
     kept = sampled.draws.evenly(_DRAWS // chains)

@@ -88,7 +88,7 @@ def _predictions(model: ContourModel, draws: Draws, kept: Index, rng: np.random.
     discrepancy = joined(smooth)
     for block in blocks(len(points), predicted[0].size):
         scale, own = model.noise_scale(points[block]), None if discrepancy is None else discrepancy.take(block)
-        predicted[block] = cell.simulate(predicted[block], seed=rng, noise_scale=scale, discrepancy=own)
+        predicted[block] = cell.simulate(predicted[block], rng=rng, noise_scale=scale, discrepancy=own)
     shape = (len(draws.samples), kept.size, samples)
     coords = {"chain": np.arange(shape[0]), "draw": kept}
     predictive = {}

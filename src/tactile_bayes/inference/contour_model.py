@@ -302,26 +302,7 @@ class ContourModel:
         return points
 
     def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:
-        """Draw from the prior of contours within reach.
-
-        Parameters
-        ----------
-        rng : np.random.Generator
-        count : int
-            Number of draws; fewer are returned if they are very rare or the deadline passes, but at least one.
-        deadline : Deadline
-
-        Returns
-        -------
-        points : ndarray, shape (count, d)
-        share : float
-            Share of all draws that are within reach.
-
-        Raises
-        ------
-        ReachError
-            If none of many draws is within reach.
-        """
+        """Draw from the prior of contours within reach. Returns points, shape (count, d)."""
         found, drawn, without_friction = [np.empty((0, len(self.names)))], 0, 0
         most = max(_MOST_TRIALS * count, _FEWEST_TRIALS)
         while (had := sum(map(len, found))) < count and drawn < most:

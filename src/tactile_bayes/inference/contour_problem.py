@@ -72,13 +72,7 @@ def identity_of(about: Mapping[str, Any]) -> dict[str, str]:
 
 
 def contour_problem(experiment: Experiment) -> ContourProblem:
-    """Return the inference problem of an experiment, with the problems of other sides of contact if they are doubtful.
-
-    Raises
-    ------
-    InferenceError
-        If no sample carries a load.
-    """
+    """Return the inference problem of an experiment, and those of other sides of contact if they are doubtful."""
     record, cell = experiment.record, experiment.noise.cell
     if is_long(record):  # each sweep is judged once, by all of its samples
         sides, doubtful = sides_and_doubts(without_errors(record, cell), cell)
@@ -103,13 +97,7 @@ def contour_problem(experiment: Experiment) -> ContourProblem:
 
 
 def _of_sides(experiment: Experiment) -> ContourProblem:
-    """Return the problem of an experiment, shortened, with the sides of contact that its record states.
-
-    Raises
-    ------
-    InferenceError
-        If no sample carries a load.
-    """
+    """Return the problem of an experiment, shortened, with the sides of contact that its record states."""
     experiment = experiment.shortened
     loaded = loaded_samples(experiment.record, experiment.noise.stated_cell)
     if not loaded.any():

@@ -113,13 +113,7 @@ class Experiment:
 
     @cached_property
     def model(self) -> ContourModel:
-        """Prior times likelihood of all samples.
-
-        Raises
-        ------
-        ParameterError
-            If the rig was calibrated with another rod, load cell, frame or unit, or by this record.
-        """
+        """Prior times likelihood of all samples."""
         if self.rig.calibration is not None:
             refuse_other_rig(self.rig.calibration, self.about)
         return ContourModel(self.record, self.contours, self.nuisances, self.noise, self.priors)

@@ -148,13 +148,7 @@ def _made(name: str, said: Mapping[str, Any]) -> Family:
 
 
 def family_of(family: str | Family) -> Family:
-    """Return a family by name, or as it is.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such family.
-    """
+    """Return a family by name, or as it is."""
     return family if isinstance(family, Family) else Family(family)
 
 

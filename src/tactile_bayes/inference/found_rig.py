@@ -18,17 +18,7 @@ __all__ = ["contact_points", "found_rig"]
 
 
 def found_rig(measured: xr.Dataset, posterior: xr.DataTree, load_cell: LoadCell | None = None) -> Corrected:
-    """Return the rig with the posterior medians of its parameters.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        The record.
-    posterior : xr.DataTree
-        Result of `infer_contour` for the record.
-    load_cell : LoadCell, optional
-        The load cell of its rig; by default that of the record.
-    """
+    """Return the rig with the posterior medians of its parameters."""
     draws = posterior_draws(posterior)
     found = {str(name): float(values.median()) for name, values in draws.data_vars.items()}
     stated = load_cell or LoadCell.from_record(measured) or LoadCell()
@@ -41,22 +31,7 @@ def found_rig(measured: xr.Dataset, posterior: xr.DataTree, load_cell: LoadCell 
 def contact_points(
     measured: xr.Dataset, posterior: xr.DataTree, load_cell: LoadCell | None = None
 ) -> xr.Dataset | None:
-    """Return contact points by Step 2, with the inferred noise, biases, stiffness, offset and friction.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        The record.
-    posterior : xr.DataTree
-        Result of `infer_contour` for the record.
-    load_cell : LoadCell, optional
-        The load cell of its rig; by default that of the record.
-
-    Returns
-    -------
-    xr.Dataset or None
-        Result of `reconstruct`; None if a load channel is missing.
-    """
+    """Return contact points by Step 2, with the inferred noise, biases, stiffness, offset and friction."""
     if set(present_channels(measured)) != set(CHANNELS):
         return None
     found = found_rig(measured, posterior, load_cell)

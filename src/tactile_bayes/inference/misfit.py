@@ -31,41 +31,12 @@ _SMOOTH = "shape-free"
 
 
 def is_inferred(suspect: str, nuisances: Collection[str]) -> bool:
-    """Return True if a nuisance parameter, or one of its group, is among the inferred ones.
-
-    Parameters
-    ----------
-    suspect : str
-        Name of a parameter or of a group.
-    nuisances : collection of str
-        Names of the inferred parameters.
-
-    Examples
-    --------
-    >>> is_inferred("gain", ["force_x_gain"]), is_inferred("lever", ["lever_x", "lever_y"]), is_inferred("drift", [])
-    (True, True, False)
-    """
+    """Return True if a nuisance parameter, or one of its group, is among the inferred ones."""
     return any(belongs(name, suspect) for name in nuisances)
 
 
 def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, friction: float = 0.0) -> str:
-    """Return sentences on the possible causes of a misfit, family and rig, and on what to try.
-
-    Parameters
-    ----------
-    families : collection of str
-        Families that were tried, or `GAUGE`.
-    nuisances : collection of str
-        Nuisance parameters that were inferred: they are not suggested again.
-    friction : float
-        Stated coefficient of friction: if it is not 0, friction is not suggested.
-
-    Examples
-    --------
-    >>> print(what_to_try(["circle"], ["friction", "drift", "lever_x", "lever_y", "backlash"]))
-    It may be the family or the rig. Try another family (--family shape-free, or compare), or infer more of the rig \
-("default" under [unknown] of rig.toml: gain, suspension_compliance, rest_curvature, taper, stem, length).
-    """
+    """Return sentences on the possible causes of a misfit, family and rig, and on what to try."""
     suspects = (*_SUSPECTS, GAUGE) if GAUGE in families else _SUSPECTS
     left = [name for name in suspects if not is_inferred(name, nuisances)]
     if friction and "friction" in left:

@@ -39,9 +39,10 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.distributions import Distribution, check_distribution, support_of
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers, spawn
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, scatter_walkers
 from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.mechanics.clamped_rod import base_curvature
+from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
 
 __all__ = ["default_priors", "infer_point_load"]
 
@@ -91,23 +92,6 @@ def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -
     ``compliance``       half-normal(R/4) [mm]                  the suspension is stiffer than the rod
     ``noise_sd``         log-uniform, 1e-6 to 1 full scale      only that there is some noise is known
     ===================  =====================================  ====================================================
-
-    Parameters
-    ----------
-    axial, lateral : array_like
-        Probe points [mm].
-    full_scale : float
-        A reading that the sensor hardly exceeds [units of the reading].
-
-    Returns
-    -------
-    dict of str to frozen scipy.stats distribution
-
-    Examples
-    --------
-    >>> priors = default_priors([10.0, 40.0], [5.0, 30.0], full_scale=1000.0)
-    >>> priors["clamp_axial"].std()
-    np.float64(12.5)
     """
     scale = _reach(np.asarray(axial, dtype=float), np.asarray(lateral, dtype=float)) / 4.0
     return {
@@ -341,7 +325,7 @@ def infer_point_load(
     lateral: ArrayLike,
     reading: ArrayLike,
     *,
-    seed: Seed,
+    rng: Rng,
     priors: Mapping[str, Distribution | float] | None = None,
     full_scale: float | None = None,
     small_deflection: bool = False,
@@ -359,7 +343,7 @@ def infer_point_load(
         Probe points [mm].
     reading : array_like, shape (n,)
         Readings of the sensor [its own unit], n at least 10.
-    seed : int or numpy.random.SeedSequence
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         The same seed gives the same posterior.
     priors : mapping, optional
         Frozen distributions of scipy.stats that replace those of `default_priors`; a number instead of a distribution
@@ -387,7 +371,7 @@ def infer_point_load(
     Raises
     ------
     ParameterError
-        If the data do not fit together, a prior is for an unknown name, or the seed is no whole number from 0 up.
+        If the data do not fit together, a prior is for an unknown name, or `rng` is none of these.
     InferenceError
         If no geometry that the priors allow lets the rod reach all the points.
 
@@ -397,7 +381,7 @@ def infer_point_load(
     >>> axial, lateral = along.ravel(), (along * across).ravel()
     >>> noise = np.random.default_rng(1).normal(scale=0.5, size=axial.size)
     >>> reading = 1e4 * base_curvature(axial + 2.0, lateral, 3.0) + noise
-    >>> tree = infer_point_load(axial, lateral, reading, seed=1, settings=SamplerSettings(max_steps=200))
+    >>> tree = infer_point_load(axial, lateral, reading, rng=1, settings=SamplerSettings(max_steps=200))
     >>> tree.posterior.clamp_axial.dims, list(tree.posterior_predictive)
     (('chain', 'draw'), ['reading', 'expected_reading'])
     """
@@ -413,6 +397,7 @@ def infer_point_load(
     unit = 3.0 / _reach(axial, lateral)
     model = _Model(axial, lateral, reading, unit, _VAGUE * full_scale, unknown, known, small_deflection)
 
+    seed = seed_sequence(rng)
     for_guess, for_walkers, for_predictions = spawn(seed, 3)
     centre, covariance = _normal_approximation(model, for_guess)
     top = float(model.log_probability(centre[None])[0])

@@ -23,33 +23,6 @@ def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats
     For each draw the discrepancy is computed from the residuals over the noise, of the real readings and of predicted
     ones (Gelman, Meng and Stern 1996, Statistica Sinica 6, 733). If the model holds, the p-value lies closer to one
     half than a uniform number does.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-        Result of `infer_point_load`.
-    discrepancy : callable
-        Maps residuals, shape (…, n), in the order of the data, to numbers, shape (…), which are large for a misfit. By
-        default the sum of squares.
-
-    Returns
-    -------
-    float
-        Share of the draws in which the prediction is at least as discrepant.
-
-    Examples
-    --------
-    >>> readings = np.zeros((1, 3, 2))
-    >>> noise = xr.Dataset({"noise_sd": (("chain", "draw"), np.ones((1, 3)))})
-    >>> predictive = {"expected_reading": readings, "reading": readings + np.array([0.5, 1.0, 2.0])[:, None]}
-    >>> dims = ("chain", "draw", "point")
-    >>> tree = xr.DataTree.from_dict({
-    ...     "posterior": noise,
-    ...     "posterior_predictive": xr.Dataset({name: (dims, a) for name, a in predictive.items()}),
-    ...     "observed_data": xr.Dataset({"reading": ("point", [0.9, 0.9])}),
-    ... })
-    >>> round(predictive_p_value(tree), 3)
-    0.667
     """
     posterior = tree["posterior"].to_dataset()
     if "noise_sd" in posterior:

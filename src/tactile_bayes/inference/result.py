@@ -17,7 +17,8 @@ import xarray as xr
 from tactile_bayes.checks import check_kind, check_path
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings
+from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
 from tactile_bayes.tasks.documents import read_json
 
@@ -34,7 +35,6 @@ __all__ = [
     "refuse_no_contour",
     "refuse_not_finite",
     "sample_stats",
-    "seed_words",
     "to_arviz",
     "write_result",
 ]
@@ -102,21 +102,8 @@ def _versions() -> str:
     return json.dumps({"Python": platform.python_version(), **{name: version(name) for name in _SOFTWARE}})
 
 
-def seed_words(seed: Seed) -> str:
-    """Return a seed as text, for an attribute."""
-    if isinstance(seed, np.random.SeedSequence):
-        return f"{seed.entropy}" + (f", spawn key {seed.spawn_key}" if seed.spawn_key else "")
-    return str(seed)
-
-
 def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
-    """Return the posterior group of a result, or the dataset if it is one already.
-
-    Raises
-    ------
-    InferenceError
-        If the tree has no such group, or a draw of a parameter is not a finite number.
-    """
+    """Return the posterior group of a result, or the dataset if it is one already."""
     draws = result if isinstance(result, xr.Dataset) else _posterior_group(result)
     for name, values in draws.data_vars.items():
         if set(values.dims) == {"chain", "draw"} and values.dtype.kind == "f":
@@ -305,13 +292,7 @@ def to_arviz(posterior: xr.DataTree) -> Any:
 
 
 def known_of(attrs: Mapping[Any, Any]) -> dict[str, float]:
-    """Return the known parameters that a posterior's attributes state: of the contour, and of the rig if not as stated.
-
-    Raises
-    ------
-    InferenceError
-        If they do not state them.
-    """
+    """Return the known parameters that attributes state: of the contour, and of the rig if not as stated."""
     if "known" not in attrs:
         raise InferenceError("the posterior does not state what was known: infer it again")
     known: dict[str, float] = read_json(attrs["known"], "known")

@@ -20,35 +20,7 @@ __all__ = ["experiment_of", "points_of", "predicted_points"]
 
 
 def experiment_of(posterior: xr.DataTree, family: Family | None = None, rig: Rig | None = None) -> Experiment:
-    """Return the experiment of which a tree is the posterior.
-
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`.
-    family, rig : Family and Rig, optional
-        Arguments of `infer_contour`. By default the posterior states them, unless a distribution is none of SciPy's.
-
-    Raises
-    ------
-    InferenceError
-        If the tree is no result of `infer_contour`.
-    ParameterError
-        If the posterior does not state its rig or family, or states other priors than the given ones.
-
-    Examples
-    --------
-    >>> from scipy import stats
-    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
-    >>> quick = SamplerSettings(ensembles=2, walkers=20, max_steps=20)
-    >>> narrow = Family("parabola", q=stats.uniform(0.4, 0.2))
-    >>> tree = infer_contour(measured, family=narrow, rig=Rig(unknown="nothing"), seed=1, settings=quick)
-    >>> experiment_of(tree).family
-    Family('parabola', q=uniform(0.4, 0.2))
-    """
+    """Return the experiment of which a tree is the posterior."""
     contour_draws(posterior)
     attrs: dict[Any, Any] = posterior.attrs
     found = Experiment(

@@ -56,14 +56,7 @@ class Blocks(NamedTuple):
     def log_density_within(self, deviation: Floats, present: Flags, *, pointwise: bool) -> Floats:
         """Return the log-density of the readings of blocks, given their means and slopes.
 
-        Parameters
-        ----------
-        deviation : ndarray, shape (..., 1 or samples, 3)
-            Standard deviation of a reading.
-        present : ndarray of bool, shape (3,)
-            True for channels that were measured.
-        pointwise : bool
-            Whether the result is by sample, shape (..., samples), or the sum, shape (...).
+        Shapes: deviation (..., 1 or samples, 3), present (3,).
         """
         deviation = deviation[..., present]
         scatter, freedom = self.scatter[:, present], self.freedom[:, None]

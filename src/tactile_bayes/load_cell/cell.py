@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_array, check_kind, check_optional, check_seed, check_switch, refused
+from tactile_bayes.checks import check_array, check_kind, check_optional, check_switch, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_loads
 from tactile_bayes.load_cell.covariance import covariance, squared_mahalanobis_distance
@@ -21,6 +21,7 @@ from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.likelihood import approximations, checked_noise_scale, log_density_left_out, log_likelihood
 from tactile_bayes.load_cell.measurement import corrected, measured, stated_entries
 from tactile_bayes.load_cell.zero_load import found_cell
+from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.record import CHANNELS, frame_of, validate
 
 __all__ = ["LoadCell"]
@@ -171,7 +172,7 @@ class LoadCell(DataSheet):
         >>> from tactile_bayes import scan
         >>> from tactile_bayes.contours import paper_profile
         >>> rig = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.1, 0.0, 0.2))
-        >>> cell = LoadCell.from_zero_load(rig.measure(scan(paper_profile("II", q=0.5)).record, seed=1))
+        >>> cell = LoadCell.from_zero_load(rig.measure(scan(paper_profile("II", q=0.5)).record, rng=1))
         >>> round(cell.force_noise, 2), round(cell.bias[2], 1)
         (0.05, 0.2)
         """
@@ -203,14 +204,14 @@ class LoadCell(DataSheet):
         """
         return approximations(self)
 
-    def measure(self, record: xr.Dataset, *, seed: int | np.random.Generator) -> xr.Dataset:
+    def measure(self, record: xr.Dataset, *, rng: Rng) -> xr.Dataset:
         """Measure a record with this load cell.
 
         Parameters
         ----------
         record : xr.Dataset
             A record without noise, in the units of the load cell. It is not changed.
-        seed : int or np.random.Generator
+        rng : int, numpy.random.SeedSequence or numpy.random.Generator
             Seed, or generator of the random numbers. A channel has the same white noise whether or not others are
             missing.
 
@@ -227,7 +228,7 @@ class LoadCell(DataSheet):
         RecordError
             If `record` is not a record, or the encoder's errors make it invalid.
         ParameterError
-            If `seed` is neither a nonnegative integer nor a generator; if there is cross-talk from a missing channel;
+            If `rng` is none of these; if there is cross-talk from a missing channel;
             if a cell with more than white noise has measured the record before.
 
         Examples
@@ -235,11 +236,11 @@ class LoadCell(DataSheet):
         >>> from tactile_bayes.record import make_record
         >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [0.5]}
         >>> ideal = make_record(columns, missing=("force_x", "force_y"))
-        >>> measured = LoadCell(moment_noise=0.02).measure(ideal, seed=1)
+        >>> measured = LoadCell(moment_noise=0.02).measure(ideal, rng=1)
         >>> float(measured["truth_holding_moment"][0]), round(float(measured["holding_moment"][0]), 3)
         (0.5, 0.507)
         """
-        return measured(self, record, _generator(seed))
+        return measured(self, record, generator(rng))
 
     def corrected(self, record: xr.Dataset) -> xr.Dataset:
         """Correct a record for the known errors of this cell: bias, gain, lever, offset and backlash.
@@ -269,7 +270,7 @@ class LoadCell(DataSheet):
         >>> from tactile_bayes.contours import paper_profile
         >>> cell = LoadCell(bias=(0.1, 0.0, 0.2), drive_angle_offset=0.01)
         >>> ideal = scan(paper_profile("II", q=0.5)).record
-        >>> back = cell.corrected(cell.measure(ideal, seed=1))
+        >>> back = cell.corrected(cell.measure(ideal, rng=1))
         >>> float(abs(back.force_y - ideal.force_y).max()) < 1e-15
         True
         """
@@ -289,7 +290,7 @@ class LoadCell(DataSheet):
         self,
         loads: ArrayLike,
         *,
-        seed: int | np.random.Generator,
+        rng: Rng,
         noise_scale: ArrayLike = 1.0,
         discrepancy: Discrepancy | None = None,
     ) -> Floats:
@@ -299,7 +300,7 @@ class LoadCell(DataSheet):
         ----------
         loads : array_like, shape (..., samples, 3)
             Loads in the order of `CHANNELS`, in the units and the frame of the load cell.
-        seed : int or np.random.Generator
+        rng : int, numpy.random.SeedSequence or numpy.random.Generator
             As in `measure`.
         noise_scale : array_like, broadcastable to shape (..., 3)
             Factor on the white noise of each channel.
@@ -313,11 +314,11 @@ class LoadCell(DataSheet):
         Raises
         ------
         ParameterError
-            If the shape of loads, the seed or a factor is impossible.
+            If the shape of loads, `rng` or a factor is impossible.
 
         Examples
         --------
-        >>> LoadCell(force_resolution=0.25, moment_range=1.0).simulate([[2.0, 0.3, 0.1]], seed=1)
+        >>> LoadCell(force_resolution=0.25, moment_range=1.0).simulate([[2.0, 0.3, 0.1]], rng=1)
         array([[1.  , 0.25, 0.  ]])
         """
         check_optional("discrepancy", discrepancy, Discrepancy)
@@ -329,7 +330,7 @@ class LoadCell(DataSheet):
         scale = checked_noise_scale(noise_scale, given.shape)
         batch = np.broadcast_shapes(scale.shape[:-1], given.shape[:-2])
         every = np.broadcast_to(given, (*batch, *given.shape[-2:]))
-        return corrupted_loads(self, every, _generator(seed), scale, discrepancy)
+        return corrupted_loads(self, every, generator(rng), scale, discrepancy)
 
     def covariance(self, loads: ArrayLike) -> Floats:
         """Covariance of the errors of readings for each sample by itself: errors that samples share count as noise.
@@ -507,9 +508,3 @@ def _by_sample(name: str, values: ArrayLike) -> Floats:
     if numbers.ndim != 2 or numbers.shape[1] != len(CHANNELS):
         raise refused(name, values, correction)
     return numbers
-
-
-def _generator(seed: int | np.random.Generator) -> np.random.Generator:
-    if isinstance(seed, np.random.Generator):
-        return seed
-    return np.random.default_rng(check_seed(seed, "give a nonnegative integer or a numpy.random.Generator"))

@@ -55,14 +55,7 @@ class ContactBounds:
 def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> ContactBounds:
     """Find contact, its onset and its snap-off in one sweep; the method is that of `zero_load`.
 
-    Parameters
-    ----------
-    readings : ndarray, shape (samples, channels)
-        Readings in the order of measurement, without NaN.
-    false_alarm : float
-        Probability of each of the errors that `zero_load` names.
-    floor : ndarray, shape (channels,)
-        Least possible variance of each channel, that of its rounding.
+    Shapes: readings (samples, channels), floor (channels,).
     """
     n = len(readings)
     readings = readings - readings[0]

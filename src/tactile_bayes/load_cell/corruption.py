@@ -23,22 +23,7 @@ def corrupted_loads(
 ) -> Floats:
     """Simulate readings of loads: lever, gain and bias, drift, noise and discrepancy, then the range, then the steps.
 
-    Parameters
-    ----------
-    sheet : DataSheet
-        Data sheet in the units of the loads.
-    loads : ndarray, shape (..., samples, 3)
-        Loads in the order of `CHANNELS`, samples of a record in the order of measurement. NaN stays NaN.
-    rng : Draws
-        Source of random numbers. White noise is drawn first, and each part for all three channels.
-    noise_scale : array_like, broadcastable to shape (..., 3)
-        Factor on the white noise of each channel.
-    discrepancy : Discrepancy, optional
-        Discrepancy of the model, whose arrays have the shape of the loads. It is drawn last.
-
-    Returns
-    -------
-    ndarray, shape (..., samples, 3)
+    Shapes: loads (..., samples, 3), noise_scale (..., 3) → (..., samples, 3).
     """
     noise = rng.standard_normal(loads.shape)
     if any(sheet.correlation):

@@ -21,14 +21,7 @@ _BISECTIONS, _POLISHED = 40, 3
 
 
 def unsaturated(quadratic: Any, cubic: Any) -> tuple[Floats, Floats]:
-    """Return the moments between which curves rise, infinite where there is no extremum.
-
-    Examples
-    --------
-    >>> low, high = unsaturated(0.5, 0.0)
-    >>> float(low), float(high)
-    (-1.0, inf)
-    """
+    """Return the moments between which curves rise, infinite where there is no extremum."""
     a, b = np.asarray(quadratic, dtype=float), np.asarray(cubic, dtype=float)
     root = np.sqrt(np.maximum(a**2 - 3.0 * b, 0.0))
     turns = a**2 > 3.0 * b
@@ -52,13 +45,7 @@ def slope_of(moment: Any, quadratic: Any, cubic: Any) -> Floats:
 
 
 def straightened(values: Floats, quadratic: float, cubic: float) -> Floats:
-    """Return the moments at which the curve has values; beyond saturation those at which it begins.
-
-    Examples
-    --------
-    >>> straightened(curved(np.array([-0.5, 2.0]), 0.3, 0.1), 0.3, 0.1).round(12)
-    array([-0.5,  2. ])
-    """
+    """Return the moments at which the curve has values; beyond saturation those at which it begins."""
     ends = []
     largest = float(np.nanmax(np.abs(values), initial=0.0))
     for end, reach in zip(unsaturated(quadratic, cubic), (-1.0, 1.0), strict=True):

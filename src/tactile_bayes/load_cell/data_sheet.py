@@ -281,13 +281,7 @@ class DataSheet:
         return np.hypot(self.noise, self.relative_noise * (self.expected(loads) - np.array(self.bias)))
 
     def misread(self, direction: ArrayLike) -> Floats:
-        """Encoder offset, including backlash, while the drive moves "forward" or "backward", without noise [rad].
-
-        Examples
-        --------
-        >>> DataSheet(drive_angle_offset=0.01, drive_angle_backlash=0.004).misread(["forward", "backward"])
-        array([0.012, 0.008])
-        """
+        """Encoder offset, including backlash, while the drive moves "forward" or "backward", without noise [rad]."""
         sense = np.where(np.asarray(direction) == "backward", -0.5, 0.5)
         return np.asarray(self.drive_angle_offset + self.drive_angle_backlash * sense)
 
@@ -298,18 +292,7 @@ class DataSheet:
     # ---- units and attributes
 
     def dimensionless(self, rod: Rod) -> Self:
-        """Load cell in the units of a rod: forces in EI/L², moments in EI/L, lengths in L.
-
-        Parameters
-        ----------
-        rod : Rod
-            Rod with which the cell is used.
-
-        Examples
-        --------
-        >>> DataSheet(force_noise=0.5, moment_noise=0.25).dimensionless(Rod(0.5, 2.0)).noise
-        array([0.0625, 0.0625, 0.0625])
-        """
+        """Load cell in the units of a rod: forces in EI/L², moments in EI/L, lengths in L."""
         check_kind("rod", rod, Rod, "give the Rod with which the cell is used")
         sizes = rod.unit_sizes
         entries = dict(self._all_entries())
@@ -319,13 +302,7 @@ class DataSheet:
         return self.from_entries(entries)
 
     def entries(self) -> dict[str, float | str]:
-        """Entries that differ from an ideal sensor, by the names in `LOAD_CELL_UNITS` and "frame"; see `from_entries`.
-
-        Examples
-        --------
-        >>> DataSheet(force_noise=0.05, bias=(0.0, 0.1, 0.0), drift=RandomWalk(force=1e-3)).entries()
-        {'force_noise': 0.05, 'bias_force_x': 0.1, 'random_walk_force': 0.001}
-        """
+        """Entries unlike an ideal sensor, by the names in `LOAD_CELL_UNITS` and "frame"; see `from_entries`."""
         ideal = dict(DataSheet()._all_entries())
         return {name: value for name, value in self._all_entries() if value != ideal.get(name, 0.0)}
 
@@ -342,23 +319,7 @@ class DataSheet:
 
     @classmethod
     def from_entries(cls, entries: Mapping[str, Any]) -> Self:
-        """Build a load cell from entries; missing ones are ideal.
-
-        Parameters
-        ----------
-        entries : mapping of str to float or str
-            Entries by the names in `LOAD_CELL_UNITS`, in the units of the record, and "frame".
-
-        Raises
-        ------
-        ParameterError
-            If a name is not known, or a value impossible.
-
-        Examples
-        --------
-        >>> DataSheet.from_entries({"moment_noise": 0.02, "gain_force_x_force_y": 0.01}).gain[1]
-        (0.0, 1.0, 0.01)
-        """
+        """Build a load cell from entries; missing ones are ideal."""
         unknown = [name for name in entries if name not in LOAD_CELL_UNITS and name != "frame"]
         if unknown:
             raise ParameterError(no_entry(unknown[0]))

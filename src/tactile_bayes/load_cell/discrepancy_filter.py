@@ -30,21 +30,6 @@ def innovations(
     The reading of a channel is weight · g + drift + bias + white noise, with g a Gaussian process of variance one and
     the covariance (1 + rate · d) exp(−rate · d) over the distance d: Matérn's with ν = 3/2, the state of which is g and
     its derivative (Hartikainen and Särkkä 2010, doi 10.1109/MLSP.2010.5589113).
-
-    Parameters
-    ----------
-    residual, noise, weight : ndarray, shape (n, samples, channels)
-        Residuals, variances of the white noise, and standard deviations of the discrepancy.
-    rate : ndarray, shape (n,)
-        √3 over the length of the process.
-    order : ndarray of int, shape (samples,)
-        Samples in the order of the filter.
-    step : ndarray, shape (samples,)
-        Distance from the previous sample in that order; infinite where an independent process begins.
-    wandering : ndarray, shape (3, channels)
-        Variance of the drift at the first sample, variance of its step, and variance of the bias.
-    decay : float
-        Factor on the drift from one sample to the next.
     """
     new, total = np.empty(residual.shape), np.empty(residual.shape)
     none = np.empty((0, 0))

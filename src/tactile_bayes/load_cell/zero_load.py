@@ -136,7 +136,7 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     >>> from tactile_bayes import LoadCell, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> ideal = scan(paper_profile("II", q=0.5)).record
-    >>> found = zero_load(LoadCell(moment_noise=0.02, force_noise=0.05, bias=(0.1, 0, 0)).measure(ideal, seed=1))
+    >>> found = zero_load(LoadCell(moment_noise=0.02, force_noise=0.05, bias=(0.1, 0, 0)).measure(ideal, rng=1))
     >>> found.snap_off.values.tolist()  # between samples, in both sweeps
     [[148, 149], [313, 314]]
     >>> bool(abs(found.bias[0] - 0.1) < 3 * found.bias_uncertainty[0])

@@ -1,1 +1,1 @@
-"""General numerical methods: Chebyshev series, roots, differences, blocks and selections of points."""
+"""General numerical methods: Chebyshev series, roots, differences, blocks and selections of points, random numbers."""

@@ -13,26 +13,6 @@ _MOST = 2_000_000
 
 
 def blocks(points: int, numbers: int, largest: int | None = None) -> list[Index]:
-    """Split the indices of points into blocks of about equal size.
-
-    Parameters
-    ----------
-    points : int
-        Number of points.
-    numbers : int
-        Numbers for each point in the largest array of the computation.
-    largest : int, optional
-        Largest number of points in a block.
-
-    Returns
-    -------
-    list of ndarray of int, shape (n_block,)
-        At least one block, which is empty if there are no points.
-
-    Examples
-    --------
-    >>> [block.tolist() for block in blocks(5, numbers=1_000_000)]
-    [[0, 1], [2, 3], [4]]
-    """
+    """Split the indices of points into blocks of about equal size. Returns shape (n_block,)."""
     most = max(1, _MOST // max(numbers, 1))
     return np.array_split(np.arange(points), max(1, -(-points // min(most, largest or most))))

@@ -20,26 +20,7 @@ def central_slopes(values: Callable[[Floats], Floats], point: Floats, steps: Flo
     A sample near snap-off may be in contact on one side of the point and released on the other. Its value then jumps;
     this is not a slope but a limit of the possible contours.
 
-    Parameters
-    ----------
-    values : callable
-        Maps points (n, d) to values (n, k), in standard deviations of the data.
-    point : ndarray, shape (d,)
-        Point at which derivatives are taken.
-    steps : ndarray, shape (d,), or float
-        Steps of the differences; not too small if values are interpolated.
-
-    Returns
-    -------
-    ndarray, shape (k, d)
-
-    Examples
-    --------
-    >>> def values(p):
-    ...     return np.stack([p[:, 0] ** 2, 5.0 * (p[:, 0] > 1.0)], axis=1)
-    >>> central_slopes(values, np.array([1.0]), 1e-4).round(6)
-    array([[2.],
-           [0.]])
+    Shapes: point (d,), steps (d,) → (k, d).
     """
     steps = np.broadcast_to(np.asarray(steps, dtype=float), point.shape)
     moves = np.diag(steps)

@@ -34,18 +34,7 @@ def bound_ends(function: Function, lo: Floats, hi: Floats, near: Floats) -> None
 def falling_root(function: Function, lo: Floats, hi: Floats, start: Floats | None = None) -> Floats:
     """Roots of functions that are positive at `lo` and not positive at `hi`, by Newton's method within the bracket.
 
-    Parameters
-    ----------
-    function : callable
-        Maps indices of functions and arguments to values and derivatives, each of shape (k,).
-    lo, hi : ndarray, shape (n,)
-        Bracket; `lo` may be greater than `hi`.
-    start : ndarray, shape (n,), optional
-        First guess in the bracket; by default its middle.
-
-    Returns
-    -------
-    ndarray, shape (n,)
+    Shapes: lo, hi (n,), start (n,) → (n,).
     """
     roots = 0.5 * (lo + hi) if start is None else start.astype(float)
     x, before = roots, np.abs(hi - lo)

@@ -10,13 +10,7 @@ __all__ = ["evenly_spread", "resampled"]
 
 
 def evenly_spread(points: int, most: int) -> Index:
-    """Return the indices of at most so many of the points, evenly spread from the first to the last.
-
-    Examples
-    --------
-    >>> evenly_spread(9, 5), evenly_spread(3, 5)
-    (array([0, 2, 4, 6, 8]), array([0, 1, 2]))
-    """
+    """Return the indices of at most so many of the points, evenly spread from the first to the last."""
     return np.unique(np.linspace(0, points - 1, min(points, most)).astype(np.intp))
 
 
@@ -24,11 +18,6 @@ def resampled(weights: Floats, count: int, rng: np.random.Generator | np.random.
     """Return `count` indices, increasing, each as often as its weight demands, rounded up or down at random.
 
     This is systematic resampling (Kitagawa 1996, doi 10.2307/1390750); weights need not add up to one.
-
-    Examples
-    --------
-    >>> resampled(np.array([2.0, 0.0, 1.0, 1.0]), 4, np.random.default_rng(1))
-    array([0, 0, 2, 3])
     """
     level = np.cumsum(weights)
     picked = np.searchsorted(level / level[-1], (np.arange(count) + rng.random()) / count)

@@ -10,6 +10,7 @@ import numpy as np
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.numerics.random_numbers import Rng, seed_words
 from tactile_bayes.paper_figures.choice import Choice, Direction, Profile, choice_of
 from tactile_bayes.paper_figures.contact_kinds import draw_contact_kinds
 from tactile_bayes.paper_figures.deformed_rods import draw_deformed_rods
@@ -78,7 +79,7 @@ def figure(
     drive_step: float | None = None,
     rods: int = 15,
     load_cell: LoadCell | None = None,
-    seed: int = 1,
+    rng: Rng | None = None,
     width: float = PAGE_WIDTH,
 ) -> Figure:
     """Draw a figure of Merker et al. 2018 (doi 10.1155/2018/1613945), computed anew.
@@ -108,8 +109,8 @@ def figure(
         contact.
     load_cell : LoadCell, optional
         Load cell that measures the records of Figure 11; by default they are without noise.
-    seed : int
-        Seed of the load cell's noise.
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator, optional
+        Random numbers of the load cell's noise, needed with a load cell.
     width : float
         Width of the figure [inches]: 7 for a page, 3.5 for a column, with panels below one another.
 
@@ -147,7 +148,7 @@ def figure(
         drive_step=drive_step,
         rods=rods,
         load_cell=load_cell,
-        seed=seed,
+        rng=rng,
         width=width,
     )
     return entry.draw(choice)
@@ -181,7 +182,11 @@ def caption(number: int, **options: Any) -> str:
     distances = ", ".join(f"{q:g}" for q in choice.distances)
     noise = ""
     if number == 11:
-        noise = ", without noise" if choice.load_cell is None else f", measured with noise (seed {choice.seed})"
+        noise = (
+            ", without noise"
+            if choice.load_cell is None or choice.seed is None
+            else f", measured with noise (seed {seed_words(choice.seed)})"
+        )
     along = "drive angle" if choice.drive is None else "travel of the base"
     return f"{entry.words.format(along=along)}, {_sweep_in_words(entry, choice)}{noise}, q = {distances} L."
 

@@ -12,12 +12,12 @@ from tactile_bayes.checks import (
     as_numbers,
     check_number,
     check_optional,
-    check_seed,
     check_whole_number,
 )
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ContourError, ParameterError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.plotting.axes import AxesArray
 from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
 from tactile_bayes.sweep import Carried, Rotation, Scan, scan
@@ -48,7 +48,7 @@ class Choice:
         Largest number of rods drawn in one sweep.
     load_cell : LoadCell or None
         Load cell that measures the records of reconstructed points.
-    seed : int
+    seed : SeedSequence or None
         Seed of its noise.
     width : float
         Width of the figure [inches].
@@ -59,7 +59,7 @@ class Choice:
     drive_step: float | None
     rods: int
     load_cell: LoadCell | None
-    seed: int
+    seed: np.random.SeedSequence | None
     width: float
 
     @property
@@ -103,7 +103,7 @@ def choice_of(
     drive_step: float | None,
     rods: int,
     load_cell: LoadCell | None,
-    seed: int,
+    rng: Rng | None,
     width: float,
 ) -> Choice:
     """Return the checked options of a figure.
@@ -120,7 +120,9 @@ def choice_of(
     inches = f"give inches from 3 to 12, like {COLUMN_WIDTH} or {PAGE_WIDTH}"
     width = check_number("width", width, inches, least=3.0, most=12.0)
     check_optional("load_cell", load_cell, LoadCell, "give a LoadCell")
-    check_seed(seed)
+    if load_cell is not None and rng is None:
+        raise ParameterError("the load cell has noise: give rng, like rng=1")
+    seed = None if rng is None else seed_sequence(rng)
     Rotation(drive_step=drive_step)  # refuses an impossible step
     check_optional("drive", drive, Carried, "the paper's rotations have none: give a Translation or a Motion")
     if drive is not None and not np.ptp(drive.poses[:, :2], axis=0).any():

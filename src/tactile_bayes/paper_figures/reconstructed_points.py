@@ -80,8 +80,8 @@ def _limits(scans: Sequence[Scan]) -> Limits:
 
 def _draw_points(ax: Axes, made: Scan, distance: float, across: tuple[float, float], choice: Choice) -> None:
     record = made.record
-    if choice.load_cell is not None:
-        record = choice.load_cell.measure(record, seed=choice.seed)
+    if choice.load_cell is not None and choice.seed is not None:
+        record = choice.load_cell.measure(record, rng=choice.seed)
     contacts = reconstruct(record, Rig(load_cell=choice.load_cell))
     ax.plot(*outline(made.contour, *across), color="0.55", linewidth=0.8, zorder=1.5, label="contour")
     last = {events.direction: events.snap_off.contact_x for events in made.sweeps}

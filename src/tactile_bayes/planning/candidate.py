@@ -16,6 +16,7 @@ from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.numerics.differences import central_slopes
+from tactile_bayes.numerics.random_numbers import Seed, words
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, STEP, Base, Knowledge
 from tactile_bayes.planning.record_information import COARSE_STEP, parameter_scales, reading_slopes, record_information
@@ -87,7 +88,7 @@ class Question:
     """Probability of the pointwise band, in (0, 1)."""
     nested: int
     """Number of draws of each nested posterior; 0 for Laplace's approximation alone."""
-    seed: int
+    seed: Seed
 
 
 class Expected(NamedTuple):
@@ -125,7 +126,7 @@ def expected_of(task: tuple[Question, int]) -> Expected:
     numbers = np.asarray([*candidate.base, candidate.drive_step])
     paths = [drive.poses.ravel() for drive in candidate.drives if isinstance(drive, Carried)]
     numbers = np.concatenate([numbers, *paths])
-    rng = np.random.default_rng([question.seed, *numbers.view(np.uint32)])
+    rng = np.random.default_rng([*words(question.seed), *numbers.view(np.uint32)])
     by_touch: dict[bytes, tuple[Question, ContourModel]] = {}
     for k, touches in enumerate(touched):
         if touches.tobytes() not in by_touch:
@@ -213,7 +214,7 @@ def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) ->
     units = rod.load_units
     cell = model.likelihood.load_cell
     scale = model.noise_scale(point[None])[0]
-    readings = cell.simulate(loads, seed=rng, noise_scale=scale, discrepancy=discrepancy) * units
+    readings = cell.simulate(loads, rng=rng, noise_scale=scale, discrepancy=discrepancy) * units
     template = model.measured
     return template.assign({name: ("sample", readings[:, i], template[name].attrs) for i, name in enumerate(CHANNELS)})
 

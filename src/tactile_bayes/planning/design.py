@@ -15,7 +15,6 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
-    check_seed,
     check_switch,
     check_whole_number,
     refused,
@@ -25,6 +24,7 @@ from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import record_of
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, words
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
 from tactile_bayes.planning.criterion import Criterion, CriterionName, criterion_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
@@ -52,7 +52,7 @@ def design(
     known: xr.DataTree | str | Family = "parabola",
     rig: Rig | None = None,
     *,
-    seed: int,
+    rng: Rng,
     drives: Sequence[Drive | Sequence[Drive]] | None = None,
     criterion: CriterionName | Criterion = "band",
     nested: bool = False,
@@ -73,7 +73,7 @@ def design(
     rig : Rig, optional
         As in `Plan`, if a family is given; a posterior has its own. Pivots are where they are planned: shifts of them
         are left out, of a posterior, too.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of all random numbers.
     drives : sequence of Rotation, Translation, Motion or sequences of them, optional
         Candidates; each sequence is one, whose sweeps are one record. Rotations without a grid of their own go from
@@ -141,24 +141,24 @@ def design(
     --------
     >>> from scipy import stats
     >>> known = Family("parabola", a=stats.lognorm(0.3, scale=0.6), q=stats.uniform(0.4, 0.2), x_c=stats.norm(0, 0.05))
-    >>> found = design(known, drives=[Rotation(), Rotation((0.0, -0.3))], draws=4, seed=1)
+    >>> found = design(known, drives=[Rotation(), Rotation((0.0, -0.3))], draws=4, rng=1)
     >>> bool(found.width[1] > found.width[0])  # farther away
     True
     """
     criterion = criterion_of(criterion)
     check_whole_number("draws", draws, 2)
     check_switch("nested", nested)
-    check_seed(seed)
-    rng = np.random.default_rng([int(seed), 1])
+    seed = seed_sequence(rng)
+    draws_from = np.random.default_rng([*words(seed), 1])
     if isinstance(known, str | Family):
-        knowledge = known_from_prior(rig_of(rig), family_of(known), draws=int(draws), rng=rng)
+        knowledge = known_from_prior(rig_of(rig), family_of(known), draws=int(draws), rng=draws_from)
     elif rig is not None:
         raise ParameterError("a rig and a posterior, which has its own: leave one of the two")
     else:
-        knowledge = known_from_posterior(known, draws=int(draws), rng=rng)
+        knowledge = known_from_posterior(known, draws=int(draws), rng=draws_from)
     candidates = _candidates(usual_drives(known, rig) if drives is None else drives)
     x = np.linspace(*(criterion.span or _span(knowledge)), _GRID_POINTS)
-    question = Question(knowledge, candidates, x, criterion.probability, _NESTED if nested else 0, int(seed))
+    question = Question(knowledge, candidates, x, criterion.probability, _NESTED if nested else 0, seed)
     with open_results_store(_identity(question), out, CANDIDATES) as store:
         found = keep_outcomes(store, expected_of, question, len(candidates), workers=workers)
     if not any(expected.reached for expected in found.values()):
@@ -283,7 +283,7 @@ def _identity(question: Question) -> dict[str, str]:
         "span": json.dumps([float(question.x[0]), float(question.x[-1])]),
         "probability": repr(question.probability),
         "nested": repr(question.nested),
-        "seed": repr(question.seed),
+        "seed": seed_words(question.seed),
         **{f"version of {name}": version(name) for name in _LIBRARIES},
     }
 

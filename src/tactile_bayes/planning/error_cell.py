@@ -17,6 +17,7 @@ from tactile_bayes.errors import ContourError, InferenceError, ReachError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.numerics.random_numbers import Seed, child
 from tactile_bayes.planning.amplification import METHODS, amplification
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
@@ -58,7 +59,7 @@ class MapTask:
     posteriors: Mapping[int, int]
     """Number of replicates for which posteriors are inferred, by index of the cell."""
     probability: float
-    seed: int
+    seed: Seed
 
 
 class CellOutcome(NamedTuple):
@@ -87,10 +88,12 @@ def error_cell(task: tuple[MapTask, int]) -> CellOutcome:
     numbers: dict[str, float] = {}
     numbers["gap_width"] = sum(stretch.end - stretch.begin for stretch in stretches(scan) if stretch.name == "gap")
     numbers |= _expected(plan, study.probability)
-    seeds = np.random.SeedSequence(study.seed, spawn_key=(number,)).spawn(study.replicates)
-    measured = [plan.cell.measure(scan.record, seed=np.random.default_rng(seed)) for seed in seeds]
+    seeds = child(study.seed, number).spawn(study.replicates)
+    measured = [plan.cell.measure(scan.record, rng=seed) for seed in seeds]
     numbers |= _reconstructed(plan, measured)
-    numbers |= _inferred(plan, measured[: study.posteriors.get(number, 0)], study.probability, study.seed)
+    numbers |= _inferred(
+        plan, measured[: study.posteriors.get(number, 0)], study.probability, child(study.seed, number, 1)
+    )
     return CellOutcome(numbers, "ok")
 
 
@@ -153,18 +156,20 @@ def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
     return numbers
 
 
-def _inferred(plan: Plan, measured: list[xr.Dataset], probability: float, seed: int) -> dict[str, float]:
+def _inferred(
+    plan: Plan, measured: list[xr.Dataset], probability: float, seed: np.random.SeedSequence
+) -> dict[str, float]:
     """Return mean widths of posterior bands, and the share of grid points at which they contain the contour."""
     numbers: dict[str, float] = {}
     widths: dict[str, list[float]] = {"touched": [], "gap": []}
     held: dict[str, list[float]] = {"touched": [], "gap": []}
     failed = 0
-    for k, one in enumerate(measured):
+    for one, own in zip(measured, seed.spawn(len(measured)), strict=True):
         try:
             posterior = sampled(
                 contour_problem(replace(plan.experiment, record=one)),
                 settings=replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * len(plan.model.names))),
-                seed=seed + k,
+                seed=own,
             ).tree
         except InferenceError:
             failed += 1

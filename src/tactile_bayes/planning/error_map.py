@@ -20,13 +20,13 @@ from tactile_bayes.checks import (
     check_mapping,
     check_names,
     check_numbers,
-    check_seed,
     check_whole_number,
     refused,
 )
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.planning.amplification import METHODS
 from tactile_bayes.planning.bands import Bands
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
@@ -61,7 +61,7 @@ def error_map(
     contours: Mapping[str, Contour] | Sequence[str] = ("II",),
     rig: Rig | None = None,
     *,
-    seed: int,
+    rng: Rng,
     over: Mapping[str, Sequence[float]] | None = None,
     drive: Rotation = _DRIVE,
     replicates: int = 20,
@@ -78,7 +78,7 @@ def error_map(
         scaled to the rod's length.
     rig : Rig, optional
         As in `Plan`.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of all random numbers; the results do not depend on the number of workers.
     over : mapping of str to sequence of float, optional
         The axes of the map: "distance", heights of the lowest point of each contour above the pivot [rod lengths], by
@@ -131,7 +131,7 @@ def error_map(
 
     Examples
     --------
-    >>> found = error_map(["II"], over={"noise_factor": [0.1, 1.0]}, replicates=2, seed=1, workers=1)
+    >>> found = error_map(["II"], over={"noise_factor": [0.1, 1.0]}, replicates=2, rng=1, workers=1)
     >>> found.rms_across.sel(reconstruction="constrained").values.ravel().round(4) < 0.02
     array([ True,  True])
     """
@@ -140,7 +140,6 @@ def error_map(
     objects = _objects(contours, rod)
     distances, noise_factors = _axes(over)
     check_whole_number("replicates", replicates, 1)
-    check_seed(seed)
     check_kind("bands", bands, Bands, "give Bands(probability=..., posterior_cells=...)")
     if not isinstance(drive, Rotation) or drive.base[1] != 0.0:
         raise refused("drive", drive, "give a Rotation((x, 0.0)), as the distance gives the height of the pivot")
@@ -158,7 +157,7 @@ def error_map(
         int(replicates),
         {int(number): min(bands.posterior_replicates, int(replicates)) for number in chosen},
         bands.probability,
-        int(seed),
+        seed_sequence(rng),
     )
     with open_results_store(_identity(task), out, CELLS) as store:
         kept = keep_outcomes(store, error_cell, task, len(cells), workers=workers)
@@ -206,7 +205,7 @@ def _identity(task: MapTask) -> dict[str, str]:
         "replicates": repr(task.replicates),
         "posteriors": json.dumps(dict(task.posteriors)),
         "probability": repr(task.probability),
-        "seed": repr(task.seed),
+        "seed": seed_words(task.seed),
         **{f"version of {name}": version(name) for name in _LIBRARIES},
     }
 
@@ -249,7 +248,7 @@ def _labelled(
             },
             "reconstruction": list(METHODS),
         },
-        attrs={"replicates": task.replicates, "probability": task.probability, "seed": task.seed},
+        attrs={"replicates": task.replicates, "probability": task.probability, "seed": seed_words(task.seed)},
     )
 
 

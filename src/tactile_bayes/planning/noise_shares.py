@@ -13,6 +13,7 @@ from scipy import stats
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence, seed_words
 from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import carried_sweeps, travels_of
@@ -26,7 +27,7 @@ _ERRORS = ("along", "across")
 
 
 def noise_shares(
-    plan: Plan, *, seed: int, samples: int = 1024, states: int = _STATES, methods: tuple[Method, ...] = METHODS
+    plan: Plan, *, rng: Rng, samples: int = 1024, states: int = _STATES, methods: tuple[Method, ...] = METHODS
 ) -> xr.Dataset:
     """Return the shares of each reading's noise in the variance of a contact's error (Sobol' 2001).
 
@@ -39,7 +40,7 @@ def noise_shares(
     plan : Plan
         Plan of the sweeps. Its load cell's white noise counts, as if that of every channel were independent of the
         others and of the load; bias and drift do not.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of the scrambled Sobol' sequences.
     samples : int
         Number of samples for each index, a power of two; `samples · (noises + 2)` contacts are reconstructed at each
@@ -86,6 +87,7 @@ def noise_shares(
     shape = (len(methods), quiet.sizes["sample"], len(_ERRORS), len(sources))
     first, total = np.full(shape, np.nan), np.full(shape, np.nan)
     rms, lost = np.full(shape[:3], np.nan), np.full(shape[:2], np.nan)
+    seed = seed_sequence(rng)
     for m, method in enumerate(methods):
         evaluated: list[Floats] = []
 
@@ -125,12 +127,12 @@ def noise_shares(
             "without_answer": (dims[:2], lost),
         },
         coords={"reconstruction": list(methods), "error": list(_ERRORS), "source": sources},
-        attrs={"seed": int(seed), "samples": int(samples)},
+        attrs={"seed": seed_words(seed), "samples": int(samples)},
     )
 
 
 def first_and_total(
-    function: Callable[[Floats], Floats], distributions: Sequence[Any], samples: int, seed: int
+    function: Callable[[Floats], Floats], distributions: Sequence[Any], samples: int, rng: Rng
 ) -> tuple[Floats, Floats]:
     """Return first-order and total Sobol' indices of a function's values, shape (values, inputs) each.
 
@@ -142,10 +144,10 @@ def first_and_total(
         Distributions of the independent inputs.
     samples : int
         Number of samples, a power of two.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of the scrambled Sobol' sequences.
     """
-    found = stats.sobol_indices(func=function, n=samples, dists=distributions, rng=np.random.default_rng(seed))
+    found = stats.sobol_indices(func=function, n=samples, dists=distributions, rng=generator(rng))
     return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)  # SciPy squeezes a single value
 
 

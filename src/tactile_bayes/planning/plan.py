@@ -150,7 +150,7 @@ class Plan:
     def certain(self, record: xr.Dataset) -> xr.Dataset:
         """Return an ideal record as the load cell reads it without random errors."""
         certain = LoadCell(**{name: getattr(self.cell, name) for name in (*CERTAIN, "frame")})
-        return certain.measure(record, seed=0)
+        return certain.measure(record, rng=0)
 
     def reconstruct(self, record: xr.Dataset, method: Literal["raw", "constrained"]) -> xr.Dataset:
         """Return the contact points of a record of this plan; see `tactile_bayes.reconstruct`."""

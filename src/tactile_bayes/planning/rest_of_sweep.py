@@ -6,9 +6,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from tactile_bayes.checks import check_numbers, check_probability, check_seed, check_whole_number
+from tactile_bayes.checks import check_numbers, check_probability, check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.result import record_of
+from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import known_from_posterior
 from tactile_bayes.planning.record_information import COARSE_STEP, reading_slopes, record_information
@@ -23,7 +24,7 @@ def rest_of_sweep(
     drive_angles: ArrayLike,
     x: ArrayLike,
     *,
-    seed: int,
+    rng: Rng,
     probability: float = 0.95,
     draws: int = 24,
 ) -> xr.Dataset:
@@ -37,7 +38,7 @@ def rest_of_sweep(
         Drive angles of the samples to come, in the direction of that sweep [rad].
     x : array_like, shape (k,)
         Positions of the band [length].
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of the draws.
     probability : float
         Probability of the pointwise band, in (0, 1).
@@ -68,19 +69,18 @@ def rest_of_sweep(
     >>> from tactile_bayes import LoadCell, Rig, Stream, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.05).record, seed=1)
-    >>> stream = Stream(rig=Rig(load_cell=cell, unknown="nothing"), seed=1, particles=200)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.05).record, rng=1)
+    >>> stream = Stream(rig=Rig(load_cell=cell, unknown="nothing"), rng=1, particles=200)
     >>> _ = stream.update(measured.isel(sample=slice(0, 30)))
-    >>> more = rest_of_sweep(stream.posterior(), measured.drive_angle[30:55], [0.0, 0.1], seed=1)
+    >>> more = rest_of_sweep(stream.posterior(), measured.drive_angle[30:55], [0.0, 0.1], rng=1)
     >>> bool((more.width < more.present_width).all())
     True
     """
-    check_seed(seed)
     check_whole_number("draws", draws, 2)
     check_probability("probability", probability)
     at = check_numbers("x", x, "give a list of finite numbers", shape=(None,))
     angles = check_numbers("drive_angles", drive_angles, "give drive angles in radians", shape=(None,))
-    known = known_from_posterior(posterior, draws=draws, rng=np.random.default_rng(seed))
+    known = known_from_posterior(posterior, draws=draws, rng=generator(rng))
     record = record_of(posterior)
     last = record.isel(sample=-1)
     direction: Direction = "forward" if last.direction == "forward" else "backward"

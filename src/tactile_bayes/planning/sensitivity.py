@@ -9,13 +9,13 @@ import xarray as xr
 from tactile_bayes.checks import (
     check_names,
     check_probability,
-    check_seed,
     check_whole_number,
     refused,
 )
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.family_parameters import enlarged
 from tactile_bayes.planning.information import information
@@ -38,7 +38,7 @@ def sensitivity(
     contour: Contour | None = None,
     rig: Rig | None = None,
     *,
-    seed: int,
+    rng: Rng,
     drive: Drive | Sequence[Drive] | None = None,
     family: Family | None = None,
     band_widths: Sequence[float] | None = None,
@@ -55,7 +55,7 @@ def sensitivity(
         2018 (doi 10.1155/2018/1613945) at the distance 0.5 rod lengths.
     rig, drive, family
         As in `Plan`.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of the samples by which Sobol' indices are estimated.
     band_widths : sequence of float, optional
         Mean widths of bands whose required noise is computed [length]; by default 0.0005 to 0.01 rod lengths.
@@ -94,13 +94,13 @@ def sensitivity(
 
     Examples
     --------
-    >>> found = sensitivity(seed=1, parts=["information", "required_noise"])
+    >>> found = sensitivity(rng=1, parts=["information", "required_noise"])
     >>> found["information"].bound.sel(parameter="a").item().__round__(4)
     0.0025
     """
     if not set(check_names("parts", parts)) <= set(PARTS) or not parts:
         raise refused("parts", parts, f"give a list of some of {', '.join(PARTS)}")
-    check_seed(seed)
+    seed = seed_sequence(rng)
     check_probability("probability", probability)
     check_whole_number("samples", samples, 1)
     rig = rig_of(rig)
@@ -112,7 +112,7 @@ def sensitivity(
     made_by: dict[str, Callable[[], xr.Dataset]] = {
         "amplification": lambda: amplification(plan),
         "information": lambda: information(plan, probability=probability),
-        "noise_shares": lambda: noise_shares(plan, seed=seed, samples=samples),
+        "noise_shares": lambda: noise_shares(plan, rng=seed, samples=samples),
         "required_noise": lambda: required_noise(plan, widths, probability=probability),
     }
     tree = xr.DataTree.from_dict({part: make() for part, make in made_by.items() if part in parts})

@@ -65,7 +65,7 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
     >>> from tactile_bayes import LoadCell, inspect_record, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5)).record, rng=1)
     >>> inspection(inspect_record(measured))[0, 1].get_title()
     'unloaded'
     """

@@ -22,13 +22,7 @@ _TICKS = {0.9: (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0), 2.2: (1.0, 2.0, 5.0), np.inf
 
 
 def group_of(found: Any, name: str, variables: set[str]) -> xr.Dataset:
-    """Return the dataset of a figure, given as a dataset, as a group, or in a whole result of `sensitivity`.
-
-    Raises
-    ------
-    ParameterError
-        If it is not such a dataset.
-    """
+    """Return the dataset of a figure, given as a dataset, as a group, or in a whole result of `sensitivity`."""
     if isinstance(found, xr.DataTree):
         found = (found[name] if name in found.children else found).to_dataset()
     if not isinstance(found, xr.Dataset) or not variables <= set(found.variables):
@@ -37,13 +31,7 @@ def group_of(found: Any, name: str, variables: set[str]) -> xr.Dataset:
 
 
 def check_among(name: str, value: str, found: xr.Dataset) -> None:
-    """Refuse a value that is not a label along a dimension.
-
-    Raises
-    ------
-    ParameterError
-        If it is not one of the labels.
-    """
+    """Refuse a value that is not a label along a dimension."""
     if not isinstance(value, str) or value not in found[name].values:
         raise ParameterError(f"{name} is {value!r}: there are {', '.join(map(str, found[name].values))}")
 

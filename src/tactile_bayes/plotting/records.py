@@ -140,7 +140,7 @@ def predictive(
     >>> from tactile_bayes import LoadCell, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> ideal = scan(paper_profile("II", q=0.5)).record
-    >>> measured = LoadCell(moment_noise=0.02, force_noise=0.05).measure(ideal, seed=1)
+    >>> measured = LoadCell(moment_noise=0.02, force_noise=0.05).measure(ideal, rng=1)
     >>> ends = {"lower": -0.04, "upper": 0.04}
     >>> predicted = xr.Dataset({f"holding_moment_{end}": ideal["holding_moment"] + off for end, off in ends.items()})
     >>> predictive(measured, predicted).shape

@@ -57,7 +57,7 @@ def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -
     --------
     >>> from matplotlib.figure import Figure
     >>> from tactile_bayes import sensitivity
-    >>> found = sensitivity(seed=1, parts=["required_noise"])
+    >>> found = sensitivity(rng=1, parts=["required_noise"])
     >>> required_noise(found, ax=Figure().subplots()).get_xlabel()
     'noise of the forces [$EI$/$L^2$]'
     """

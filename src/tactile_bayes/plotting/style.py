@@ -67,30 +67,7 @@ STYLES: Mapping[Style, Mapping[str, Any]] = {
 def style(name: Style = "print") -> Iterator[None]:
     """Give figures that are made and saved inside the block one look; Matplotlib's settings are restored after it.
 
-    Parameters
-    ----------
-    name : {"print", "screen"}
-        "print" has letters of 8 points and thin axes, for figures that are printed 7 inches wide or, in one column, 3.5
-        inches wide. "screen" has letters of 10 points. In both, PDF holds text in TrueType fonts and SVG holds it as
-        text, so that both can be searched and edited.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such style.
-
-    Notes
-    -----
     Fonts go into a file when it is saved: `savefig` belongs inside the block, too.
-
-    Examples
-    --------
-    >>> import io
-    >>> from matplotlib.figure import Figure
-    >>> with style("print"):
-    ...     figure = Figure(figsize=(3.5, 2.0))
-    ...     _ = figure.subplots().set_xlabel("drive angle")
-    ...     figure.savefig(io.BytesIO(), format="pdf")
     """
     check_choice("style", name, STYLES)
     import matplotlib as mpl

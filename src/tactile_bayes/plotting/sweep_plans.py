@@ -78,7 +78,7 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
     --------
     >>> from matplotlib.figure import Figure
     >>> from tactile_bayes import sensitivity
-    >>> found = sensitivity(seed=1, parts=["amplification"])
+    >>> found = sensitivity(rng=1, parts=["amplification"])
     >>> amplification(found, ax=Figure().subplots()).get_ylabel()
     'standard deviation of a contact point [$L$]'
     """
@@ -151,7 +151,7 @@ def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> A
     --------
     >>> from matplotlib.figure import Figure
     >>> from tactile_bayes import sensitivity
-    >>> found = sensitivity(seed=1, parts=["information"])
+    >>> found = sensitivity(rng=1, parts=["information"])
     >>> information(found, ax=Figure().subplots()).get_ylabel()
     'leverage of a reading'
     """
@@ -219,7 +219,7 @@ def noise_shares(
     --------
     >>> from matplotlib.figure import Figure
     >>> from tactile_bayes import sensitivity
-    >>> found = sensitivity(seed=1, parts=["noise_shares"], samples=8)
+    >>> found = sensitivity(rng=1, parts=["noise_shares"], samples=8)
     >>> noise_shares(found, ax=Figure().subplots()).get_ylabel()
     'share of variance'
     """
@@ -255,13 +255,7 @@ def noise_shares(
 
 
 def _of_sweep(found: xr.Dataset, sweep: int) -> xr.Dataset:
-    """Return the samples of a sweep in the order of the drive angle.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such sweep.
-    """
+    """Return the samples of a sweep in the order of the drive angle."""
     numbers = found["sweep"].values
     is_number = isinstance(sweep, int | np.integer) and not isinstance(sweep, bool)
     here = np.flatnonzero(numbers == sweep) if is_number else np.arange(0)

@@ -146,7 +146,7 @@ def reconstruct(
     >>> on = contacts.status == "ok"
     >>> float(abs(contacts.contact_y - (0.5 * contacts.contact_x**2 + 0.5)).where(on).max()) < 1e-10
     True
-    >>> noisy = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
+    >>> noisy = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, rng=1)
     >>> for method in ("raw", "constrained"):
     ...     print(method, float(reconstruct(noisy, method=method).normal_sd.median().round(4)))
     raw 0.0062

@@ -37,7 +37,7 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
         record,
         family=tb.Family.of(stored),
         rig=tb.Rig.of(stored),
-        seed=1,
+        rng=1,
         settings=tb.SamplerSettings(
             ensembles=2,
         ),
@@ -49,7 +49,7 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
     options = [
         "family=tb.Family.of(stored)",
         "rig=tb.Rig.of(stored)",
-        f"seed={_seed(seed)}",
+        f"rng={_seed(seed)}",
         *([] if streamed else ["settings=tb.SamplerSettings("]),
         *(f"{'' if streamed else '    '}{name}={value!r}," for name, value in settings.items()),
         *([] if streamed else [")"]),

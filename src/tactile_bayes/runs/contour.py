@@ -26,6 +26,7 @@ from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import known_of, posterior_draws, record_of, write_result
+from tactile_bayes.numerics.random_numbers import Rng
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod
 from tactile_bayes.rig.rig import Rig, rig_of, rod_with
@@ -121,7 +122,7 @@ def analyse(
     *,
     rig: Rig | None = None,
     probability: float = 0.95,
-    seed: int = 1,
+    rng: Rng,
     truth: Contour | None = None,
     record_file: str | os.PathLike[str] | None = None,
     command: Sequence[str] = (),
@@ -141,7 +142,7 @@ def analyse(
         the figures; created if missing. The posterior replaces all files of these names in it, and report.html,
         watch.html, trust.nc and the replicates behind it, which would belong to the former posterior; the other files
         come together at the end, so that a folder without summary.txt is not complete.
-    rig, seed, options
+    rig, rng, options
         Options of `infer_contour`.
     probability : float
         Probability of the band and of the intervals in the summary, in (0, 1).
@@ -178,7 +179,7 @@ def analyse(
         drawn.append(posterior)
 
     try:
-        keep(infer_contour(measured, rig=rig, seed=seed, keep=keep, **options))
+        keep(infer_contour(measured, rig=rig, rng=rng, keep=keep, **options))
     except Exception as error:
         if not drawn and isinstance(error, InferenceError):
             raise type(error)(" ".join((str(error), *check_units_and_signs(measured, rig.load_cell)))) from error

@@ -12,6 +12,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError, RecordWarning, TactileBayesError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.numerics.random_numbers import Rng
 from tactile_bayes.record import CHANNELS, MEASURED, read_record, rod_of, write_record
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR
@@ -36,14 +37,14 @@ RIG = Rig(rod=ROD, load_cell=LOAD_CELL, unknown="nothing")
 """The rig as it is stated."""
 
 
-def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> tuple[Path, Path]:
+def measure_demo(out: str | os.PathLike[str], *, rng: Rng) -> tuple[Path, Path]:
     """Sweep forward and backward in steps of 1°, measure, and write record.csv, without columns of truth, and rig.toml.
 
     Parameters
     ----------
     out : path-like
         Folder, created if missing; a run in it is removed.
-    seed : int
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of the load cell's noise.
 
     Raises
@@ -56,7 +57,7 @@ def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> tuple[Path, P
     record, rig : Path
         The files of the record and of the rig.
     """
-    measured = LOAD_CELL.measure(scan(CONTOUR, Rig(rod=ROD)).record, seed=seed)
+    measured = LOAD_CELL.measure(scan(CONTOUR, Rig(rod=ROD)).record, rng=rng)
     path, rig = Path(out) / "record.csv", Path(out) / "rig.toml"
     _refuse_another_record(path)
     _refuse_another_rig(rig)

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_path, check_probability, check_seed, refused
+from tactile_bayes.checks import check_path, check_probability, refused
 from tactile_bayes.errors import ParameterError, TactileBayesError
 from tactile_bayes.inference.ensembles import SamplerSettings, settings_of
 from tactile_bayes.inference.family import Family, family_of
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.record import read_record
 from tactile_bayes.record.bag import is_bag
 from tactile_bayes.rig.rig import Rig, rig_of
@@ -54,7 +55,7 @@ class _Task:
     out: Path
     rig: Rig
     family: Family
-    seed: int
+    seed: np.random.SeedSequence
     settings: SamplerSettings
     probability: float
 
@@ -65,7 +66,7 @@ class _Task:
             "record": _digest(self.path),
             "rig": self.rig.text,
             "family": repr(self.family),
-            "seed": str(self.seed),
+            "seed": seed_words(self.seed),
             "settings": json.dumps(asdict(self.settings)),
             "probability": repr(self.probability),
             "version": version("tactile-bayes"),
@@ -78,7 +79,7 @@ def infer_contours(
     *,
     out: str | os.PathLike[str],
     family: Family | str = "parabola",
-    seed: int,
+    rng: Rng,
     settings: SamplerSettings | None = None,
     probability: float = 0.95,
     workers: int | str | Workers | None = None,
@@ -98,7 +99,7 @@ def infer_contours(
     out : path-like
         Folder for a folder of each record, by the name of its file, and for runs.csv and runs.nc, the table; created if
         missing.
-    family, seed, settings
+    family, rng, settings
         As in `infer_contour`.
     probability : float
         Probability of bands and intervals, in (0, 1).
@@ -124,7 +125,7 @@ def infer_contours(
     workers = workers_of(workers)
     names = _names(paths)
     refuse_replacing((folder / name for name in MANY), paths)
-    made = (rig_of(rig), family_of(family), check_seed(seed), settings_of(settings), probability)
+    made = (rig_of(rig), family_of(family), seed_sequence(rng), settings_of(settings), probability)
     tasks = [_Task(path, folder / name, *made) for path, name in zip(paths, names, strict=True)]
     rows = {task.out.name: row for task in tasks if (row := _kept(task)) is not None}
     began, left = time.monotonic(), [task for task in tasks if task.out.name not in rows]
@@ -201,7 +202,7 @@ def _analysed(task: _Task) -> dict[str, Any]:
             rig=task.rig.without_bare_cell,
             family=task.family,
             probability=task.probability,
-            seed=task.seed,
+            rng=task.seed,
             settings=task.settings,
             record_file=task.path,
         )

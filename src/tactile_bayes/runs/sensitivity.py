@@ -106,7 +106,7 @@ def sensitivity_into(
     --------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     run = sensitivity_into(folder, seed=1, parts=["information"])
+    ...     run = sensitivity_into(folder, rng=1, parts=["information"])
     ...     sorted(path.name for path in run.files.values())
     ['information.png', 'sensitivity.nc', 'words.txt']
     """

@@ -36,22 +36,7 @@ _DOTTED = re.compile(r"[\w\-. \t]+")
 
 
 def read_json(text: Any, name: str) -> Any:
-    """Return the value of a JSON text, which messages call by `name`.
-
-    Raises
-    ------
-    ParameterError
-        If it is no JSON text, or is nested too deep.
-
-    Examples
-    --------
-    >>> read_json('{"bias": [1, 2.5]}', "priors")
-    {'bias': [1, 2.5]}
-    >>> read_json("[" * 2000, "priors")
-    Traceback (most recent call last):
-    ...
-    tactile_bayes.errors.ParameterError: priors is nested deeper than 64 levels: write it as this package does
-    """
+    """Return the value of a JSON text, which messages call by `name`."""
     try:
         whole = text.decode("utf-8") if isinstance(text, bytes) else text
         if isinstance(whole, str):
@@ -64,18 +49,7 @@ def read_json(text: Any, name: str) -> Any:
 
 
 def read_toml(text: str) -> dict[str, Any]:
-    """Return the tables of a TOML text.
-
-    Raises
-    ------
-    ParameterError
-        If it is no TOML text, is too long, or is nested too deep.
-
-    Examples
-    --------
-    >>> read_toml("scan.samples = 180")
-    {'scan': {'samples': 180}}
-    """
+    """Return the tables of a TOML text."""
     if len(text) > LARGEST:
         raise ParameterError(f"the text has {len(text):,} characters: give at most {LARGEST:,}")
     _refuse_deep(text, _TOML_STRING, "the text")
@@ -100,13 +74,7 @@ def _refuse_deep(text: str, strings: re.Pattern[str], name: str) -> None:
 
 
 def toml_value(value: Any) -> str:
-    """Return a number, a text, a list or a mapping of these as an inline value of TOML.
-
-    Raises
-    ------
-    ParameterError
-        If it is none of these.
-    """
+    """Return a number, a text, a list or a mapping of these as an inline value of TOML."""
     if isinstance(value, bool | str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, int | np.integer):

@@ -34,31 +34,6 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
     Processes that were killed leave such folders behind. They are removed first if their lock shows that nobody writes
     to them: not on Windows, nor on a file system without locks. Since locks may not reach other machines, folders from
     another machine must also be a day old.
-
-    Parameters
-    ----------
-    path : path-like
-        File to be written. A symbolic link is followed.
-
-    Yields
-    ------
-    pathlib.Path
-        Temporary path for the block to write to.
-
-    Raises
-    ------
-    FileNotFoundError
-        If the folder of `path` does not exist, or the block wrote no file.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as directory:
-    ...     target = Path(directory) / "answer.txt"
-    ...     with write_atomically(target) as temporary:
-    ...         _ = temporary.write_text("42")
-    ...     target.read_text()
-    '42'
     """
     target = Path(path).resolve()
     with _beside(target.parent, target) as folder:
@@ -78,18 +53,6 @@ def replace_together(folder: Path, names: Sequence[str]) -> Iterator[Path]:
     go first, and the first name is the first to go and the last to come. A single new file that is not the first
     replaces the old one at once. So a folder in which a process was killed holds the old files, or the new ones, or
     lacks the first name.
-
-    Parameters
-    ----------
-    folder : Path
-        An existing folder.
-    names : sequence of str
-        Names in the folder, also in subfolders of it. Other files stay as they are.
-
-    Raises
-    ------
-    IsADirectoryError
-        If there is a folder of one of the names.
     """
     with _beside(folder, folder) as temporary:
         yield temporary
@@ -122,13 +85,7 @@ def _exchange(folder: Path, temporary: Path, names: Sequence[str], new: Sequence
 
 
 def refuse_replacing(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Refuse to write a file from which the same call reads, under whatever name.
-
-    Raises
-    ------
-    ParameterError
-        If an output is the same file as an input; it names both.
-    """
+    """Refuse to write a file from which the same call reads, under whatever name."""
     sources = list(inputs)
     for output in outputs:
         for source in sources:
@@ -245,13 +202,7 @@ def _remove_leftovers(parent: Path) -> None:
 
 
 def _lock(folder: Path) -> int | None:
-    """Lock a folder until the handle is closed or the process ends; None where the system has no locks.
-
-    Raises
-    ------
-    BlockingIOError
-        If it is locked already.
-    """
+    """Lock a folder until the handle is closed or the process ends; None where the system has no locks."""
     try:
         import fcntl
     except ImportError:  # Windows
@@ -272,11 +223,6 @@ def alone_in(folder: Path, refusal: type[Exception]) -> Iterator[None]:
     """Create a folder if it is missing, and keep other runs out of it where the system has locks.
 
     The lock ends with the process.
-
-    Raises
-    ------
-    Exception
-        Of the type `refusal`, if there is a file in its place, or another run is at work there.
     """
     if folder.exists() and not folder.is_dir():
         raise refusal(f"{folder} is a file: give a folder")

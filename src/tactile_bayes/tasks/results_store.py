@@ -72,18 +72,7 @@ class ResultsStore(Generic[Outcome]):
 def open_results_store(
     identity: Mapping[str, str], out: str | os.PathLike[str] | None, kind: Kind
 ) -> Iterator[ResultsStore[Any]]:
-    """Open the results store in a folder, which is created if it does not exist; write it at the end of the block.
-
-    Parameters
-    ----------
-    identity : mapping of str to str
-        Description of all that the outcomes depend on.
-    out : str or path, optional
-        The folder; by default outcomes stay in memory.
-    kind : Kind
-        Its error is raised if the folder holds results of another experiment, or a file that cannot be read, or if
-        another run uses it.
-    """
+    """Open the results store in a folder, which is created if it does not exist; write it at the end of the block."""
     if out is None:
         yield ResultsStore(identity, None, kind)
         return
@@ -104,19 +93,7 @@ def keep_outcomes(
     *,
     workers: int | str | Workers | None,
 ) -> dict[int, Outcome]:
-    """Return the outcomes of a task for the numbers from 0 to `count` − 1, and compute those not in the store.
-
-    Parameters
-    ----------
-    store : ResultsStore
-    function : callable
-        Function of (task, number); a function of a module, not a local one.
-    task
-    count : int
-        Number of outcomes.
-    workers
-        As in `run_tasks`.
-    """
+    """Return the outcomes of a task for the numbers from 0 to `count` − 1, and compute those not in the store."""
     workers, began = workers_of(workers), time.monotonic()
     kept = {number: outcome for number, outcome in store.outcomes.items() if number < count}
     tasks = [(task, number) for number in range(count) if number not in kept]

@@ -30,15 +30,6 @@ def in_parts(function: Callable[[slice], None], count: int, fewest: int) -> None
     The function releases the global interpreter lock, and writes the results of its items. These must not depend on the
     parts. There are as many threads as cores, or as the environment variable NUMBA_NUM_THREADS says, and one within
     `one_thread`.
-
-    Parameters
-    ----------
-    function : callable
-        Function of a slice.
-    count : int
-        Number of items.
-    fewest : int
-        Fewest items for which another thread is worth the while.
     """
     threads = 1 if getattr(_here, "is_one", False) else min(_threads(), count // fewest)
     if threads < 2:

@@ -96,33 +96,6 @@ def run_tasks(
     A process that dies (killed, out of memory) is replaced, and its task is repeated. The result of a task must not
     depend on where or when it is computed. Each task runs on one thread. Processes end with the
     iterator, and with this process, however it ends; only this process receives Ctrl-C.
-
-    Parameters
-    ----------
-    function : callable
-        Function of one task; for processes and clusters a function of a module, not a local one.
-    tasks : sequence
-        Tasks; small objects, since they are sent to other processes.
-    workers : int, str or Workers, optional
-        Where they are done; tasks wait as long as a scheduler has no workers.
-
-    Yields
-    ------
-    (task, result)
-
-    Raises
-    ------
-    ParameterError
-        If `workers` is not a positive number; if a scheduler is given and Dask is not installed, or the scheduler does
-        not answer in ten seconds.
-    TaskError
-        If processes die repeatedly over a task, or cannot start, or the scheduler is lost. An exception of a task
-        itself is raised here too.
-
-    Examples
-    --------
-    >>> sorted(run_tasks(abs, [-1, 2], workers=1))
-    [(-1, 1), (2, 2)]
     """
     where = workers_of(workers).where
     if isinstance(where, str):

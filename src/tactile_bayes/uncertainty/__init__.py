@@ -1,0 +1,19 @@
+"""How far a posterior lets contours, contacts and readings range: bands, regions, moments and the gap."""
+
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.contact_moments import contact_moments
+from tactile_bayes.uncertainty.contact_region import contact_region
+from tactile_bayes.uncertainty.gap import gap
+from tactile_bayes.uncertainty.implied_contacts import implied_contacts
+from tactile_bayes.uncertainty.normal_band import normal_band
+from tactile_bayes.uncertainty.predictive_interval import predictive_interval
+
+__all__ = [
+    "contact_moments",
+    "contact_region",
+    "contour_band",
+    "gap",
+    "implied_contacts",
+    "normal_band",
+    "predictive_interval",
+]

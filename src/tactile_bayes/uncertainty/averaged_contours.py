@@ -13,27 +13,7 @@ __all__ = ["averaged_heights", "family_weights"]
 
 
 def family_weights(comparison: xr.Dataset) -> tuple[Floats, str]:
-    """Return the weight of each family, shape (families,), of sum one, and their source, "evidence" or "stacking".
-
-    Parameters
-    ----------
-    comparison : xr.Dataset
-        From `compare_families`, or from `StreamComparison.update`.
-
-    Raises
-    ------
-    InferenceError
-        If it has no draws, as those of former versions, none of its families fits the record, or there is neither a
-        probability nor a stacking weight.
-
-    Examples
-    --------
-    >>> variables = {"probability": ("family", [np.nan, np.nan]), "weight": ("family", [0.2, 0.8])}
-    >>> draws = (("family", "contour_draw", "contour_parameter"), np.zeros((2, 1, 3)))
-    >>> found = xr.Dataset(variables | {"contour_draws": draws}, attrs={"none_fits": 0})
-    >>> family_weights(found)
-    (array([0.2, 0.8]), 'stacking')
-    """
+    """Return the weight of each family, shape (families,), of sum one, and their source, "evidence" or "stacking"."""
     if "contour_draws" not in comparison:
         raise InferenceError("this comparison has no draws of contours: compare again")
     if comparison.attrs.get("none_fits"):

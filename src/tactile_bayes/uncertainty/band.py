@@ -123,13 +123,7 @@ def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:
 
 
 def grid_points(x: ArrayLike) -> Floats:
-    """Return the values of x as an array of shape (n,).
-
-    Raises
-    ------
-    ParameterError
-        If x is not a list of finite numbers.
-    """
+    """Return the values of x as an array of shape (n,)."""
     numbers = as_numbers(x)
     if numbers is None or numbers.ndim > 1 or not np.all(np.isfinite(numbers)):
         raise ParameterError("x must be a list of finite numbers")

@@ -44,24 +44,6 @@ def triangle(left: Locus, right: Locus) -> Triangle:
     """Return the triangle between two contacts of each of n contours; NaN where the left one is not on the left.
 
     With the chord of length ℓ and its angles A and B to the tangents, the height is ℓ sin A sin B / sin(A + B).
-
-    Parameters
-    ----------
-    left, right : Locus
-        The contacts, arrays of shape (n,).
-
-    Returns
-    -------
-    Triangle
-
-    Examples
-    --------
-    >>> from tactile_bayes.contours import Parabola
-    >>> parabola = Parabola(0.5, q=0.3)
-    >>> ends = (parabola.locate(parabola.parameter_of_x([x])) for x in (-0.2, 0.4))
-    >>> found = triangle(*ends)
-    >>> found.apex_x.round(12), found.width.round(12)  # midway; half of a (x₂ − x₁)²
-    (array([0.1]), array([0.09]))
     """
     across, up = right.x - left.x, right.y - left.y
     length, chord = np.hypot(across, up), np.arctan2(up, across)

@@ -94,9 +94,9 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
     >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
-    >>> posterior = infer_contour(measured, rig=Rig(unknown="nothing"), seed=1, settings=quick)
+    >>> posterior = infer_contour(measured, rig=Rig(unknown="nothing"), rng=1, settings=quick)
     >>> implied = implied_contacts(posterior, draws=50)
     >>> [round(float(implied["posterior"][name][..., 20].mean()), 2) for name in ("contact_x", "contact_y")]
     [0.66, 0.72]

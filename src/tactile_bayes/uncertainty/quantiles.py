@@ -14,18 +14,7 @@ _ROUNDING = 1e-9
 
 
 def central_levels(probability: float) -> tuple[float, float, float]:
-    """Return the quantile levels of the central interval's lower end, the median, and its upper end.
-
-    Raises
-    ------
-    ParameterError
-        If the probability is not in (0, 1).
-
-    Examples
-    --------
-    >>> central_levels(0.5)
-    (0.25, 0.5, 0.75)
-    """
+    """Return the quantile levels of the central interval's lower end, the median, and its upper end."""
     check_probability("probability", probability)
     return 0.5 * (1.0 - probability), 0.5, 0.5 * (1.0 + probability)
 
@@ -33,32 +22,7 @@ def central_levels(probability: float) -> tuple[float, float, float]:
 def quantile_band(values: Floats, probability: float, simultaneous: bool = False) -> Floats:
     """Return lower edge, median and upper edge of draws on a grid.
 
-    Parameters
-    ----------
-    values : ndarray, shape (draws, grid points)
-        NaN where a draw has no value.
-    probability : float
-        Probability of the band, in (0, 1).
-    simultaneous : bool
-        If True, the band contains that share of draws at all grid points at once: the pointwise band is widened about
-        the median, everywhere by the same factor.
-
-    Returns
-    -------
-    ndarray, shape (3, grid points)
-        NaN where some draw has no value.
-
-    Raises
-    ------
-    ParameterError
-        If the probability is not in (0, 1).
-
-    Examples
-    --------
-    >>> quantile_band(np.linspace([0.0, 0.0], [1.0, 2.0], 101), 0.9).round(12)
-    array([[0.05, 0.1 ],
-           [0.5 , 1.  ],
-           [0.95, 1.9 ]])
+    Shapes: values (draws, grid points) → (3, grid points).
     """
     levels = central_levels(probability)
     check_switch("simultaneous", simultaneous)

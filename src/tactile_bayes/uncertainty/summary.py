@@ -17,22 +17,7 @@ __all__ = ["gap_if_any", "reach", "summary"]
 
 
 def summary(posterior: xr.DataTree, probability: float = 0.95, edges: xr.Dataset | None = None) -> xr.Dataset:
-    """Return median, central interval, R̂ and effective sample size of every parameter, and the gap where one is given.
-
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`.
-    probability : float
-        Probability of the central intervals, in (0, 1).
-    edges : xr.Dataset, optional
-        The gap, from `gap_if_any` with this probability.
-
-    Returns
-    -------
-    xr.Dataset
-        Over "quantity": median, lower, upper, r_hat, ess_bulk, ess_tail, unit.
-    """
+    """Return median, central interval, R̂ and effective sample size of each parameter, and the gap if there is one."""
     draws, stats = posterior_draws(posterior), posterior["sample_stats"].to_dataset()
     rows: list[tuple[Any, ...]] = []
     for name in stats.parameter.values:
@@ -62,11 +47,6 @@ def reach(posterior: xr.DataTree) -> Floats:
 
     The stretch reaches from the 5 % quantile to the 95 % quantile of the events' x. Draws without an event do not
     count.
-
-    Raises
-    ------
-    InferenceError
-        If the rod touches none of the posterior's contours.
     """
     events = _events(posterior)
     x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])

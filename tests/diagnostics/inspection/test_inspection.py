@@ -32,13 +32,13 @@ def ideal():
 @pytest.fixture(scope="module")
 def record(ideal):
     """As a laboratory has it: no truth, no data sheet."""
-    return bare(LOAD_CELL.measure(ideal, seed=1))
+    return bare(LOAD_CELL.measure(ideal, rng=1))
 
 
 @pytest.fixture(scope="module")
 def coarse():
     """In steps of 12°, where few samples will do."""
-    return bare(LOAD_CELL.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=COARSE).record, seed=1))
+    return bare(LOAD_CELL.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=COARSE).record, rng=1))
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ def test_nothing_is_said_of_a_good_record(record):
         tb.LoadCell(force_noise=0.05, moment_noise=0.02, force_resolution=0.05, moment_resolution=0.02),
         tb.LoadCell(force_noise=0.02, moment_noise=0.01, force_resolution=0.1, moment_resolution=0.05),
         tb.LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=3e-3, frame="turning"),
-        tb.LoadCell(force_noise=0.05, moment_noise=0.02, drift=tb.RandomWalk(moment=2e-3, force=5e-3)),
+        tb.LoadCell(force_noise=0.05, moment_noise=0.02, drift=tb.load_cell.RandomWalk(moment=2e-3, force=5e-3)),
         tb.LoadCell(force_noise=0.05, moment_noise=0.02, gain=FAINT),
     ],
     ids=["usual", "poor", "steps", "coarse", "turning", "drift", "faint"],
@@ -116,7 +116,7 @@ def test_nothing_is_said_of_a_good_record(record):
 def test_nothing_is_said_of_good_records_of_any_cell_that_is_stated(swept, cell):
     """Seven tests at 1e-3 each, of 21 records: at most one false alarm in some 7 runs, at other seeds."""
     for seed, ideal in enumerate(swept):
-        assert words(cell.measure(ideal, seed=seed)) == NOTHING
+        assert words(cell.measure(ideal, rng=seed)) == NOTHING
 
 
 def test_nothing_is_said_of_a_scan_nor_of_a_record_with_missing_channels(ideal, record):
@@ -135,7 +135,7 @@ def test_false_alarms_are_as_rare_as_stated():
     records = [tb.scan(tb.contours.paper_profile(name, q=0.5)).record for name in ("I", "II", "III", "IV")]
     cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
     suspected = sum(
-        tb.inspect_record(bare(cell.measure(records[seed % 4], seed=seed))).is_suspect for seed in range(400)
+        tb.inspect_record(bare(cell.measure(records[seed % 4], rng=seed))).is_suspect for seed in range(400)
     )
     assert suspected <= 8
 
@@ -162,11 +162,11 @@ def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
         moment_noise=1e-4,
         gain=((1.0, 0.0, 0.0), (0.0, -0.2, 0.01), (0.0, 0.0, 0.2)),  # the sign that is wrong
         correlation=(0.0, 0.0, 0.5),
-        drift=tb.RandomWalk(force=1e-5),
+        drift=tb.load_cell.RandomWalk(force=1e-5),
         force_range=0.12,
         drive_angle_offset=0.02,
     )
-    measured = cell.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.5 * COARSE).record, seed=1)
+    measured = cell.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.5 * COARSE).record, rng=1)
     assert (np.abs(measured.force_y.values) == 0.12).any()
     stated = measured.assign_attrs(load_cell_gain_force_x_force_x=0.2, load_cell_gain_force_x_force_y=-0.01)
     assert correction(stated) == OTHER_FORCE_X
@@ -176,7 +176,7 @@ def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
 def test_a_wrong_frame_an_exchange_and_a_sign_that_is_suspected_are_named(record):
     exchanged = changed(record, force_x=record.force_y, force_y=record.force_x)
     assert correction(exchanged) == "force_x and force_y were exchanged."
-    as_fixed = tb.in_frame(record, "turning").assign_attrs(load_cell_frame="fixed")
+    as_fixed = tb.record.in_frame(record, "turning").assign_attrs(load_cell_frame="fixed")
     assert 'the load cell turned with the drive (frame = "turning" under [load_cell]' in correction(as_fixed)
     upside_down = changed(record, force_y=-record.force_y)
     assert correction(upside_down) == "force_y had the other sign."
@@ -227,7 +227,7 @@ def test_a_world_in_which_all_fits_but_lies_below_the_pivot_is_told(coarse):
 
 def test_friction_is_named():
     dragged = tb.scan(CONTOUR, rig=Rig(rod=ROD, unknown={"friction": 0.3}), drive_step=COARSE).record
-    measured = LOAD_CELL.measure(dragged, seed=1)
+    measured = LOAD_CELL.measure(dragged, rng=1)
     assert correction(measured).startswith("there were friction of about 0.3")
     assert words(measured, friction=0.3) == NOTHING
 
@@ -270,7 +270,7 @@ def test_samples_that_are_stored_twice(record):
 
 @pytest.mark.parametrize("stated", [False, True])
 def test_readings_that_are_cut_off(ideal, stated):
-    measured = tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3, force_range=0.5).measure(ideal, seed=1)
+    measured = tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3, force_range=0.5).measure(ideal, rng=1)
     found = tb.inspect_record(measured if stated else bare(measured))
     flagged = found.samples.cut_off.sel(channel="force_y").values
     assert np.abs(measured.force_y.values[flagged]).min() == 0.5
@@ -302,7 +302,7 @@ def test_a_zero_that_moves_and_one_that_is_not_as_stated(ideal, record):
     later = record.sweep.values == 1
     moved = words(changed(record, force_y=record.force_y + 0.01 * later))
     assert moved[0].startswith("The zero of force_y moved between one unloaded stretch and another")
-    untared = changed(LOAD_CELL.measure(ideal, seed=1), force_y=LOAD_CELL.measure(ideal, seed=1).force_y + 0.015)
+    untared = changed(LOAD_CELL.measure(ideal, rng=1), force_y=LOAD_CELL.measure(ideal, rng=1).force_y + 0.015)
     (sentence,) = words(untared)
     assert sentence.startswith("Without load the cell does not read what is stated: force_y is off by 15.1 mN (")
     assert words(bare(untared)) == NOTHING  # without a data sheet a bias is nothing wrong
@@ -343,11 +343,13 @@ def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
 
 
 def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal):
-    cell = tb.LoadCell(force_noise=1e-3, moment_noise=2.5e-4, drift=tb.OrnsteinUhlenbeck(force=6e-3, time=5.0))
-    measured = cell.measure(ideal, seed=1)
+    cell = tb.LoadCell(
+        force_noise=1e-3, moment_noise=2.5e-4, drift=tb.load_cell.OrnsteinUhlenbeck(force=6e-3, time=5.0)
+    )
+    measured = cell.measure(ideal, rng=1)
     assert words(measured) == NOTHING  # as it is stated
     assert any(sentence.startswith("The noise is not white: ") for sentence in words(bare(measured)))
-    stated = bare(LOAD_CELL.measure(ideal, seed=1)).assign_attrs(
+    stated = bare(LOAD_CELL.measure(ideal, rng=1)).assign_attrs(
         load_cell_force_noise=1e-3, load_cell_moment_noise=2.5e-4
     )
     assert words(stated)[0].startswith("The noise of force_x is 2.91 mN in unloaded samples, and stated as 1 mN")
@@ -395,7 +397,7 @@ def test_a_false_alarm_that_is_no_probability(record):
 
 def test_the_load_cell_is_known_from_what_is_nearest(ideal, record):
     given = tb.LoadCell(force_noise=1.0, moment_noise=1.0)
-    measured = LOAD_CELL.measure(ideal, seed=1)
+    measured = LOAD_CELL.measure(ideal, rng=1)
     assert known_cell(measured, given) == (given, "given")
     assert known_cell(measured) == (LOAD_CELL, "data sheet")
     assert known_cell(record)[1] == "unloaded samples"
@@ -447,7 +449,7 @@ def held(record, readings, between=0.0):
     """That record with several readings at each angle, whose noise has a part that is the same for all of them."""
     rng = np.random.default_rng(9)
     count = record.sizes["sample"]
-    again = bare(LOAD_CELL.measure(record.isel(sample=np.repeat(np.arange(count), readings)), seed=2))
+    again = bare(LOAD_CELL.measure(record.isel(sample=np.repeat(np.arange(count), readings)), rng=2))
     common = {
         name: again[name] + np.repeat(between * again_noise * rng.standard_normal(count), readings)
         for name, again_noise in LOAD_CELL.standard_deviations.items()

@@ -31,7 +31,7 @@ def some(kind="plain", which=SOME):
 
 def infer(kind="plain", which=SOME, **options):
     rig = Rig(load_cell=options.pop("load_cell", SI_CELL if kind == "SI" else CELL))
-    return infer_contacts(some(kind, which), rig, **{"seed": 1, **options})
+    return infer_contacts(some(kind, which), rig, **{"rng": 1, **options})
 
 
 @pytest.fixture(scope="module")
@@ -107,8 +107,8 @@ def test_chains_of_importance_sampling_agree_where_one_phase_is_certain(contacts
 def test_small_errors_leave_the_normal_distribution_of_the_constrained_estimate(angle_noise):
     """Mean, standard deviation and correlation within 4.5 standard errors of 4000 draws, and 1 % for curvature."""
     cell = LoadCell(force_noise=1e-3, moment_noise=4e-4, drive_angle_noise=angle_noise)
-    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.3).record, seed=4)
-    found = infer_contacts(record, rig=Rig(load_cell=cell), seed=2, draws=4000, method="importance")
+    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.3).record, rng=4)
+    found = infer_contacts(record, rig=Rig(load_cell=cell), rng=2, draws=4000, method="importance")
     normal = reconstruct(record, method="constrained", rig=Rig(load_cell=cell))
     stats_ = stats_of(found)
     clear = np.flatnonzero((normal.status == "ok") & (normal.edge_distance > 6.0) & (stats_.engine == 1))
@@ -132,7 +132,7 @@ def test_small_errors_leave_the_normal_distribution_of_the_constrained_estimate(
 
 
 def test_the_same_seed_gives_the_same_draws_and_another_others():
-    one, again, other = (infer(which=[2, 21, 61], draws=400, method="importance", seed=seed) for seed in (1, 1, 2))
+    one, again, other = (infer(which=[2, 21, 61], draws=400, method="importance", rng=seed) for seed in (1, 1, 2))
     xr.testing.assert_identical(again["posterior"].to_dataset(), one["posterior"].to_dataset())
     there = stats_of(one).engine.values > 0
     same = other["posterior"].contact_x.values == one["posterior"].contact_x.values
@@ -190,16 +190,16 @@ def test_draws_are_contacts(contacts):
 
 
 def test_an_exact_encoder_has_no_drive_angle_to_draw():
-    tree = infer_contacts(some("exact angle", [20, 61]), rig=Rig(load_cell=EXACT_ANGLE), seed=1)
+    tree = infer_contacts(some("exact angle", [20, 61]), rig=Rig(load_cell=EXACT_ANGLE), rng=1)
     assert "drive_angle" not in tree["posterior"]
 
 
 def test_si_is_the_dimensionless_record_in_other_units():
     """The same random numbers: to 1e-6."""
     record = measured("SI").isel(sample=[25, 62, 105])
-    found = infer_contacts(record, rig=Rig(load_cell=SI_CELL), seed=3)
+    found = infer_contacts(record, rig=Rig(load_cell=SI_CELL), rng=3)
     length, thin = ROD.length_unit, replace(ROD, diameter=0.0)
-    line = infer_contacts(record, rig=Rig(rod=thin, load_cell=SI_CELL), seed=3)
+    line = infer_contacts(record, rig=Rig(rod=thin, load_cell=SI_CELL), rng=3)
     slope = found["posterior"].slope_angle
     for name, shift in (("contact_x", -0.5 * np.sin(slope)), ("contact_y", 0.5 * np.cos(slope))):
         expected = line["posterior"][name] + ROD.diameter * shift
@@ -249,8 +249,8 @@ def test_progress_reaches_the_end():
 def test_the_truth_is_within_reach_of_the_posterior(further):
     """Squared distances of the truth, in standard deviations, of 20 contacts and more; not a calibration."""
     cell = LoadCell(force_noise=0.05, moment_noise=0.02, **further)
-    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=6)
-    tree = infer_contacts(record, rig=Rig(load_cell=cell), seed=1, method="importance")
+    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=6)
+    tree = infer_contacts(record, rig=Rig(load_cell=cell), rng=1, method="importance")
     certain = stats_of(tree).tangential_probability.values > 0.999  # else the slope is far from normal
     on = certain & (stats_of(tree).converged.values == 1) & (record.truth_contact_phase.values != "none")
     assert on.sum() > 20
@@ -290,18 +290,18 @@ def without(*names):
 
 def test_a_missing_channel_is_refused():
     with refused(RecordError, "force_y"):
-        infer_contacts(without("force_y"), rig=Rig(load_cell=CELL), seed=1)
+        infer_contacts(without("force_y"), rig=Rig(load_cell=CELL), rng=1)
 
 
 def test_a_record_without_a_load_cell_is_refused():
     with refused(ParameterError, "load_cell="):
-        infer_contacts(without(), seed=1)
+        infer_contacts(without(), rng=1)
 
 
 @pytest.mark.parametrize("cell", [LoadCell(), LoadCell(moment_noise=0.02), LoadCell(force_noise=0.05)])
 def test_a_channel_without_noise_is_refused(cell):
     with refused(ParameterError, "load cell", "noise"):
-        infer_contacts(without(), rig=Rig(load_cell=cell), seed=1)
+        infer_contacts(without(), rig=Rig(load_cell=cell), rng=1)
 
 
 def test_a_record_without_load_is_refused():
@@ -314,9 +314,9 @@ def test_what_has_no_closed_form_is_refused():
     with refused(ParameterError, "outliers"):
         infer(load_cell=replace(CELL, degrees_of_freedom=4.0, **wanders))
     cell = replace(CELL, moment_range=0.9, **wanders)
-    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
     with refused(ParameterError, "end of the load cell's range"):
-        infer_contacts(record, rig=Rig(load_cell=cell), seed=1)
+        infer_contacts(record, rig=Rig(load_cell=cell), rng=1)
 
 
 # --- What once went wrong ---------------------------------------------------------------------------------------
@@ -336,7 +336,7 @@ def test_a_sample_that_no_contact_explains_leaves_the_others_alone(method):
     bad = some(which=[20, 21, 61])
     bad.force_y[1] = -50.0
     tree = infer_contacts(
-        bad, rig=Rig(load_cell=CELL), seed=1, method=method, settings=SamplerSettings(walkers=16, max_steps=20)
+        bad, rig=Rig(load_cell=CELL), rng=1, method=method, settings=SamplerSettings(walkers=16, max_steps=20)
     )
     assert stats_of(tree).converged.values[[0, 2]].all()
     assert stats_of(tree).converged[1] == 0
@@ -352,7 +352,7 @@ def test_cut_off_samples_are_left_out():
         cut[name] = cut[name].clip(-cell.force_range, cell.force_range)
     left = (np.abs(strong.force_y.values) < cell.force_range) & (np.abs(strong.force_x.values) < cell.force_range)
     assert 0 < np.count_nonzero(left) < 3
-    tree = infer_contacts(cut, rig=Rig(load_cell=cell), seed=1, method="importance")
+    tree = infer_contacts(cut, rig=Rig(load_cell=cell), rng=1, method="importance")
     assert (np.isfinite(tree["posterior"].contact_x.values).all(axis=(0, 1)) == left).all()
     assert (stats_of(tree).converged.values == left).all()
 
@@ -362,7 +362,7 @@ def test_cut_off_samples_are_left_out():
 def test_outliers_of_every_kind_have_posteriors(degrees_of_freedom):
     cell = replace(CELL, degrees_of_freedom=degrees_of_freedom)
     settings = SamplerSettings(walkers=24, min_ess=200.0, max_r_hat=1.05)
-    tree = infer_contacts(some(which=[21, 61, 99]), rig=Rig(load_cell=cell), seed=1, settings=settings)
+    tree = infer_contacts(some(which=[21, 61, 99]), rig=Rig(load_cell=cell), rng=1, settings=settings)
     assert stats_of(tree).converged.all()
 
 
@@ -373,7 +373,7 @@ def test_ensembles_are_as_many_as_chains():
 
 def test_spawned_seeds_are_told_apart():
     seeds = np.random.SeedSequence(5).spawn(2)
-    words = [infer(which=[61], draws=4, method="importance", seed=seed).attrs["seed"] for seed in seeds]
+    words = [infer(which=[61], draws=4, method="importance", rng=seed).attrs["seed"] for seed in seeds]
     assert words == ["5, spawn key (0,)", "5, spawn key (1,)"]
 
 

@@ -337,7 +337,7 @@ def test_bad_starts_are_refused():
 
 @pytest.mark.parametrize("seed", [-1, 1.5, None, True])
 def test_bad_seeds_are_refused(seed):
-    with refused(ParameterError, seed=seed):
+    with refused(ParameterError, rng=seed):
         draw_from(standard, 2, settings=SMALL, seed=seed)
 
 

@@ -31,7 +31,7 @@ CONTOUR = Parabola(TRUTH["a"], TRUTH["q"], TRUTH["x_c"])
 
 
 def measured(cell=CELL, seed=1, **options):
-    return cell.measure(swept(CONTOUR, **options), seed=seed)
+    return cell.measure(swept(CONTOUR, **options), rng=seed)
 
 
 def disturbed(size, seed=1, cell=CELL):
@@ -42,7 +42,7 @@ def disturbed(size, seed=1, cell=CELL):
     for name, shape in zip(CHANNELS, shapes, strict=True):
         values = ideal[name].values
         ideal[name].values = values + size * np.abs(values).max() * shape * (values != 0.0)
-    return cell.measure(ideal, seed=seed)
+    return cell.measure(ideal, rng=seed)
 
 
 def model_of(record, nuisances=SMOOTH, cell=CELL, family="parabola"):
@@ -136,7 +136,7 @@ def test_repeated_sweeps_have_it_in_common():
 
 def test_its_coordinate_is_the_travel_where_the_base_is_carried():
     drive = Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6, drive_step=0.04)
-    record = CELL.measure(scan(Circle(0.5, 0.5), drive=drive).record, seed=1)
+    record = CELL.measure(scan(Circle(0.5, 0.5), drive=drive).record, rng=1)
     model = model_of(record, family="circle")
     course = model.likelihood.segments.course
     assert course.is_measured_order
@@ -152,7 +152,7 @@ def test_what_has_no_closed_form_is_refused():
     for flaw, reason in (({"degrees_of_freedom": 4.0}, "outliers"), ({"correlation": (0.5, 0.0, 0.0)}, "correlated")):
         with refused(ParameterError, reason):
             infer_contour(
-                record, rig=Rig(load_cell=replace(CELL, **flaw), unknown=only(*SMOOTH)), seed=1, settings=BRIEF
+                record, rig=Rig(load_cell=replace(CELL, **flaw), unknown=only(*SMOOTH)), rng=1, settings=BRIEF
             )
     for known in ({"discrepancy_scale": 0.01}, {"discrepancy": 0.01}):
         with refused(ParameterError, "discrepancy_scale", "distribution"):
@@ -164,7 +164,7 @@ def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
     """By bands that are wider, as the readings are less certain."""
     record = disturbed(0.02, cell=LoadCell(force_noise=0.01, moment_noise=0.004))
     x = np.linspace(-0.2, 0.2, 5)
-    draw = {"seed": 1, "settings": MODEST}
+    draw = {"rng": 1, "settings": MODEST}
     blind, smooth = (infer_as_stated(record, unknown=only(*asked), **draw) for asked in ((), SMOOTH))
     before, after = check_record(blind), check_record(smooth)
     assert not before.passed
@@ -186,7 +186,7 @@ def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
 @pytest.mark.slow
 def test_a_good_record_suggests_nothing():
     assert (
-        check_record(infer_contour(measured(), rig=Rig(unknown="nothing"), seed=1, settings=MODEST)).attrs["suggestion"]
+        check_record(infer_contour(measured(), rig=Rig(unknown="nothing"), rng=1, settings=MODEST)).attrs["suggestion"]
         == ""
     )
 
@@ -203,7 +203,7 @@ def test_simulated_readings_have_the_density_of_the_likelihood():
     }
     rig = Rig(load_cell=CELL, unknown=unknown)
     experiment = experiment_of(
-        family, rig, seed=1, drive=Rotation(drive_angles=np.radians(np.arange(-30.0, 211.0, 4.0)))
+        family, rig, rng=1, drive=Rotation(drive_angles=np.radians(np.arange(-30.0, 211.0, 4.0)))
     )
     squares = []
     for seed in range(40):
@@ -223,7 +223,7 @@ def test_simulated_readings_have_the_density_of_the_likelihood():
 @pytest.mark.parametrize("family", ["parabola", "circle"])
 def test_posteriors_with_it_are_calibrated(family):
     rig = Rig(unknown={**NOTHING, "discrepancy": "default"})
-    found = calibrate(family, rig, seed=1, replicates=50, workers=1)
+    found = calibrate(family, rig, rng=1, replicates=50, workers=1)
     assert found.attrs["calibrated"] == 1, found.attrs["verdict"]
 
 

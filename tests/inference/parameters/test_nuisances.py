@@ -141,7 +141,7 @@ def test_a_lever_and_a_backlash_may_be_known_or_inferred_or_both(exact, frame):
     """The readings of a cell without noise are expected, and the likelihood is the same whoever knows of them."""
     flaws = {"lever": (0.03, -0.02), "drive_angle_backlash": 0.02}
     gain = ((1.1, 0.0, 0.02), (0.0, 1.0, 0.0), (0.0, 0.0, 0.9))
-    record = LoadCell(gain=gain, **flaws, frame=frame).measure(scanned(), seed=1)
+    record = LoadCell(gain=gain, **flaws, frame=frame).measure(scanned(), rng=1)
     values = []
     for known in (0.0, 0.3, 1.0):
         cell = LoadCell(
@@ -169,7 +169,7 @@ def test_of_a_mirrored_rig_the_lever_is_mirrored_and_the_backlash_is_the_same(fr
     cell = LoadCell(
         force_noise=0.05, moment_noise=0.02, lever=(0.03, -0.02), drive_angle_backlash=0.02, drive_angle_offset=0.01
     )
-    measured = replace(cell, frame=frame).measure(scan(Parabola(0.5, 0.5, 0.1), drive_step=0.1).record, seed=1)
+    measured = replace(cell, frame=frame).measure(scan(Parabola(0.5, 0.5, 0.1), drive_step=0.1).record, rng=1)
     signs = {"holding_moment": -1.0, "force_x": 1.0 if frame == "turning" else -1.0}
     signs["force_y"] = -signs["force_x"]
     other = {"forward": "backward", "backward": "forward"}
@@ -194,7 +194,7 @@ def test_backlash_goes_by_the_way_that_the_drive_moves_and_not_by_the_side_of_co
     columns = {name: np.concatenate([out[name], out[name][::-1]]) for name in (*CHANNELS, "drive_angle")}
     columns |= {"sweep": np.repeat([0, 1], 100), "direction": np.repeat(["forward", "backward"], 100)}
     true = make_record(columns)
-    read = LoadCell(drive_angle_backlash=0.02).measure(true, seed=1)
+    read = LoadCell(drive_angle_backlash=0.02).measure(true, rng=1)
     loads = np.stack([true[name].values for name in CHANNELS], axis=-1)
     largest = np.abs(loads).max()
     told, untold = (RecordLikelihood(read, replace(CELL, drive_angle_backlash=b), exact=exact) for b in (0.02, 0.0))
@@ -205,7 +205,7 @@ def test_backlash_goes_by_the_way_that_the_drive_moves_and_not_by_the_side_of_co
 
 
 def test_snap_offs_are_where_they_are_read_whatever_the_encoder_reads_too_much():
-    record = LoadCell(drive_angle_offset=0.01, drive_angle_backlash=0.1).measure(scanned(2.0), seed=1)
+    record = LoadCell(drive_angle_offset=0.01, drive_angle_backlash=0.1).measure(scanned(2.0), rng=1)
     likelihood = RecordLikelihood(record, CELL)
     between = likelihood.segments.event_angles((record.force_y != 0.0).values)[:, 2:]
     off = RigValues(drive_angle_offset=0.01, drive_angle_backlash=0.1)
@@ -242,7 +242,7 @@ def test_a_pivot_that_is_off_is_found():
     true = scanned(2.0, base=[(0.0, 0.0), (0.27, -0.02)])
     stated = true.assign(base_x=true.base_x.round(1) * 0.25 / 0.3, base_y=0.0 * true.base_y)
     result = infer_contour(
-        CELL.measure(stated, seed=1), rig=Rig(unknown={**NOTHING, "bias": "default", "base": "default"}), seed=1
+        CELL.measure(stated, rng=1), rig=Rig(unknown={**NOTHING, "bias": "default", "base": "default"}), rng=1
     )
     posterior = result["posterior"].to_dataset()
     assert_near(result, {"base_2_x": 0.02, "base_2_y": -0.02, **TRUTH})
@@ -301,7 +301,7 @@ def test_the_taper_is_inferred_about_the_stated_one():
     """In the loads of scans, and with a prior that ends where tapers do; a rod may be an arc as stated."""
     truth, angles = Parabola(0.5, 0.5), np.linspace(0.1, 3.0, 59)
     for stated in (Rod(), Rod(rest_curvature=0.3), Rod(taper=0.4)):
-        record = CELL.measure(scan(truth, rig=Rig(rod=stated), drive_angles=angles).record, seed=1)
+        record = CELL.measure(scan(truth, rig=Rig(rod=stated), drive_angles=angles).record, rng=1)
         model = model_of(record, ["taper", "rest_curvature"])
         assert model.may_vanish[model.names.index("taper")]
         prior = model.priors["taper"]
@@ -328,7 +328,7 @@ def test_the_stem_is_inferred_about_the_stated_one(bent):
     for stem in (0.0, 0.005):
         stated = Rod(0.1, 1e-5, rest_curvature=bent, stem=stem)
         record = scan(Parabola(5.0, 0.06), rig=Rig(rod=stated), drive_angles=angles).record
-        record = LoadCell(force_noise=5e-5, moment_noise=2e-6).measure(record, seed=1)
+        record = LoadCell(force_noise=5e-5, moment_noise=2e-6).measure(record, rng=1)
         model = model_of(record, ["stem", "friction"], LoadCell(force_noise=5e-5, moment_noise=2e-6))
         assert model.may_vanish[model.names.index("stem")]
         prior = model.priors["stem"]
@@ -356,7 +356,7 @@ def test_the_length_is_inferred_about_the_stated_one(bent):
     """In loads of scans, in SI; alone it keeps the turn from base to tip, which beside the rest curvature is free."""
     angles, contour = np.linspace(0.3, 2.8, 59), Parabola(5.0, 0.06)
     cell, stated = LoadCell(force_noise=5e-5, moment_noise=2e-6), Rod(0.1, 1e-5, rest_curvature=bent, stem=0.002)
-    record = cell.measure(scan(contour, rig=Rig(rod=stated), drive_angles=angles).record, seed=1)
+    record = cell.measure(scan(contour, rig=Rig(rod=stated), drive_angles=angles).record, rng=1)
     mean = stated.mean_rest_curvature
     for names, curvature in ((["length"], mean / 1.02), (["length", "rest_curvature"], mean + 0.5)):
         model = model_of(record, names, cell)
@@ -469,7 +469,7 @@ def flawed(name, value):
         "lever_y": {"lever": (0.0, value)},
         "backlash": {"drive_angle_backlash": value},
     }
-    return replace(CELL, **own.get(name, {})).measure(record, seed=1)
+    return replace(CELL, **own.get(name, {})).measure(record, rng=1)
 
 
 @pytest.mark.slow
@@ -480,7 +480,7 @@ def test_a_flaw_that_is_inferred_is_found_and_does_no_harm(name):
     result = infer_contour(
         flawed(name, FLAWS[name]),
         rig=Rig(load_cell=CELL, unknown=only(name)),
-        seed=1,
+        rng=1,
         settings=settings,
     )
     assert_near(result, {**TRUTH, name: FLAWS[name]}, 4.5)
@@ -496,10 +496,10 @@ def test_half_a_millimetre_and_a_fifth_of_a_degree_mislead_where_they_are_not_in
     """
     value = {"lever_x": 0.0025, "backlash": np.radians(0.2)}[name]
     flaw = {"lever_x": {"lever": (value, 0.0)}, "backlash": {"drive_angle_backlash": value}}[name]
-    measured = replace(CELL, **flaw).measure(scanned(0.5), seed=1)
+    measured = replace(CELL, **flaw).measure(scanned(0.5), rng=1)
     settings = SamplerSettings(min_ess=300.0, max_r_hat=1.05)
     found, blind = (
-        infer_contour(measured, rig=Rig(load_cell=CELL, unknown=only(*names)), seed=1, settings=settings)
+        infer_contour(measured, rig=Rig(load_cell=CELL, unknown=only(*names)), rng=1, settings=settings)
         for names in ([name], [])
     )
 
@@ -515,8 +515,8 @@ def test_half_a_millimetre_and_a_fifth_of_a_degree_mislead_where_they_are_not_in
 @pytest.mark.slow
 def test_what_is_standard_is_inferred_and_has_units():
     unit = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
-    measured = unit.measure(scan(Parabola(5.0, 0.05), rig=Rig(rod=SI), drive_step=0.1).record, seed=1)
-    result = infer_contour(measured, rig=Rig(load_cell=unit), seed=1, settings=FEW)
+    measured = unit.measure(scan(Parabola(5.0, 0.05), rig=Rig(rod=SI), drive_step=0.1).record, rng=1)
+    result = infer_contour(measured, rig=Rig(load_cell=unit), rng=1, settings=FEW)
     units = {name: draws.attrs["units"] for name, draws in result["posterior"].data_vars.items()}
     assert units == {
         "a": "1/m",
@@ -544,7 +544,7 @@ def test_of_what_is_standard_a_record_is_asked_for_what_it_can_tell():
     every = {"lever_x", "lever_y", "backlash", "moment_bias"}
     for record, left_out in ((coarse(), set()), (forward, {"backlash"}), (silent, every - {"backlash"})):
         assert every - set(priors_of(record)) == left_out
-    result = infer_contour(CELL.measure(forward, seed=1), seed=1, settings=FEW)
+    result = infer_contour(CELL.measure(forward, rng=1), rng=1, settings=FEW)
     assert "lever_y" in json.loads(result.attrs["nuisances"])
     assert "backlash" not in json.loads(result.attrs["nuisances"])
 
@@ -555,15 +555,15 @@ def test_a_lever_and_a_backlash_are_found_beside_all_that_is_standard():
     flaws = {"lever_x": 0.0025, "lever_y": 0.0025, "backlash": float(np.radians(0.2))}
     cell = replace(CELL, lever=(0.0025, 0.0025), drive_angle_backlash=flaws["backlash"])
     settings = SamplerSettings(ensembles=2, walkers=26, min_ess=160.0, max_r_hat=1.06)
-    result = infer_contour(cell.measure(scanned(2.0), seed=1), rig=Rig(load_cell=CELL), seed=1, settings=settings)
+    result = infer_contour(cell.measure(scanned(2.0), rng=1), rig=Rig(load_cell=CELL), rng=1, settings=settings)
     assert_near(result, {**TRUTH, **flaws}, 4.5)
 
 
 def test_a_prior_makes_a_nuisance_of_what_was_taken_as_stated():
     result = infer_contour(
-        CELL.measure(coarse(), seed=1),
+        CELL.measure(coarse(), rng=1),
         rig=Rig(unknown=only(suspension_compliance=stats.halfnorm(scale=0.1))),
-        seed=1,
+        rng=1,
         settings=FEW,
     )
     assert list(result["posterior"].data_vars) == ["a", "q", "x_c", "suspension_compliance", "noise_scale"]
@@ -589,7 +589,7 @@ def test_biases_that_the_cell_is_not_sure_of_are_integrated_out_and_not_inferred
 )
 def test_stiffness_and_all_gains_are_refused(said):
     with refused(ParameterError, "rigidity_scale", "moment_gain, force_x_gain, force_y_gain"):
-        infer_contour(CELL.measure(coarse(), seed=1), rig=Rig(unknown=said), seed=1)
+        infer_contour(CELL.measure(coarse(), rng=1), rig=Rig(unknown=said), rng=1)
 
 
 def test_all_gains_take_the_place_of_the_stiffness_unless_it_is_named():
@@ -623,8 +623,8 @@ def test_friction_is_either_known_or_inferred():
     measured = coarse()
     assert "friction" in priors_of(measured, cell=CELL)
     for known in (0.0, 0.2):
-        rubbed = CELL.measure(scanned(friction=known), seed=1)
-        result = infer_contour(rubbed, rig=Rig(unknown={"friction": known}), seed=1, settings=FEW)
+        rubbed = CELL.measure(scanned(friction=known), rng=1)
+        result = infer_contour(rubbed, rig=Rig(unknown={"friction": known}), rng=1, settings=FEW)
         assert "friction" not in result["posterior"].data_vars
         assert result.attrs["friction"] == known
 

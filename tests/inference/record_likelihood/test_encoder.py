@@ -60,7 +60,7 @@ def finely(likelihood, count=1501):
     ids=["normal", "good", "bad", "outliers", "correlated"],
 )
 def test_the_likelihood_is_that_of_an_integral_over_the_errors(cell):
-    likelihood = RecordLikelihood(cell.measure(swept(Parabola(**TRUTH), step=0.05), seed=2), cell)
+    likelihood = RecordLikelihood(cell.measure(swept(Parabola(**TRUTH), step=0.05), rng=2), cell)
     by_sample = likelihood.log_likelihood(some_contours(), pointwise=True)
     exact = finely(likelihood).log_likelihood(some_contours(), pointwise=True)
     off = np.abs(by_sample - exact)
@@ -100,9 +100,9 @@ def test_a_sample_beside_the_snap_off_may_be_loaded_or_not():
 @pytest.mark.slow
 def test_a_posterior_with_a_noisy_encoder_is_right_and_wider():
     settings = SamplerSettings(ensembles=2, walkers=16, min_ess=100, max_r_hat=1.1)
-    record = ROUGH.measure(swept(Parabola(**TRUTH), step=0.1), seed=3)
-    wide = infer_as_stated(record, load_cell=ROUGH, seed=1, settings=settings)["posterior"]
-    narrow = infer_as_stated(record, load_cell=CELL, seed=1, settings=settings)["posterior"]
+    record = ROUGH.measure(swept(Parabola(**TRUTH), step=0.1), rng=3)
+    wide = infer_as_stated(record, load_cell=ROUGH, rng=1, settings=settings)["posterior"]
+    narrow = infer_as_stated(record, load_cell=CELL, rng=1, settings=settings)["posterior"]
     for name, value in TRUTH.items():
         assert abs(wide[name].mean() - value) < 4.5 * wide[name].std(), name
     assert wide["x_c"].std() > 1.2 * narrow["x_c"].std() / narrow["noise_scale"].mean()
@@ -112,9 +112,9 @@ def test_a_posterior_with_a_noisy_encoder_is_right_and_wider():
 def test_predictions_have_the_errors_of_the_encoder():
     """Where loads change with the drive angle they scatter by more than the noise of the load cell."""
     cell = LoadCell(force_noise=0.002, moment_noise=0.002, drive_angle_noise=0.01)
-    record = cell.measure(swept(Parabola(**TRUTH), step=0.1), seed=3)
+    record = cell.measure(swept(Parabola(**TRUTH), step=0.1), rng=3)
     settings = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=60)
-    predictive = infer_as_stated(record, load_cell=cell, seed=1, settings=settings)["posterior_predictive"]
+    predictive = infer_as_stated(record, load_cell=cell, rng=1, settings=settings)["posterior_predictive"]
     moment = predictive["holding_moment"].values.reshape(-1, record.sizes["sample"])
     loaded = record.truth_holding_moment.values != 0.0
     assert np.median(moment.std(axis=0)[loaded]) > 3.0 * np.median(moment.std(axis=0)[~loaded])

@@ -104,7 +104,7 @@ RIGS = {
 def measured_by(rig):
     """A record of the first contour, in steps of 5°, that is not to be changed."""
     true, _, rod, cell, bases, friction = RIGS[rig]
-    return cell.measure(swept(true, bases=bases, rod=rod, friction=friction, step=np.radians(5.0)), seed=3)
+    return cell.measure(swept(true, bases=bases, rod=rod, friction=friction, step=np.radians(5.0)), rng=3)
 
 
 @cache
@@ -163,7 +163,7 @@ def test_the_taper_of_a_rig_is_that_of_the_rod_in_addition(rod):
     """A likelihood that takes it as stated has another table; both have errors as large as noise requires."""
     true, other, stated, cell, _, friction = RIGS[rod]
     contours, tapered = stack([true, other]), replace(stated, taper=stated.taper + 0.1)
-    record = cell.measure(swept(true, rod=tapered, friction=friction, step=np.radians(5.0)), seed=3)
+    record = cell.measure(swept(true, rod=tapered, friction=friction, step=np.radians(5.0)), rng=3)
     rig = RigValues(taper=np.array([0.1, 0.1]), friction=friction)
     for exact in (True, False):
         known = RecordLikelihood(record, cell, friction, exact)
@@ -204,7 +204,7 @@ def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
     rig = RigValues(rest_curvature=bend, friction=friction, stem=rng.uniform(-0.02, 0.02, count))
     for drive in (Translation((0.11, 0.0), np.pi, 1.13, 1.1), Translation((0.3, -1.2), 2.05, 1.13, 1.1)):
         measured = CELL.measure(
-            scan(Circle(0.29, 0.21), rig=Rig(rod=rod, unknown={"friction": 0.2}), drive=drive).record, seed=1
+            scan(Circle(0.29, 0.21), rig=Rig(rod=rod, unknown={"friction": 0.2}), drive=drive).record, rng=1
         )
         places = 0.003 * rng.normal(size=(3, count)) + np.array([[0.29], [0.21], [0.0]])
         likelihood, exactly = (RecordLikelihood(measured, CELL, exact=exact) for exact in (False, True))
@@ -285,7 +285,7 @@ def test_channels_may_be_missing_where_the_load_cell_turns(missing):
 
 
 def test_truth_is_more_likely_than_what_is_a_little_off():
-    measured = CELL.measure(swept(Parabola(0.5, 0.5)), seed=3)
+    measured = CELL.measure(swept(Parabola(0.5, 0.5)), rng=3)
     off = [Parabola(0.5, 0.5), Parabola(0.51, 0.5), Parabola(0.5, 0.502), Parabola(0.5, 0.5, 0.005)]
     values = RecordLikelihood(measured, CELL).log_likelihood(stack(off))
     assert np.argmax(values) == 0
@@ -310,7 +310,7 @@ def test_a_contour_out_of_reach_of_any_pivot_is_impossible():
 def test_snap_off_tells_contours_apart():
     """Across the contour that lets go at a sample's drive angle, likelihood jumps by what that sample says."""
     record = swept(Parabola(0.5, 0.5), direction="forward")
-    measured = CELL.measure(record, seed=3)
+    measured = CELL.measure(record, rng=3)
     last = int(np.flatnonzero(record.force_y.values)[-1])
     angle = float(record.drive_angle[last])
 
@@ -333,7 +333,7 @@ def test_snap_off_tells_contours_apart():
 
 
 def test_order_of_sweeps_and_their_number_do_not_matter():
-    measured = CELL.measure(swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.2, 0.1))), seed=3)
+    measured = CELL.measure(swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.2, 0.1))), rng=3)
     contours = stack([Parabola(0.5, 0.5), Parabola(0.505, 0.5)])
     expected = RecordLikelihood(measured, CELL).log_likelihood(contours)
     mixed = measured.isel(sample=np.random.default_rng(1).permutation(measured.sizes["sample"]).argsort(kind="stable"))
@@ -366,7 +366,7 @@ def test_a_drive_that_turns_back_in_contact_meets_the_same_side(direction):
     likelihood = RecordLikelihood(both, CELL)
     predicted, _ = likelihood.predict(stack([contour]))
     np.testing.assert_allclose(predicted[0], likelihood.measured, atol=1e-3)
-    noisy = RecordLikelihood(CELL.measure(both, seed=1), CELL)
+    noisy = RecordLikelihood(CELL.measure(both, rng=1), CELL)
     np.testing.assert_array_equal(noisy.predict(stack([contour]))[0], predicted)
 
 
@@ -390,7 +390,7 @@ def test_a_moment_that_is_counted_the_other_way_round_turns_no_side(missing):
     record = scan(Parabola(0.5, 0.5), drive_step=np.radians(3.0)).record
     values = []
     for cell in (upright, turned):
-        measured = without(cell.measure(record, seed=1), *missing)
+        measured = without(cell.measure(record, rng=1), *missing)
         values.append(RecordLikelihood(measured, cell).log_likelihood(contour)[0])
     # Not one number: the noise on the moment has the other sign.
     assert values[0] == pytest.approx(values[1], abs=4.0 * np.sqrt(2.0 * record.sizes["sample"]))
@@ -411,7 +411,7 @@ def exact_sensed(model, point):
 def off_at_the_truth(noise, family, numbers):
     """By how much log-likelihoods of records from the default prior differ from exact ones."""
     cell = LoadCell(force_noise=0.05 * noise, moment_noise=0.02 * noise)
-    experiment = experiment_of(family, Rig(load_cell=cell, unknown={"friction": 0.0}), seed=1)
+    experiment = experiment_of(family, Rig(load_cell=cell, unknown={"friction": 0.0}), rng=1)
     off = []
     for number in numbers:
         simulation = simulate(experiment, np.random.default_rng([9, number]))
@@ -486,7 +486,7 @@ def test_a_drive_that_repeats_itself_is_followed_once_and_has_one_discrepancy():
     """Two sweeps through the same poses, and the same with the second further on by less than what matters."""
     there, contour = Translation((0.8, 0.0), np.pi, 1.2, 1.6, 0.05), Circle(0.3, 0.8)
     whole = scan(contour, drive=[there, there]).record
-    measured = CELL.measure(whole, seed=1)
+    measured = CELL.measure(whole, rng=1)
     apart = measured.assign(base_x=measured.base_x - 1e-12 * (measured.sweep == 1))
     once, twice = RecordLikelihood(measured, CELL), RecordLikelihood(apart, CELL)
     assert [len(each.segments) for each in (once, twice)] == [1, 2]
@@ -508,7 +508,7 @@ def test_contours_that_release_a_rod_are_usable_in_a_likelihood_as_well(rod, fri
     at, rng = Parabola(1.0, 0.8315 if rod.profile is None else 0.81, 0.1), np.random.default_rng(1)
     found = scan(at, rig=Rig(rod=rod, unknown={"friction": friction}), drive_step=0.01)
     assert "release" in {sweep.snap_off.kind for sweep in found.events.values()}
-    measured = CELL.measure(found.record, seed=1)
+    measured = CELL.measure(found.record, rng=1)
     contours = Parabola(*(rng.normal(0.0, 1e-4, (3, 60)) + np.array([[at.a], [at.q], [at.x_c]])))
     exact, fast = (RecordLikelihood(measured, CELL, friction, one, is_always_clear=False) for one in (True, False))
     np.testing.assert_array_equal(fast.usable(contours), exact.usable(contours))

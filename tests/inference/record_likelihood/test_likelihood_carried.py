@@ -23,7 +23,7 @@ TURNS = [tb.Motion([0.8, -0.8], 0.0, [1.2, 1.9]), tb.Rotation()]
 
 
 def model(drive, family="circle"):
-    measured = CELL.measure(tb.scan(CIRCLE, drive=drive).record, seed=1)
+    measured = CELL.measure(tb.scan(CIRCLE, drive=drive).record, rng=1)
     return Experiment(measured, Rig(load_cell=CELL), family).model
 
 
@@ -73,12 +73,12 @@ def test_what_a_drive_does_not_tell_is_left_out():
 
 @pytest.mark.slow
 def test_a_posterior_of_a_carried_rod_finds_the_circle():
-    measured = CELL.measure(tb.scan(CIRCLE, drive=SHIFTS).record, seed=3)
+    measured = CELL.measure(tb.scan(CIRCLE, drive=SHIFTS).record, rng=3)
     posterior = tb.infer_contour(
         measured,
         family="circle",
         rig=Rig(load_cell=CELL, unknown={"friction": 0.0}),
-        seed=1,
+        rng=1,
         settings=tb.SamplerSettings(ensembles=2, walkers=32, min_ess=400, max_r_hat=1.05),
     )
     for name, true in (("r", 0.3), ("q", 0.8), ("x_c", 0.0)):

@@ -41,7 +41,7 @@ def read(contour, seed, **options):
     lever = TRUE["lever_x"], TRUE["lever_y"]
     gain = tuple(map(tuple, TRUE["rigidity_scale"] * np.eye(3)))
     cell = replace(CELL, drive_angle_offset=TRUE["drive_angle_offset"], gain=gain, lever=lever)
-    record = cell.measure(swept(contour, step=0.05, **options), seed=seed)
+    record = cell.measure(swept(contour, step=0.05, **options), rng=seed)
     record.attrs = {name: v for name, v in record.attrs.items() if not name.startswith("load_cell_")}
     return record
 
@@ -58,7 +58,7 @@ def rig_from(*pivots):
         read_from(*pivots),
         contour=PIN,
         rig=Rig(load_cell=CELL, unknown=UNKNOWN),
-        seed=1,
+        rng=1,
         settings=SOUND,
     )
 
@@ -70,7 +70,7 @@ def rig():
 @cache
 def rig_of_two():
     """The rig from two records, one after the other."""
-    return calibrate_rig(read_from(1), contour=PIN, rig=rig(), seed=1, settings=SOUND)
+    return calibrate_rig(read_from(1), contour=PIN, rig=rig(), rng=1, settings=SOUND)
 
 
 @cache
@@ -80,7 +80,7 @@ def found(which):
         "default": lambda: Rig(load_cell=CELL, unknown=UNKNOWN),
         "truth": lambda: Rig(load_cell=CELL, unknown=only(**TRUE)),
     }[which]()
-    return infer_contour(read(OBJECT, 2), rig=given, seed=1, settings=SOUND)
+    return infer_contour(read(OBJECT, 2), rig=given, rng=1, settings=SOUND)
 
 
 def drawn(priors=("rigidity_scale", "lever_x"), **attrs):
@@ -125,13 +125,13 @@ def test_what_was_unknown_and_lasts_is_calibrated_and_the_rest_stays_as_it_was()
 def test_a_stem_is_found_and_lasts():
     """The rod is stated to begin at the pivot, and begins 4 % of its length from there."""
     true = Rod(stem=0.04)
-    record = CELL.measure(swept(PIN, step=0.05, rod=true), seed=1)
+    record = CELL.measure(swept(PIN, step=0.05, rod=true), rng=1)
     record = with_rod(record, Rod())
     found = calibrate_rig(
         record,
         contour=PIN,
         rig=Rig(load_cell=CELL, unknown={**NOTHING, "stem": "default", "rigidity_scale": "default"}),
-        seed=1,
+        rng=1,
         settings=SOUND,
     )
     assert_near(found.calibration.posterior, {"stem": 0.04, "rigidity_scale": 1.0})
@@ -163,9 +163,9 @@ def test_a_record_counts_once():
     assert first.calibration.error >= rig().calibration.error
     for record in (read_from(0), second):
         with refused(ParameterError, "twice"):
-            calibrate_rig(record, contour=PIN, rig=first, seed=1, settings=QUICK)
+            calibrate_rig(record, contour=PIN, rig=first, rng=1, settings=QUICK)
     with refused(ParameterError, "twice"):
-        infer_contour(second, rig=first, seed=1, settings=QUICK)
+        infer_contour(second, rig=first, rng=1, settings=QUICK)
 
 
 def test_the_gauge_predicts_as_its_family():
@@ -235,7 +235,7 @@ def test_draws_from_the_prior_have_the_correlations():
 
 @pytest.mark.slow
 def test_a_stored_posterior_has_the_same_prior():
-    tree = infer_contour(read(OBJECT, 2), rig=rig(), seed=1, settings=QUICK)
+    tree = infer_contour(read(OBJECT, 2), rig=rig(), rng=1, settings=QUICK)
     model = experiment_of(tree).model
     points = np.array([[0.7, 0.45, 0.0, *TRUE.values(), 1.0]])
     given = Experiment(read(OBJECT, 2), rig()).model
@@ -246,7 +246,7 @@ def test_a_stored_posterior_has_the_same_prior():
 def test_families_are_compared_with_the_rig():
     """One parameter has no correlations: its prior given by hand has the same evidence, up to the error of bridges."""
     record, alone = read(OBJECT, 2), rig_prior(drawn(("rigidity_scale",)))
-    known = {"families": ["parabola", "circle"], "leave_one_out": False, "seed": 1}
+    known = {"families": ["parabola", "circle"], "leave_one_out": False, "rng": 1}
     stated = Rig(load_cell=CELL, unknown=only(**alone.priors))
     with_rig = compare_families(record, rig=calibrated(alone), settings=SOUND, **known)
     by_hand = compare_families(record, rig=stated, settings=SOUND, **known)
@@ -296,16 +296,16 @@ def test_others_are_refused():
         Rig(unknown={"lever_x": stats.norm(0.0, 0.1)}, calibration=rig_prior(drawn()))
     for what, other in {"units": "SI", "rod_length": 0.1, "load_cell_drive_angle_offset": 0.1}.items():
         with refused(ParameterError, what):
-            infer_contour(read(OBJECT, 2), rig=calibrated(rig_prior(drawn(**{what: other}))), seed=1, settings=QUICK)
+            infer_contour(read(OBJECT, 2), rig=calibrated(rig_prior(drawn(**{what: other}))), rng=1, settings=QUICK)
 
 
 def test_other_gauges_are_refused():
     record = read(PIN, 1)
     for contour in ("circle", Circle(r=[0.2, 0.3], q=0.5), from_function(lambda x: 0.5 + x * x, (-1.0, 1.0))):
         with refused(ParameterError, "contour"):
-            calibrate_rig(record, contour=contour, seed=1)
+            calibrate_rig(record, contour=contour, rng=1)
     with refused(ParameterError, "nothing of the rig is unknown"):
-        calibrate_rig(record, contour=PIN, rig=Rig(unknown="nothing"), seed=1)
+        calibrate_rig(record, contour=PIN, rig=Rig(unknown="nothing"), rng=1)
 
 
 def found_nothing():
@@ -323,11 +323,11 @@ def test_a_sensor_in_counts_is_calibrated_on_a_gauge_whose_place_is_uncertain():
     real = LoadCell(moment_noise=5.0, gain=counts(900.0 * 1.1), moment_curve=(0.06, 0.03))
 
     def read_by(sensor, contour, seed):
-        record = sensor.measure(swept(contour, step=0.05), seed=seed)
+        record = sensor.measure(swept(contour, step=0.05), rng=seed)
         record.attrs = {name: v for name, v in record.attrs.items() if not name.startswith("load_cell_")}
         return record.assign({name: np.nan * record[name] for name in ("force_x", "force_y")})
 
-    known = {"seed": 1, "settings": SOUND}
+    known = {"rng": 1, "settings": SOUND}
     unknown = only("gauge", "moment_curve", "moment_bias", moment_gain=stats.lognorm(s=0.3))
     place = Circle(r=0.2, q=0.5 - 0.006, x_c=0.01)
     whole = Rig(load_cell=stated, unknown=unknown)
@@ -346,7 +346,7 @@ def counts(gain):
 @pytest.mark.slow
 def test_a_stream_takes_it_as_prior(tmp_path):
     """Its posterior is that of the whole record, within their Monte-Carlo errors: a quarter of a deviation."""
-    record, known = read(OBJECT, 2), {"seed": 1, "rig": rig()}
+    record, known = read(OBJECT, 2), {"rng": 1, "rig": rig()}
     stream = Stream(**known, particles=500)
     for block in np.array_split(np.arange(record.sizes["sample"]), 3):
         stream.update(record.isel(sample=block))

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tactile_bayes import LoadCell, SamplerSettings, Translation, infer_contacts, infer_contour, scan, zero_load
+from tactile_bayes import LoadCell, SamplerSettings, Translation, infer_contacts, infer_contour, scan
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.record_likelihood import shortening
 from tactile_bayes.inference.record_likelihood.shortening import MOST_SAMPLES, shortened, thinned
+from tactile_bayes.load_cell import zero_load
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.drift import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.load_cell.likelihood import log_likelihood
@@ -35,7 +36,7 @@ def ideal(samples, sweeps=1, direction="both"):
 
 
 def long_record(samples=20_000, sweeps=1, cell=CELL, direction="both"):
-    return cell.measure(ideal(samples, sweeps, direction), seed=1)
+    return cell.measure(ideal(samples, sweeps, direction), rng=1)
 
 
 def in_blocks(record, cell=CELL):
@@ -85,7 +86,7 @@ def test_readings_next_to_a_snap_off_stay_single():
 def test_readings_at_one_angle_are_one_block():
     """A drive that stops to measure: 300 angles, 20 readings at each; nothing is lost but the order of readings."""
     once = ideal(300)
-    record = CELL.measure(once.isel(sample=np.repeat(np.arange(once.sizes["sample"]), 20)), seed=1)
+    record = CELL.measure(once.isel(sample=np.repeat(np.arange(once.sizes["sample"]), 20)), rng=1)
     made = in_blocks(record)
     assert set(made.drive_angle.values.round(12)) == set(record.drive_angle.values.round(12))
     assert np.all(made.block_freedom.values == made.block_readings.values - 1)
@@ -128,7 +129,7 @@ def test_within_a_block_the_noise_is_that_of_the_sensor():
 
 def test_zero_load_of_blocks_is_that_of_the_readings():
     swept = scan(CONTOUR, direction="forward", drive_angles=np.linspace(0.4, 3.4, 10_000)).record
-    record = CELL.measure(swept, seed=1)
+    record = CELL.measure(swept, rng=1)
     made = in_blocks(record)
     whole, found = zero_load(record), zero_load(made)
     for name in ("bias", "bias_uncertainty", "noise"):
@@ -181,7 +182,7 @@ def test_thinned_samples_drift_as_they_did(drift):
 
 def test_a_thinned_way_keeps_its_ends_and_no_drive_is_averaged():
     drive = Translation((1.2, 0.0), np.pi, np.pi / 2, 2.4, 2.4 / 5_000)
-    record = CELL.measure(scan(CONTOUR, drive=drive).record, seed=1)
+    record = CELL.measure(scan(CONTOUR, drive=drive).record, rng=1)
     made, _ = shortened(record, CELL)
     assert made.sizes["sample"] < MOST_SAMPLES + 10
     assert made.base_x.values[[0, -1]].tolist() == record.base_x.values[[0, -1]].tolist()
@@ -205,7 +206,7 @@ def test_a_posterior_of_a_long_record_is_of_its_blocks(monkeypatch):
 
     monkeypatch.setattr("tactile_bayes.load_cell.cell.log_likelihood", counted)
     record = long_record()
-    result = infer_contour(record, rig=Rig(unknown="nothing"), seed=1, settings=BRIEF)
+    result = infer_contour(record, rig=Rig(unknown="nothing"), rng=1, settings=BRIEF)
     samples = result["observed_data"].sizes["sample"]
     assert set(taken) == {samples}
     assert samples <= MOST_SAMPLES
@@ -219,7 +220,7 @@ def test_a_posterior_of_a_long_record_is_of_its_blocks(monkeypatch):
 
 def test_contacts_of_a_long_record_are_of_every_so_many_samples(monkeypatch):
     monkeypatch.setattr(shortening, "MOST_SAMPLES", 100)
-    result = infer_contacts(long_record(300), seed=1, draws=40, method="importance")
+    result = infer_contacts(long_record(300), rng=1, draws=40, method="importance")
     assert result["posterior"].sizes["sample"] <= 100
     assert "every" in result.attrs["message"]
 
@@ -244,7 +245,7 @@ def test_a_posterior_of_blocks_is_that_of_the_readings(monkeypatch):
     """Means within five Monte-Carlo errors, standard deviations within five: false alarm below 1 in 10,000."""
     record = long_record(3_000)
     settings = SamplerSettings(min_ess=2000)
-    options = {"rig": Rig(unknown={**NOTHING, "friction": "default"}), "seed": 1, "settings": settings}
+    options = {"rig": Rig(unknown={**NOTHING, "friction": "default"}), "rng": 1, "settings": settings}
     blocks = infer_contour(record, **options)["posterior"].to_dataset()
     monkeypatch.setattr(shortening, "MOST_SAMPLES", 10**9)
     readings = infer_contour(record, **options)["posterior"].to_dataset()

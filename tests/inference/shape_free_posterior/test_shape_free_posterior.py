@@ -69,7 +69,7 @@ def model_of(unknown=SMOOTH, profile="II", rod=None, cell=CELL):
     contour = paper_profile(profile, q=0.5)
     if rod is not None:
         contour = Parabola(0.5 / rod.length, 0.5 * rod.length)
-    measured = cell.measure(scan(contour, rig=Rig(rod=rod), drive_step=np.radians(5.0)).record, seed=1)
+    measured = cell.measure(scan(contour, rig=Rig(rod=rod), drive_step=np.radians(5.0)).record, rng=1)
     return model_of_record(measured, unknown, cell)
 
 
@@ -153,8 +153,8 @@ def test_a_smooth_contour_is_within_its_band(profile, unknown, evaluations):
     each of four ensembles, it makes 344 evaluations in place of 272.
     """
     truth = paper_profile(profile, q=0.5)
-    measured = CELL.measure(scan(truth, drive_step=np.radians(1.0)).record, seed=1)
-    result = infer_contour(measured, family="shape-free", rig=Rig(load_cell=CELL, unknown=unknown), seed=1)
+    measured = CELL.measure(scan(truth, drive_step=np.radians(1.0)).record, rng=1)
+    result = infer_contour(measured, family="shape-free", rig=Rig(load_cell=CELL, unknown=unknown), rng=1)
     assert result.attrs["converged"], result.attrs["message"]
     assert result["sample_stats"].attrs["evaluations"] < evaluations
     x = np.linspace(-0.6, 0.6, 9)
@@ -169,8 +169,8 @@ def test_a_smooth_contour_is_within_its_band(profile, unknown, evaluations):
 def test_a_run_is_made_again_from_its_seed_and_has_units():
     settings = SamplerSettings(ensembles=2, max_steps=20)
     cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
-    measured = cell.measure(scan(Parabola(5.0, 0.05), rig=Rig(rod=SI), drive_step=0.05).record, seed=1)
-    one, other = (infer_contour(measured, family="shape-free", seed=1, settings=settings) for _ in range(2))
+    measured = cell.measure(scan(Parabola(5.0, 0.05), rig=Rig(rod=SI), drive_step=0.05).record, rng=1)
+    one, other = (infer_contour(measured, family="shape-free", rng=1, settings=settings) for _ in range(2))
     for name, draws in one["posterior"].data_vars.items():
         np.testing.assert_array_equal(draws, other["posterior"][name])
     units = {name: one["posterior"][name].attrs["units"] for name in ("r", "amplitude", "length_scale", "z_1", "q")}
@@ -179,7 +179,7 @@ def test_a_run_is_made_again_from_its_seed_and_has_units():
 
 @pytest.mark.slow
 def test_what_goes_on_from_a_checkpoint_is_the_same(tmp_path):
-    measured = CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, seed=1)
+    measured = CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, rng=1)
 
     def run(steps, **options):
         settings = SamplerSettings(ensembles=2, block_steps=10, max_steps=steps)
@@ -187,7 +187,7 @@ def test_what_goes_on_from_a_checkpoint_is_the_same(tmp_path):
             measured,
             family="shape-free",
             rig=Rig(load_cell=CELL, unknown="nothing"),
-            seed=1,
+            rng=1,
             settings=settings,
             **options,
         )
@@ -221,10 +221,10 @@ def test_what_may_vanish_does_not_end_the_coordinates():
 def test_time_that_ends_before_anything_possible_is_found_gives_what_the_prior_allows():
     """Of a vertex far above where the rod was: no approximation by normal distributions leads there."""
     kept = infer_contour(
-        CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, seed=1),
+        CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, rng=1),
         family=Family("shape-free", q=stats.uniform(0.9, 0.05)),
         rig=Rig(load_cell=CELL),
-        seed=1,
+        rng=1,
         settings=SamplerSettings(ensembles=2, max_seconds=1e-3),
     )
     assert kept.attrs["message"].startswith("not converged, the time allowed ran out")
@@ -245,7 +245,7 @@ def test_a_zero_that_is_not_known_hides_no_snap_off(bias):
     """The same samples are loaded, and the snap-offs between the same samples, if all readings are shifted."""
     cell = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, -bias, bias))
     record = scan(paper_profile("II", q=0.5), drive_step=np.radians(2.0)).record
-    found = Observer(model_of_record(cell.measure(record, seed=1)))
+    found = Observer(model_of_record(cell.measure(record, rng=1)))
     assert found.ends.all()
     loaded = (record.holding_moment != 0.0).values
     assert np.count_nonzero(found.loaded != loaded) <= 6  # just after first contact the noise hides the load
@@ -276,13 +276,13 @@ def test_other_rigs(what):
         truth, scale = Parabola(0.5 / SI.length, 0.5 * SI.length), SI.length
         record = scan(truth, rig=Rig(rod=SI), drive_step=np.radians(2.0)).record
         cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
-    measured = cell.measure(record, seed=measured_with)
+    measured = cell.measure(record, rng=measured_with)
     if what == "moment alone":
         for name in ("force_x", "force_y"):
             measured[name] = measured[name] * np.nan
         unknown = "nothing"
     rig = Rig(load_cell=cell, unknown=unknown)
-    result = infer_contour(measured, family="shape-free", rig=rig, seed=1, **options)
+    result = infer_contour(measured, family="shape-free", rig=rig, rng=1, **options)
     x = scale * np.linspace(-0.6, 0.6, 9)
     band = contour_band(result, x)
     inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)

@@ -26,7 +26,7 @@ ALL: dict[str, float] = {}
 
 def model_of(contour, unknown=ALL):
     record = scan(contour, drive_step=np.radians(1.0), rig=Rig(unknown={"friction": 0.2})).record
-    model = Experiment(TRUE.measure(record, seed=1), Rig(load_cell=STATED, unknown=unknown)).model
+    model = Experiment(TRUE.measure(record, rng=1), Rig(load_cell=STATED, unknown=unknown)).model
     return model, (record.holding_moment != 0.0).values
 
 

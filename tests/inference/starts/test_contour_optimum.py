@@ -25,7 +25,7 @@ def brief():
     scanned = scan(contour, drive_angles=angles, rig=Rig(unknown={"friction": TRUTH["friction"]}))
     touched = (scanned.record.holding_moment != 0.0).groupby(scanned.record.sweep).sum()
     assert touched.values.tolist() == [2, 2]
-    return scanned, contour_problem(Experiment(CELL.measure(scanned.record, seed=3), Rig(load_cell=CELL))).model
+    return scanned, contour_problem(Experiment(CELL.measure(scanned.record, rng=3), Rig(load_cell=CELL))).model
 
 
 def test_contact_of_a_few_samples_brackets_its_events(brief):

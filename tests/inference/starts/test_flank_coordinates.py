@@ -103,7 +103,7 @@ def test_a_flank_of_joined_contours_is_that_of_its_own_parameters(side):
 @pytest.mark.parametrize(("contour", "flank"), [("parabola/power-law", "power-law"), ("ellipse/parabola", None)])
 def test_of_joined_contours_the_flank_that_was_touched_counts(contour, flank):
     """A record of the right flank alone, which is none of an ellipse where that is on the left."""
-    replicate = experiment_of(family=contour, seed=2026)
+    replicate = experiment_of(family=contour, rng=2026)
     measured = simulate(replicate, np.random.default_rng(1)).measured
     model = replicate.problem_of(measured).model
     point = np.concatenate([[0.7, 1.3, 1.6][: len(model.family.parameters) - 2], [0.3, -0.9]])
@@ -124,6 +124,6 @@ def test_of_joined_contours_the_flank_that_was_touched_counts(contour, flank):
 )
 def test_a_flank_known_to_a_hundred_thousandth_is_found_and_sampled(family, number):
     """Pivots next to the object, loads of up to 65,000 times their noise: replicates of the published calibration."""
-    replicate = calibration_replicate(number, family=family, seed=2026)
+    replicate = calibration_replicate(number, family=family, rng=2026)
     assert replicate.outcome.ranks, replicate.outcome.message
     assert replicate.outcome.numbers["converged"] == 1.0

@@ -27,11 +27,11 @@ X = [-0.2, 0.0, 0.2]
 @pytest.fixture(scope="module")
 def measured():
     scan = tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.1)
-    return CELL.measure(scan.record, seed=1)
+    return CELL.measure(scan.record, rng=1)
 
 
 def stream_of(**changes):
-    return tb.Stream(**({"rig": STATED, "seed": 1, "particles": 500, "x": X} | changes))
+    return tb.Stream(**({"rig": STATED, "rng": 1, "particles": 500, "x": X} | changes))
 
 
 def fed(stream, measured, blocks):
@@ -73,7 +73,7 @@ def test_the_evidence_agrees_with_bridge_sampling(streamed, whole):
 
 @pytest.mark.slow
 def test_one_block_and_many_agree(streamed, measured):
-    (once,) = fed(stream_of(seed=5, particles=2000), measured, 1)
+    (once,) = fed(stream_of(rng=5, particles=2000), measured, 1)
     last = streamed[1][-1]
     spread = once.parameters.sel(level=0.975) - once.parameters.sel(level=0.025)
     assert float((abs(once.parameters - last.parameters).sel(level=0.5) / spread).max()) < 0.1
@@ -128,7 +128,7 @@ def test_a_wrong_model_shows_early_and_a_right_one_never(streamed):
         tb.contours.paper_profile("II", q=0.5), drive_step=0.05, rig=Rig(unknown={"friction": 0.2})
     ).record
     stream = stream_of(particles=200)
-    first, *_, last = fed(stream, CELL.measure(sliding, seed=1).isel(sample=slice(0, 60)), 4)
+    first, *_, last = fed(stream, CELL.measure(sliding, rng=1).isel(sample=slice(0, 60)), 4)
     assert float(first.e_value) < 2.0
     assert float(last.e_value) > 1000.0
 
@@ -211,7 +211,7 @@ def test_the_backlash_enters_with_the_second_direction(measured):
 
 # --- The file of a stream -------------------------------------------------------------------------------------------
 
-SAVED = {"rig": STATED, "seed": 1, "particles": 100}
+SAVED = {"rig": STATED, "rng": 1, "particles": 100}
 
 
 @pytest.fixture(scope="module")
@@ -237,7 +237,7 @@ def test_a_stream_that_goes_on_has_the_numbers_of_one_that_was_not_stopped(measu
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"seed": 2}, "seed (was '1, pool of 4', now '2, pool of 4')"),
+        ({"rng": 2}, "seed (was '1, pool of 4', now '2, pool of 4')"),
         ({"family": "circle"}, "family (was 'parabola', now 'circle')"),
         ({"particles": 200}, "particles (was '100', now '200')"),
         ({"rig": STATED.with_unknown(friction="default")}, "nuisances"),

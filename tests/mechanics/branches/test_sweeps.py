@@ -180,7 +180,7 @@ def test_what_is_known_of_a_contour_does_not_depend_on_others_beside_it(name, op
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_forces_are_in_the_frame_of_the_record(friction):
-    record = CELL.measure(scan(Parabola(0.5, 0.5)).record, seed=1)
+    record = CELL.measure(scan(Parabola(0.5, 0.5)).record, rng=1)
     contours = drawn("parabola", THIN, 40)
     fixed = RecordLikelihood(record, CELL, friction).log_likelihood(contours)
     turning = RecordLikelihood(in_frame(record, "turning"), CELL, friction).log_likelihood(contours)
@@ -273,7 +273,7 @@ import sys
 import tactile_bayes as tb
 sys.stderr.isatty = lambda: True
 for _ in range(2):
-    tb.elastica.wrench_from_contact(0.2, 0.6, 0.1)
+    tb.mechanics.elastica.wrench_from_contact(0.2, 0.6, 0.1)
 print("done")
 """
 

@@ -134,7 +134,7 @@ def inspect_record(
     >>> from tactile_bayes import scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.1, 0.0, 0.0))
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5)).record, rng=1)
     >>> inspect_record(measured).messages
     ('Nothing looks wrong.',)
     >>> knocked = measured.holding_moment.copy()

@@ -12,7 +12,8 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.importance import ContactWeights, weigh_contacts
-from tactile_bayes.inference.ensembles import SamplerSettings, sample, scatter_walkers, spawn
+from tactile_bayes.inference.ensembles import SamplerSettings, sample, scatter_walkers
+from tactile_bayes.numerics.random_numbers import spawn
 from tactile_bayes.numerics.selection import resampled
 
 __all__ = ["CHAINS", "EMCEE", "EMCEE_SETTINGS", "IMPORTANCE", "ContactDraws", "Method", "draw_contacts"]

@@ -64,14 +64,6 @@ def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequ
     """Return proposals and their importance weights.
 
     A proposal takes 7 numbers of memory, so that many samples are better processed in blocks.
-
-    Parameters
-    ----------
-    density : ContactDensity
-        Density of n samples.
-    draws : int
-        Number of proposals for each of them.
-    seed : SeedSequence
     """
     rng = np.random.default_rng(seed)
     approximation = _approximation(density)

@@ -26,12 +26,12 @@ from tactile_bayes.inference.contact_posterior.draws import (
     draw_contacts,
 )
 from tactile_bayes.inference.contact_posterior.importance import LARGEST_K, LEAST_DRAWS
-from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
+from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.shortening import thinned
-from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, spawn
 from tactile_bayes.reconstruction import contacts_of, samples_of
 from tactile_bayes.record import CHANNELS, frame_of, record_hash, validate, with_rod
 from tactile_bayes.record.schema import column_attributes
@@ -54,7 +54,7 @@ def infer_contacts(
     rig: Rig | None = None,
     *,
     prior: ContactPrior = "flat",
-    seed: Seed,
+    rng: Rng,
     draws: int = 1000,
     method: Method = "auto",
     settings: SamplerSettings | None = None,
@@ -83,8 +83,8 @@ def infer_contacts(
         takes arrays contact_x, contact_y (on the object's surface, in the laboratory frame and the record's unit) and
         slope_angle [rad], and returns the logarithm of a density, an array of their shape, −inf where there is no
         contact; it need not be normalised. Flat is lambda x, y, slope: 0 * x.
-    seed : int or numpy.random.SeedSequence
-        Seed of all random numbers; the same seed gives the same draws of the same samples. One sample more, or less,
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
+        Random numbers; the same seed gives the same draws of the same samples. One sample more, or less,
         changes the draws of others, too.
     draws : int
         Number of draws for each sample; a multiple of 4, since there are four independent chains.
@@ -141,13 +141,14 @@ def infer_contacts(
     >>> from tactile_bayes import LoadCell, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
-    >>> contacts = infer_contacts(measured, seed=1)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
+    >>> contacts = infer_contacts(measured, rng=1)
     >>> contacts["posterior"].sizes["draw"], int(contacts["sample_stats"].converged.sum())
     (250, 46)
     """
     rig = rig_of(rig)
     measured = with_rod(validate(measured), rig.rod)
+    seed = seed_sequence(rng)
     _refuse_options(draws, method, settings)
     check_function("progress", progress)
     stated = rig.load_cell or LoadCell.from_record(measured)
@@ -265,7 +266,7 @@ def _stats(size: int, loaded: Index, found: ContactDraws) -> xr.Dataset:
 def _attributes(
     measured: xr.Dataset,
     cell: LoadCell,
-    seed: Seed,
+    seed: np.random.SeedSequence,
     prior: ContactPrior,
     friction: float,
     draws: int,

@@ -32,7 +32,7 @@ from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends, Proposal,
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
 from tactile_bayes.inference.ensembles.straightened import Straightened
-from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, seed_sequence, spawn
+from tactile_bayes.inference.ensembles.walkers import scatter_walkers
 
 __all__ = [
     "ANYTHING",
@@ -47,16 +47,13 @@ __all__ = [
     "Proposal",
     "Proposing",
     "SamplerSettings",
-    "Seed",
     "Straightened",
     "approximate",
     "in_coordinates",
     "learn_coordinates",
     "sample",
     "scatter_walkers",
-    "seed_sequence",
     "settings_of",
-    "spawn",
     "standardise",
     "whitened_moves",
 ]

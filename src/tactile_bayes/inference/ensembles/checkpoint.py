@@ -182,13 +182,7 @@ def _name(begin: int, end: int) -> str:
 def open_checkpoint(
     path: str | os.PathLike[str], identity: Mapping[str, str], shape: tuple[int, int, int]
 ) -> Iterator[Checkpoint]:
-    """Open the checkpoint in a folder, created if missing, and lock it for this run.
-
-    Raises
-    ------
-    InferenceError
-        If the path is a file, or the folder is in use, damaged, of another run, or holds other files.
-    """
+    """Open the checkpoint in a folder, created if missing, and lock it for this run."""
     folder = Path(path).resolve()
     with alone_in(folder, InferenceError):
         yield Checkpoint(folder, identity, shape)

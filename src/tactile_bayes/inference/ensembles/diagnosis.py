@@ -27,10 +27,6 @@ def lost_walkers(values: Floats) -> Flags:
     R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails of the
     result. Fewer than one in thousands of draws from a posterior is so improbable, and practically never the most
     probable of a walker's many draws.
-
-    Parameters
-    ----------
-    values : ndarray, shape (chain, step, walker)
     """
     if not values.shape[1]:
         return np.zeros((len(values), values.shape[2]), dtype=bool)

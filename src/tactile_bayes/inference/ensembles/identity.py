@@ -12,9 +12,9 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
-from tactile_bayes.inference.ensembles.walkers import Seed, seed_sequence
+from tactile_bayes.numerics.random_numbers import Seed, whole_seed
 
-__all__ = ["changes", "identity_of_run", "seed_as_text"]
+__all__ = ["changes", "identity_of_run"]
 
 
 _START, _COORDINATES = _CONSEQUENCES = ("starting points", "coordinates of the walkers")
@@ -32,13 +32,7 @@ def identity_of_run(
     settings: SamplerSettings,
     coordinates: Coordinates,
 ) -> dict[str, str]:
-    """Return all that determines the draws: the caller's identity of the log-probability, and the sampler's entries.
-
-    Raises
-    ------
-    ParameterError
-        If the caller's identity holds anything but strings, or a name of the sampler.
-    """
+    """Return all that determines the draws: the caller's identity of the log-probability, and the sampler's entries."""
     chains, walkers, _ = start.shape
     entries = {} if identity is None else dict(identity)
     rest = {
@@ -46,7 +40,7 @@ def identity_of_run(
         "number of ensembles": str(chains),
         "walkers of an ensemble": str(walkers),
         "block_steps": str(settings.block_steps),
-        "seed of the ensembles": seed_as_text(seed),
+        "seed of the ensembles": whole_seed(seed),
         _START: hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
         _COORDINATES: coordinates.digest,
         "version of emcee": version("emcee"),
@@ -57,13 +51,6 @@ def identity_of_run(
         if name in rest:
             raise ParameterError(f"the identity has {name!r}, which the sampler adds itself: leave it out")
     return {**entries, **rest}
-
-
-def seed_as_text(seed: Seed) -> str:
-    """Return all of a seed that determines random numbers, as text."""
-    sequence = seed_sequence(seed)
-    spawned = f", spawn key {sequence.spawn_key}" if sequence.spawn_key else ""
-    return f"{sequence.entropy}{spawned}, pool of {sequence.pool_size}"
 
 
 def changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:

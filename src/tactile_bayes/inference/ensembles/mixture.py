@@ -47,11 +47,6 @@ class Mixture:
         Its parts are normal distributions of the columns `bent`, found by expectation and maximisation; given these,
         the other columns are the same normal distribution everywhere, with a mean that is linear in them. Parts begin
         as slices of equal numbers along the longest direction.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If the points lie in a plane.
         """
         deviation = points.std(axis=0)
         refuse_constant(deviation, np.abs(points).max(axis=0))

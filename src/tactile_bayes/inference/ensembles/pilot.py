@@ -63,19 +63,7 @@ def learn_coordinates(
     The quality of a proposal is estimated at positions of the walkers: its own draws would miss the same parts of the
     target as the proposal, and a narrow one would look good.
 
-    Parameters
-    ----------
-    log_probability : callable
-        Log-density of parameters, (n, d) to (n,).
-    base : Logarithms
-        Coordinates, with a proposal if one is known.
-    start : ndarray, shape (walkers, d)
-        Starting points of an even number of walkers, in parameters.
-    scale : ndarray, shape (d,)
-        Prior scale of each of the base's coordinates.
-    rng : np.random.Generator
-    deadline : Deadline
-        After it, the walkers make one more step, and there is no further stage.
+    Shapes: start (walkers, d), scale (d,).
     """
     best: Proposing = base
     points = start
@@ -119,18 +107,7 @@ def standardise(
     Each of some pilot runs samples in the coordinates so far, and these are standardised by mean and covariance of its
     second half.
 
-    Parameters
-    ----------
-    log_probability : callable
-        Log-density of parameters, (n, d) to (n,).
-    base : Standardising coordinates
-    start : ndarray, shape (ensembles, walkers, d)
-        Starting points of even numbers of walkers, in the base's coordinates.
-    columns : slice
-        The coordinates that are nearly standard normal.
-    rng : np.random.Generator
-    deadline : Deadline
-        After it, the walkers make one more step, and there is no further run.
+    Shapes: start (ensembles, walkers, d).
     """
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
     best, start, points = base, start.copy(), start[0]

@@ -125,11 +125,6 @@ class Proposal:
         """Fit a proposal to points, shape (n, parameters), with weights of sum one, in any units of the parameters.
 
         The points are assumed to come from a normal distribution that is truncated at the lower bounds.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If the points lie in a plane.
         """
         weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
         mean = weights @ points

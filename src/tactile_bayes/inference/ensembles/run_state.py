@@ -64,18 +64,7 @@ class RunState:
 
     @classmethod
     def begin(cls, coordinates: Coordinates, start: Block, steps: int = 0, planned: int = 0) -> RunState:
-        """Return the state of a run without stored steps.
-
-        Parameters
-        ----------
-        coordinates : Coordinates
-        start : Block
-            Block that ends with the coordinates before the first step that is appended.
-        steps : int
-            Number of steps before the first one that is appended.
-        planned : int
-            Number of steps at the next diagnosis, if known.
-        """
+        """Return the state of a run without stored steps."""
         samples, values = start.samples[:, :0], start.log_probability[:, :0]
         empty = StoredSteps(steps + 1, np.empty(0, dtype=np.intp), samples, values, np.empty(values.shape, dtype=bool))
         return cls(coordinates, start, steps, _thinning(max(steps, planned), start), empty)

@@ -24,7 +24,8 @@ from tactile_bayes.inference.ensembles.modes import modes_message, modes_of
 from tactile_bayes.inference.ensembles.run_state import RunState
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.target import CheckedTarget, LogProbability
-from tactile_bayes.inference.ensembles.walkers import Seed, checked_start, first_random_state, spawn
+from tactile_bayes.inference.ensembles.walkers import checked_start, first_random_state
+from tactile_bayes.numerics.random_numbers import Seed, spawn
 
 __all__ = ["Progress", "sample"]
 

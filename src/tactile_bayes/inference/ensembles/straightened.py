@@ -55,23 +55,7 @@ class Straightened:
 
     @classmethod
     def fitted(cls, base: Coordinates, points: Floats, scale: Floats, count: float) -> Straightened:
-        """Fit coordinates to draws of a posterior.
-
-        Parameters
-        ----------
-        base : Coordinates
-        points : ndarray, shape (n, d)
-            Draws, in parameters.
-        scale : ndarray, shape (d,)
-            Prior scale of each of the base's coordinates, by which widths are compared.
-        count : float
-            Effective number of independent draws.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If the draws lie in a plane.
-        """
+        """Fit coordinates to draws of a posterior. Shapes: points (n, d), scale (d,)."""
         coordinates = base.of(points)
         mean: Floats = coordinates.mean(axis=0)
         deviations: Floats = coordinates - mean
@@ -130,13 +114,7 @@ def _solved(root: Floats, deviations: Floats) -> Floats:
 
 
 def _principal(covariance: Floats, scale: Floats) -> Floats:
-    """Return principal directions, a column each, the widest relative to the scale first.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If one of them is no wider than rounding errors.
-    """
+    """Return principal directions, a column each, the widest relative to the scale first."""
     sizes, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
     if not sizes[0] > np.finfo(float).eps * sizes[-1]:
         raise np.linalg.LinAlgError("draws lie in a plane")

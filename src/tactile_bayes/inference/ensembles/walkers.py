@@ -10,15 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_seed
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
 from tactile_bayes.inference.ensembles.target import LogProbability
+from tactile_bayes.numerics.random_numbers import Seed, spawn
 
-__all__ = ["RandomState", "Seed", "checked_start", "first_random_state", "scatter_walkers", "seed_sequence", "spawn"]
-
-
-Seed = int | np.random.SeedSequence
+__all__ = ["RandomState", "checked_start", "first_random_state", "scatter_walkers"]
 
 
 class RandomState(NamedTuple):
@@ -46,28 +43,8 @@ def first_random_state(seed: np.random.SeedSequence) -> RandomState:
     return RandomState.of(np.random.RandomState(np.random.MT19937(seed)))
 
 
-def seed_sequence(seed: Seed) -> np.random.SeedSequence:
-    """Return the seed as a sequence that has not spawned any; refuse other objects."""
-    if isinstance(seed, np.random.SeedSequence):
-        return np.random.SeedSequence(seed.entropy, spawn_key=seed.spawn_key, pool_size=seed.pool_size)
-    return np.random.SeedSequence(check_seed(seed, "give a whole number from 0 up, or a numpy.random.SeedSequence"))
-
-
-def spawn(seed: Seed, count: int) -> list[np.random.SeedSequence]:
-    """Return independent seeds, the same at every call with the same seed."""
-    return seed_sequence(seed).spawn(count)
-
-
 def checked_start(start: ArrayLike, names: Sequence[str], settings: SamplerSettings) -> Floats:
-    """Return starting points, shape (ensembles, walkers, parameters), and refuse unsuitable ones.
-
-    Raises
-    ------
-    ParameterError
-        If the shape does not agree with names and settings, or there are too few walkers.
-    InferenceError
-        If a number is not finite, or the walkers of an ensemble lie in a plane.
-    """
+    """Return starting points, shape (ensembles, walkers, parameters), and refuse unsuitable ones."""
     points = np.array(start, dtype=float)
     if points.ndim != 3 or points.shape[0] != settings.ensembles or points.shape[2] != len(names):
         raise ParameterError(
@@ -102,38 +79,7 @@ def scatter_walkers(
 ) -> Floats:
     """Return starting points for `sample`: random points, redrawn until each has a finite log-probability.
 
-    Parameters
-    ----------
-    log_probability : callable
-        The target, as for `sample`.
-    draw : callable
-        Function from a random generator and n to n points (n, parameters), scattered more widely than the posterior:
-        draws from the prior, or from a widened normal approximation.
-    parameters : int
-        Number of parameters.
-    seed : int or numpy.random.SeedSequence
-        Seed, from which each ensemble has its own stream.
-    settings : SamplerSettings, optional
-        Numbers of ensembles and walkers.
-    max_rounds : int
-        Largest mean number of points drawn for each walker.
-
-    Returns
-    -------
-    ndarray, shape (ensembles, walkers, parameters)
-
-    Raises
-    ------
-    InferenceError
-        If too few points lie inside the support.
-
-    Examples
-    --------
-    >>> def log_probability(x):
-    ...     return np.where(x[:, 0] > 0, -x[:, 0], -np.inf)
-    >>> start = scatter_walkers(log_probability, lambda rng, n: rng.normal(size=(n, 1)), parameters=1, seed=1)
-    >>> start.shape, bool(np.all(start > 0))
-    ((4, 48, 1), True)
+    Returns shape (ensembles, walkers, parameters).
     """
     settings = SamplerSettings() if settings is None else settings
     walkers = settings.walkers_for(parameters)

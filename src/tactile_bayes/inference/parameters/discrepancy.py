@@ -28,13 +28,7 @@ def is_discrepancy(name: str) -> bool:
 
 
 def discrepancy_priors(rig: Rig) -> dict[str, Distribution]:
-    """Return the priors of the discrepancy, if it is unknown; none if nothing or zero is said of it.
-
-    Raises
-    ------
-    ParameterError
-        If it is said to have a known size.
-    """
+    """Return the priors of the discrepancy, if it is unknown; none if nothing or zero is said of it."""
     said = {name: value for name, value in rig.said.items() if name in PARAMETERS}
     if known := [name for name, value in said.items() if isinstance(value, float) and value]:
         raise ParameterError(
@@ -52,13 +46,6 @@ def load_in_contact(loads: Floats, course: Course) -> Floats:
 
     The largest force in any direction stands for both forces, so that the discrepancy does not depend on the frame of
     the load cell, and a force that happens to be small is as uncertain as the other.
-
-    Parameters
-    ----------
-    loads : ndarray, shape (..., samples, 3)
-        Loads, exactly zero out of contact.
-    course : Course
-        Sweeps of the record.
     """
     sizes = np.stack([np.abs(loads[..., 0]), np.hypot(loads[..., 1], loads[..., 2])], axis=-1)
     begins = np.flatnonzero(np.isinf(course.step))

@@ -39,27 +39,6 @@ def matched_priors(family: str, length: float) -> dict[str, Distribution]:
     to be wider and rounder than a circle. Here, sizes have priors for which the geometric mean of the radius of
     curvature between slopes of 0° and 45° on one side has its median at half the rod's length, and its logarithm a
     standard deviation of 1. Exponents, amplitude and length scale keep their default priors.
-
-    Parameters
-    ----------
-    family : str
-        As in `infer_contour`.
-    length : float
-        Length of the rod, in the unit of the record.
-
-    Returns
-    -------
-    dict of str to frozen scipy.stats distribution
-
-    Raises
-    ------
-    ParameterError
-        If there is no such family.
-
-    Examples
-    --------
-    >>> {name: round(float(p.median()), 3) for name, p in matched_priors("ellipse", 1.0).items()}
-    {'a': 0.592, 'b': 0.592}
     """
     return {
         f"{side}{parameter}": prior

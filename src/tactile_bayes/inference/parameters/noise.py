@@ -59,22 +59,7 @@ class Noise(NamedTuple):
 
 
 def noise_of(measured: xr.Dataset, rig: Rig, discrepancy: Mapping[str, Distribution]) -> Noise:
-    """Return the noise parameters of a record: a factor on the stated noise, or the scales if none is stated.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A valid record.
-    rig : Rig
-        Its load cell is in the record's units; by default the data sheet in the record.
-    discrepancy : mapping of str to frozen scipy.stats distribution
-        Priors of the parameters of a discrepancy; empty without.
-
-    Raises
-    ------
-    ParameterError
-        If the load cell states only noise in proportion to the load.
-    """
+    """Return the noise parameters of a record: a factor on the stated noise, or the scales if none is stated."""
     cell = rig.load_cell or LoadCell.from_record(measured)
     present = present_channels(measured)
     if cell is not None and any(cell.standard_deviations[name] > 0.0 for name in present):

@@ -197,13 +197,7 @@ class Nuisances:
 
 
 def belongs(name: str, group: str) -> bool:
-    """Return True for the name of a nuisance parameter, or of one of a group.
-
-    Examples
-    --------
-    >>> belongs("force_x_gain", "gain"), belongs("base_2_x", "base"), belongs("discrepancy_length", "length")
-    (True, True, False)
-    """
+    """Return True for the name of a nuisance parameter, or of one of a group."""
     return name == group or name in GROUPS.get(group, ()) or (group == "base" and bool(BASE.fullmatch(name)))
 
 
@@ -219,21 +213,6 @@ def nuisances_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool 
 
     A bias with a bias_uncertainty of the load cell is not among them: the likelihood integrates it out already. The
     parameters of the noise and of a discrepancy are not among them either.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A valid record.
-    rig : Rig
-    cell : LoadCell
-        The load cell of the rig or of the record, in the record's units.
-    gauge : bool
-        Whether the contour is that of a gauge, whose place can be inferred.
-
-    Raises
-    ------
-    ParameterError
-        If two unknowns have the same effect.
     """
     present = [_SHORT[name] for name in present_channels(measured)]
     joint = rig.calibration

@@ -41,24 +41,12 @@ _NOISES = ("load_cell_drive_angle_noise", "load_cell_drive_angle_resolution")
 
 
 def _lasting(nuisances: Collection[str]) -> tuple[str, ...]:
-    """Return the names of the parameters that a rig keeps from one record to the next.
-
-    Examples
-    --------
-    >>> _lasting(["rigidity_scale", "moment_bias", "lever_x", "base_2_x", "friction"])
-    ('rigidity_scale', 'lever_x')
-    """
+    """Return the names of the parameters that a rig keeps from one record to the next."""
     return tuple(name for name in nuisances if not any(part in _PASSING for part in name.split("_")))
 
 
 def rig_prior(rig: xr.DataTree) -> RigPrior:
-    """Return a density fitted to the posterior of a rig.
-
-    Raises
-    ------
-    InferenceError
-        If this is no result of `calibrate_rig`, it has not converged, or none of its parameters lasts.
-    """
+    """Return a density fitted to the posterior of a rig."""
     if not isinstance(rig, xr.DataTree) or "gauge" not in rig.attrs:
         raise InferenceError("this is no posterior of a rig: give one that calibrate_rig found")
     if not rig.attrs.get("converged"):
@@ -83,13 +71,7 @@ def _is_stated(name: str) -> bool:
 
 
 def refuse_other_rig(rig: RigPrior, own: Mapping[str, Any]) -> None:
-    """Refuse a calibration of another rod, load cell, frame or unit than a posterior states by its attributes.
-
-    Raises
-    ------
-    ParameterError
-        If they differ, or the rig was calibrated by the record of the posterior.
-    """
+    """Refuse a calibration of another rod, load cell, frame or unit than a posterior states by its attributes."""
     if own["data_sha256"] in rig.source.split():
         raise ParameterError("the rig was inferred from this very record, which would count twice: give another record")
     if not rig.stated:

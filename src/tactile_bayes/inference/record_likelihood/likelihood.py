@@ -126,16 +126,7 @@ class RecordLikelihood:
     ) -> Paths:
         """Return the paths of every contour in every segment; batch index k·n + i is contour i in segment k.
 
-        Parameters
-        ----------
-        contours : Contour
-            Contours with parameters of shape (n,).
-        rig : RigValues, optional
-            Deviations from the stated rig.
-        exact : bool
-            Whether paths are exact to rounding, or as accurate as the noise requires.
-        drive_angles : ndarray, shape (segments · n, k), optional
-            Travels as from `travels`, or others in the sweep frame.
+        Shapes: drive_angles (segments · n, k).
         """
         rig = self._rig_of(rig, contours.shape[0])
         segments, lines = len(self.segments), None
@@ -204,15 +195,7 @@ class RecordLikelihood:
         return self._events(self._solutions(contours, rig), rig)[..., 1]
 
     def travels(self, drive_angles: Floats, rig: RigValues) -> Floats:
-        """Return travels of samples as `paths` takes them, shape (n or 1, samples): drive angles [rad], or ways [L].
-
-        Parameters
-        ----------
-        drive_angles : ndarray, shape (samples,)
-            Readings of drive angles, corrected by the data sheet; NaN for samples without interest.
-        rig : RigValues
-            Deviations from the stated rig.
-        """
+        """Return travels of samples as `paths` takes them, shape (n or 1, samples): drive angles [rad], or ways [L]."""
         sign = self.segments.signs_of_samples
         in_sweep_frame = np.where(sign < 0.0, np.pi - drive_angles, drive_angles)[None]
         if not self.segments.is_carried:
@@ -330,19 +313,7 @@ class RecordLikelihood:
     def log_likelihood(
         self, contours: Contour, noise_scale: Any = 1.0, rig: RigValues | None = None, *, pointwise: bool = False
     ) -> Floats:
-        """Return the log-likelihood of each contour, shape (n,), or of each sample, (n, samples); −inf out of reach.
-
-        Parameters
-        ----------
-        contours : Contour
-            Contours with parameters of shape (n,).
-        noise_scale : array_like, broadcastable to shape (n, 3)
-            Factor on the load cell's standard deviations, by channel.
-        rig : RigValues, optional
-            Deviations from the stated rig.
-        pointwise : bool
-            Whether the result is by sample.
-        """
+        """Return the log-likelihood of each contour, shape (n,), or of each sample, (n, samples); −inf out of reach."""
         return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
 
     def _within_blocks(self, predicted: Floats, scale: Floats, pointwise: bool) -> Floats:

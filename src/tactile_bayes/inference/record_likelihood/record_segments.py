@@ -150,11 +150,6 @@ class RecordSegments:
         """Return the samples between which the events of each segment lie, shape (segments, 4).
 
         They are the last before contact, the first and the last in contact, and the next after it; −1 if there is none.
-
-        Parameters
-        ----------
-        loaded : ndarray of bool, shape (samples,)
-            True for samples with a load that noise does not explain.
         """
         out = np.full((len(self), 4), -1)
         for row, segment, angles in zip(out, self, self._angles, strict=True):

@@ -53,16 +53,7 @@ class RodTables:
     def known(self, profile: Profile, taper: Floats, bend: Floats, friction: Floats, length: Floats) -> Tables:
         """Return the tables for rods of a profile; the second is for friction beyond that of the first.
 
-        Parameters
-        ----------
-        profile : Profile
-            The stated rod.
-        taper, bend : ndarray, shape (n,)
-            Additions to its taper and its rest curvature [1/L].
-        friction : ndarray, shape (n,)
-            Coefficients.
-        length : ndarray, shape (n,)
-            Lengths over the stated one: a cone of another length has another half angle.
+        Shapes: taper, bend (n,), friction (n,), length (n,).
         """
         from tactile_bayes.mechanics.poses.forward_table import NO_TABLE  # numba takes a second to load
 

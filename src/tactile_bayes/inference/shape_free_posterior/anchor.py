@@ -43,14 +43,7 @@ class Anchor:
 
     @classmethod
     def best(cls, centre: Floats, radii: Floats, vertex: Floats) -> Anchor:
-        """Return the anchor where a contour is known best.
-
-        Parameters
-        ----------
-        centre : ndarray, shape (nodes,)
-        radii, vertex : ndarray, shape (n, nodes), (n, 2)
-            Standard deviations of the logarithms of the radii, and of q and x_c, along n independent directions.
-        """
+        """Return the anchor where a contour is known best. Shapes: centre (nodes,), radii, vertex (n, nodes)."""
         anchors = [cls(float(angle), centre) for angle in _SLOPE_ANGLES]
         spread = [np.sum(np.square(radii @ anchor._interpolation @ anchor._lengths + vertex)) for anchor in anchors]
         return anchors[int(np.argmin(spread))]
@@ -72,12 +65,6 @@ class Anchor:
         return lengths[:, None] * np.column_stack([np.sin(self._places), np.cos(self._places)])
 
     def beyond_line(self, log_radius: Floats) -> Floats:
-        """Return how far the anchor is above and to the right of where the linear map has it, shape (n, 2).
-
-        Parameters
-        ----------
-        log_radius : ndarray, shape (n, nodes)
-            Logarithms of the radii at the nodes.
-        """
+        """Return how far the anchor is above and to the right of where the linear map has it, shape (n, 2)."""
         change = (log_radius - self.centre) @ self._interpolation
         return np.asarray((np.expm1(np.minimum(change, _LARGEST)) - change) @ self._lengths)

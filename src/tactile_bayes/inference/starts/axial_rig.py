@@ -33,17 +33,7 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
     Elasticity, § 262). Of a sample's four numbers one is thus redundant, which determines stiffness, encoder, lever,
     zeros and friction where loads are large. Tip contacts deviate, and have little weight.
 
-    Parameters
-    ----------
-    model : ContourModel
-    loaded : ndarray of bool, shape (samples,)
-        Samples in contact.
-
-    Returns
-    -------
-    dict of str to float, or None
-        Nuisance parameters by name, in the record's units. None if the rod is curved, tapered, carried or has a stem,
-        if a channel is missing, or if few samples are loaded.
+    Shapes: loaded (samples,).
     """
     names, likelihood = model.nuisances.names, model.likelihood
     rod = likelihood.rod

@@ -140,13 +140,7 @@ def certainly_loaded(model: ContourModel) -> Flags:
 
 
 def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
-    """Return the first optimum of `optima_of` that explains the record, or else the best of the first ones.
-
-    Raises
-    ------
-    InferenceError
-        If there is no optimum.
-    """
+    """Return the first optimum of `optima_of` that explains the record, or else the best of the first ones."""
     best: ContourOptimum | None = None
     for tried, found in enumerate(optima_of(model, rng, deadline), start=1):
         if best is None or found.cost < best.cost:

@@ -86,18 +86,7 @@ def optima(
     A search may pass through points that are a priori impossible; if it ends at one, it is repeated within the bounds
     from the nearest possible point.
 
-    Parameters
-    ----------
-    residuals : callable
-        Maps points, shape (n, d), to residuals in standard deviations, shape (n, k).
-    candidates : iterable of ndarray, shape (d,)
-        Starting points.
-    middle, spread : ndarray, shape (d,)
-        Prior mean and standard deviation of each parameter, each of which adds one residual.
-    low, high : ndarray, shape (d,), or float
-        Bounds of each parameter.
-    deadline : Deadline
-        Time at which the current search ends with its best point, and no other begins.
+    Shapes: candidates (d,), middle, spread (d,), low, high (d,).
     """
     for candidate in candidates:
         found = descend(residuals, candidate, middle, spread, deadline=deadline)
@@ -221,19 +210,7 @@ def gather(
     them are far less probable than the best, centre and covariance are estimated from the best fifth (cross-entropy
     method). The covariance is halved, since the best fifth of points that are twice as wide would not be narrower.
 
-    Parameters
-    ----------
-    log_probability : callable
-        Maps points, shape (n, d), to log-probabilities, shape (n,), −inf if impossible.
-    centre : ndarray, shape (d,)
-        Estimate of the mode.
-    covariance : ndarray, shape (d, d)
-        Estimate of the posterior covariance.
-    rng : np.random.Generator
-    deadline : Deadline
-        Time after which a distribution suffices of which the share `_SOME` is possible.
-    ends : Ends
-        Known bounds of possible points.
+    Shapes: centre (d,), covariance (d, d).
     """
     size = centre.size
     top = float(log_probability(centre[None])[0])

@@ -26,13 +26,14 @@ from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import identity_of
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, seed_sequence
-from tactile_bayes.inference.ensembles.identity import changes, seed_as_text
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings
+from tactile_bayes.inference.ensembles.identity import changes
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import STREAMED, provenance
 from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, WIDER, Particles, effective_number
 from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, tree_of
+from tactile_bayes.numerics.random_numbers import Rng, child, seed_sequence, whole_seed
 from tactile_bayes.numerics.selection import resampled
 from tactile_bayes.record import carried_sweeps, validate
 from tactile_bayes.record.netcdf import write_netcdf
@@ -65,8 +66,8 @@ class Stream:
     family, rig
         As in `infer_contour`. An unknown of which nothing is said and that the record does not show at first, like the
         backlash in a single direction, enters with the first sample that does.
-    seed : int or numpy.random.SeedSequence
-        Seed of all random numbers: the same seed and blocks give the same results.
+    rng : int, numpy.random.SeedSequence or numpy.random.Generator
+        Random numbers: the same seed and blocks give the same results.
     particles : int
         Number of particles, from 100 up; see Notes.
     x : array_like, optional
@@ -101,8 +102,8 @@ class Stream:
     >>> from tactile_bayes import LoadCell, Rig, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
-    >>> stream = Stream(family="parabola", rig=Rig(load_cell=cell, unknown="nothing"), seed=1, particles=200)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
+    >>> stream = Stream(family="parabola", rig=Rig(load_cell=cell, unknown="nothing"), rng=1, particles=200)
     >>> first = stream.update(measured.isel(sample=slice(0, 10)))
     >>> now = stream.update(measured.isel(sample=slice(10, None)))
     >>> int(now.samples) == measured.sizes["sample"]
@@ -114,7 +115,7 @@ class Stream:
         *,
         family: Family | str = "parabola",
         rig: Rig | None = None,
-        seed: Seed,
+        rng: Rng,
         particles: int = 1000,
         x: ArrayLike | None = None,
         stop: Callable[[xr.Dataset], object] | None = None,
@@ -123,7 +124,7 @@ class Stream:
         check_function("stop", stop)
         self._x = None if x is None else check_numbers("x", x, "give a list of finite numbers", shape=(None,))
         self._family, self._rig = family_of(family), rig_of(rig)
-        self._seed, self._entropy = seed, seed_sequence(seed)
+        self._seed = seed_sequence(rng)
         self._particles, self._stop = particles, stop
         self._state: StreamState | None = None
 
@@ -281,8 +282,8 @@ class Stream:
         >>> from tactile_bayes import LoadCell, Rig, scan
         >>> from tactile_bayes.contours import paper_profile
         >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-        >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
-        >>> options = {"load_cell": cell, "nuisances": [], "seed": 1, "particles": 100}
+        >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=1)
+        >>> options = {"rig": Rig(load_cell=cell, unknown="nothing"), "rng": 1, "particles": 100}
         >>> stream = Stream(**options)
         >>> _ = stream.update(measured.isel(sample=slice(0, 10)))
         >>> with tempfile.TemporaryDirectory() as directory:
@@ -372,14 +373,13 @@ class Stream:
             "samples": str(experiment.record.sizes["sample"]),
             "names of parameters": ", ".join(experiment.model.names),
             "particles": str(self._particles),
-            "seed": seed_as_text(self._seed),
+            "seed": whole_seed(self._seed),
             "version of emcee": version("emcee"),
         }
 
     def _random(self, purpose: int, updates: int) -> np.random.Generator:
         """Return random numbers of an update: they do not depend on calls that were refused."""
-        key = (*self._entropy.spawn_key, purpose, updates)
-        return np.random.default_rng(np.random.SeedSequence(self._entropy.entropy, spawn_key=key))
+        return np.random.default_rng(child(self._seed, purpose, updates))
 
     def _brief(self, state: StreamState) -> xr.Dataset:
         model, points, weights = state.experiment.model, state.points, np.exp(state.log_weights)
@@ -433,13 +433,7 @@ def _weighted_quantiles(values: Floats, weights: Floats) -> Floats:
 
 
 def _continued(record: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
-    """Return a record with new samples behind its own.
-
-    Raises
-    ------
-    RecordError
-        If the new samples do not continue the record.
-    """
+    """Return a record with new samples behind its own."""
     new = validate(samples)
     for name in sorted({*record.attrs, *new.attrs}, key=str):
         one, other = record.attrs.get(name), new.attrs.get(name)

@@ -92,13 +92,7 @@ def tree_of(state: StreamState, identity: Mapping[str, str]) -> xr.DataTree:
 
 
 def read_tree(path: Path) -> xr.DataTree:
-    """Read the file of a stream, or of several.
-
-    Raises
-    ------
-    InferenceError
-        If there is no such file, or it is damaged.
-    """
+    """Read the file of a stream, or of several."""
     if not path.is_file():
         raise InferenceError(f"there is no file {path}: give the state that a stream has saved")
     return read_netcdf(
@@ -111,13 +105,7 @@ def read_tree(path: Path) -> xr.DataTree:
 
 
 def state_in(tree: xr.DataTree, path: Path) -> StoredState:
-    """Return the state in a tree from `tree_of`, or of a part of the file.
-
-    Raises
-    ------
-    InferenceError
-        If it is no whole state, of another kind, or of a later format.
-    """
+    """Return the state in a tree from `tree_of`, or of a part of the file."""
     if tree.attrs.get("kind") != _KIND:
         raise InferenceError(f"{path} holds no state of a stream: give a file that Stream.save has written")
     if tree.attrs["format"] != _FORMAT:
