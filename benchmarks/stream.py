@@ -51,8 +51,8 @@ WRONG: Mapping[str, dict[str, Any]] = {
     "friction of 0.3, not inferred": {"truth": SMOOTH.with_unknown(friction=0.3)},
     "rod tapered by 30 %": {"truth": SMOOTH.with_unknown(taper=0.3)},
     "rod curved by 0.2/L": {"truth": SMOOTH.with_unknown(rest_curvature=0.2)},
-    "circle": {"misspecification": tb.calibration.Misspecification(family="circle")},
-    "flat spot in the gap": {"misspecification": tb.calibration.Misspecification(flat_spot=(0.0, 2.0))},
+    "circle": {"truth": tb.calibration.Misspecification(family="circle")},
+    "flat spot in the gap": {"truth": tb.calibration.Misspecification(flat_spot=(0.0, 2.0))},
     "outliers (t, 2.5)": {"truth": replace(SMOOTH, load_cell=replace(CELL, degrees_of_freedom=2.5))},
 }
 """What the model does not have: it takes all for parabolas without friction and backlash."""
