@@ -1,5 +1,6 @@
 """The command `sensitivity`, as a user calls it."""
 
+import importlib
 import json
 from functools import partial
 
@@ -8,12 +9,13 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-import tactile_bayes.planning.error_map as error_map_module
 from helpers import commands
 from tactile_bayes.contours import Joined, Parabola
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.error_cell import CellOutcome
 from tactile_bayes.runs import sensitivity as sensitivity_run
+
+error_map_module = importlib.import_module("tactile_bayes.planning.error_map")
 
 QUICK = ("--drive-step", "6", "-q")
 STUDY = ("--noise-factor", "0.3", "--noise-factor", "1", "--replicates", "1", "--workers", "1")
@@ -251,7 +253,6 @@ def test_refusals(tmp_path, monkeypatch, options, words):
 
 def amplification_at_once(plan):
     """On the drive angles of the record, and not close to its ends."""
-
     return amplification(plan.at_angles(np.radians(np.arange(-30.0, 211.0, 10.0))))
 
 
