@@ -32,7 +32,7 @@ from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.numerics.random_numbers import spawn
-from tactile_bayes.record import make_record
+from tactile_bayes.rig import make_record
 from tactile_bayes.runs.demonstration import CONTOUR as DEMONSTRATED
 from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
 from tactile_bayes.tasks import one_thread

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw
-from tactile_bayes.record import make_record
+from tactile_bayes.rig import make_record
 from tactile_bayes.tasks import one_thread
 
 REFERENCE = Path(__file__).parents[1] / "data" / "synthetic" / "reference"

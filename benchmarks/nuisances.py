@@ -13,7 +13,7 @@ import numpy as np
 import tactile_bayes as tb
 from tactile_bayes.planning.information import information
 from tactile_bayes.rig.parameters import STANDARD
-from tactile_bayes.rig.rig import DEFAULT, NOTHING, Unknown
+from tactile_bayes.rig.unknown import DEFAULT, NOTHING, Unknown
 
 CONTOUR = tb.contours.Parabola(a=0.5, q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)

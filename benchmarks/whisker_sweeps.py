@@ -152,7 +152,7 @@ def hysteresis(share: float, rod: tb.Rod) -> dict[str, Any]:
 def _record(rod: tb.Rod, sweep: Floats, x: Floats, y: Floats, counts: Floats) -> xr.Dataset:
     columns = {"sweep": sweep, "direction": "forward", "base_x": 1e-3 * x, "base_y": 1e-3 * y}
     columns |= {"drive_angle": np.full(len(x), DRIVE_ANGLE), "holding_moment": counts}
-    return tb.make_record(columns, rod=rod, missing=("force_x", "force_y"))
+    return tb.make_record(columns, tb.Rig(rod=rod, file={"missing": ("force_x", "force_y")}))
 
 
 def _table(name: str) -> Floats:

@@ -7,8 +7,8 @@ from helpers import commands
 from helpers.refusals import refused
 from tactile_bayes.contours import Ellipse, Parabola
 from tactile_bayes.errors import ReachError, RecordError
-from tactile_bayes.record import present_channels, read_record, write_record
-from tactile_bayes.rig import Rig
+from tactile_bayes.record import present_channels, write_record
+from tactile_bayes.rig import Rig, read_record
 from tactile_bayes.sweep import scan
 
 NAMES = ["sweep", "direction", "base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y"]
@@ -50,11 +50,11 @@ FIRST_ROW = 9
 MISTAKES = {
     "a missing column": (
         lambda rows: (NAMES[:-1], without_last(rows)),
-        ["column 'force_y'", "columns={'force_y': 'NAME[UNIT]'}", 'force_y = "NAME[UNIT]"', 'missing = ["force_y"]'],
+        ["column 'force_y'", "Rig(file={'force_y': 'NAME[UNIT]'})", 'force_y = "NAME[UNIT]"', 'missing = ["force_y"]'],
     ),
     "a misspelt column": (
         lambda rows: ([name.replace("drive_angle", "drive_angel") for name in NAMES], rows),
-        ["column 'drive_angel'", "columns={'drive_angle': 'drive_angel'}", 'drive_angle = "drive_angel"'],
+        ["column 'drive_angel'", "Rig(file={'drive_angle': 'drive_angel'})", 'drive_angle = "drive_angel"'],
     ),
     "text in a row": (
         lambda rows: (NAMES, edited(rows, 3, "force_x", "overload")),
@@ -93,7 +93,7 @@ def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
     else:
         path = written(tmp_path / "record.csv", header, NAMES, mapped(rows, "force_y", lambda cell: ""))
         missing = []
-    assert present_channels(read_record(path, missing=missing)) == ("holding_moment", "force_x")
+    assert present_channels(read_record(path, Rig(file={"missing": missing}))) == ("holding_moment", "force_x")
     (tmp_path / "rig.toml").write_text(f'unknown = "nothing"\n[file]\nmissing = {missing}\n')
     result = commands.call("infer", path, "--out", tmp_path / "run", "-q", "--rig", tmp_path / "rig.toml")
     assert result.exit_code == 0, result.output

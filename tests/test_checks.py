@@ -113,9 +113,9 @@ NAMED_BY = {
     "unknown": "unknown|rig|prior",
     "r": "r|circle",
     "false_alarm": "false_alarm|record",
+    "file": "file|columns|missing|split_sweeps",
 }
 """What a refusal calls arguments that it does not call by their names."""
-NAMES = [["left"], ["bias", None], ["bias", 1], "bias", ["bias", ["gain"]], {"bias": 1.0}]
 UNKNOWN = [{"friction": None}, {"friction": "wide"}, {"left": 0.1}, {"friction": stats.norm}, {1: 0.1}, "everything"]
 
 
@@ -196,11 +196,8 @@ NO_SHARES = [0.0, 1.0, 90.0]
 FLAG = kind(bool | np.bool_)
 RNG = either(whole(0), kind(np.random.Generator), kind(np.random.SeedSequence))
 CELL_OR_NONE = either(nothing, kind(tb.LoadCell))
-ROD_OR_NONE = either(nothing, kind(tb.Rod, is_dimensionless=True))
 SETTINGS_OR_NONE = either(nothing, kind(tb.SamplerSettings))
 PROGRESS = either(nothing, callable)
-NONE_NAMED = empty(list, tuple, set)
-NO_PRIORS = either(nothing, empty(dict))
 
 
 def cases(tmp_path):
@@ -297,15 +294,8 @@ def cases(tmp_path):
         ),
         "read_record": (
             tb.read_record,
-            {
-                "path": (good, never),
-                "columns": (None, NO_PRIORS),
-                "split_sweeps": (False, lambda value: FLAG(value) and not value),
-                "rod": (None, ROD_OR_NONE),
-                "missing": ((), NONE_NAMED),
-                "load_cell_frame": (None, nothing),
-            },
-            {**paths, "columns": [{"force_x": 1}, {"force_x": None}, {"left": "Fx"}], "missing": NAMES},
+            {"path": (good, never), "rig": (None, either(nothing, kind(tb.Rig)))},
+            paths,
         ),
         "write_record": (
             tb.write_record,
@@ -336,8 +326,12 @@ def cases(tmp_path):
                 "rod": (None, either(nothing, kind(tb.Rod))),
                 "load_cell": (CELL, CELL_OR_NONE),
                 "unknown": ({}, either(empty(dict), one_of("nothing"))),
+                "file": ({}, empty(dict)),
             },
-            {"unknown": UNKNOWN},
+            {
+                "unknown": UNKNOWN,
+                "file": [{"force_x": None}, {"left": "Fx"}, {"missing": ["left"]}, {"split_sweeps": 1}],
+            },
         ),
         "Family": (
             functools.partial(tb.Family, "circle"),
@@ -638,9 +632,7 @@ def test_a_switch_takes_true_and_false_alone(module, label, name, value):
 
 
 def test_the_switches_are_found():
-    assert {("record", "truth"), ("design", "nested"), ("read_record", "split_sweeps")} <= {
-        (label, name) for _, label, name in switches()
-    }
+    assert {("record", "truth"), ("design", "nested")} <= {(label, name) for _, label, name in switches()}
 
 
 def test_a_masked_number_is_none():

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-from tactile_bayes.record import read_record
+from tactile_bayes.rig import read_record
 from tactile_bayes.runs.demonstration import measure_demo
 
 FOLDER = Path(__file__).parents[1] / "data" / "synthetic"

@@ -54,8 +54,8 @@ _HOMES = {
     "infer_contours": "runs.many",
     "infer_point_load": "inference.point_load",
     "inspect_record": "diagnostics.inspection",
-    "make_record": "record",
-    "read_record": "record",
+    "make_record": "rig",
+    "read_record": "rig",
     "read_result": "inference.result",
     "reconstruct": "reconstruction",
     "scan": "sweep",
@@ -106,10 +106,10 @@ if TYPE_CHECKING:
     from tactile_bayes.planning.design import design as design
     from tactile_bayes.planning.sensitivity import sensitivity as sensitivity
     from tactile_bayes.reconstruction import reconstruct as reconstruct
-    from tactile_bayes.record import make_record as make_record
-    from tactile_bayes.record import read_record as read_record
     from tactile_bayes.record import write_record as write_record
     from tactile_bayes.report import write_report as write_report
+    from tactile_bayes.rig import make_record as make_record
+    from tactile_bayes.rig import read_record as read_record
     from tactile_bayes.rig.rig import Rig as Rig
     from tactile_bayes.runs.many import infer_contours as infer_contours
     from tactile_bayes.sweep import Motion as Motion

@@ -23,6 +23,7 @@ from tactile_bayes.errors import ParameterError
 
 __all__ = [
     "KINDS",
+    "UNWRITTEN",
     "Distribution",
     "Kind",
     "all_in_words",
@@ -34,8 +35,10 @@ __all__ = [
     "log_density_of",
     "numbers_of",
     "refuse_unknown_names",
+    "stated_text",
     "support_of",
     "table_of_distribution",
+    "text_or_unwritten",
 ]
 
 _TRIED = 16
@@ -43,6 +46,9 @@ _TRIED = 16
 
 _NARROWEST = 64.0 * float(np.finfo(float).eps)
 """Range of draws over their size up to which they count as one number."""
+
+UNWRITTEN = "not written"
+"""Text of what has a distribution that is none of SciPy's."""
 
 _ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
 
@@ -189,6 +195,23 @@ def table_of_distribution(value: float | Distribution) -> Any:
 
 _USUAL = {("loc", 0.0), ("scale", 1.0)}
 """Numbers of a distribution that need no mention."""
+
+
+def text_or_unwritten(text: Callable[[], str]) -> str:
+    """Return a text, or "not written" if a distribution in it is none of SciPy's."""
+    try:
+        return text()
+    except ParameterError:
+        return UNWRITTEN
+
+
+def stated_text(attrs: Mapping[Any, Any], entry: str) -> str:
+    """Return the text of `text_or_unwritten` in the attributes of a posterior, or refuse one that is not written."""
+    text = attrs.get(entry, UNWRITTEN)
+    if not isinstance(text, str) or text == UNWRITTEN:
+        what = entry.partition("_")[0]
+        raise ParameterError(f"the posterior does not state its {what}, as a distribution of it is none of SciPy's")
+    return text
 
 
 def is_finite_number(value: Any) -> bool:

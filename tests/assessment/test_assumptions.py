@@ -13,8 +13,8 @@ from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.rig.rig import expanded
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.unknown import expanded
 
 
 def only(*names):

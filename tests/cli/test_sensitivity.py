@@ -150,8 +150,7 @@ def test_without_options_it_is_profile_ii_at_half_a_rod_length(asked, tmp_path):
     assert options["contour"] == Parabola(0.5, 0.5)
     assert (options["rig"].rod, options["rig"].load_cell, options["rig"].entries) == (None, None, {})
     assert options["rng"] == 1
-    assert options["base"] == [(0.0, 0.0)]
-    assert options["drive_step"] == pytest.approx(np.radians(1.0))
+    assert options["drive"] == [tb.Rotation(drive_step=float(np.radians(1.0)))]
     assert options["band_widths"] is None
     assert not (tmp_path / "study").exists()
 
@@ -177,7 +176,7 @@ def test_rig_and_options_arrive(asked, tmp_path, rig_file):
     cell = tb.LoadCell(force_noise=0.1, moment_noise=0.03, drive_angle_noise=float(np.radians(0.5)))
     assert options["rig"].load_cell == cell
     assert options["rig"].entries == {"friction": 0.2, "discrepancy": "default"}
-    assert options["base"] == [(0.1, 0.0), (0.2, 0.0)]
+    assert [drive.base for drive in options["drive"]] == [(0.1, 0.0), (0.2, 0.0)]
     assert options["rng"] == 3
     assert options["band_widths"] == [0.01, 0.02]
 
@@ -246,7 +245,8 @@ def test_another_study_is_refused(asked, tmp_path):
     ],
 )
 def test_refusals(tmp_path, monkeypatch, options, words):
-    monkeypatch.setattr("tactile_bayes.planning.sensitivity.amplification", lambda plan: amplification_at_once(plan))
+    module = importlib.import_module("tactile_bayes.planning.sensitivity")
+    monkeypatch.setattr(module, "amplification", lambda plan: amplification_at_once(plan))
     commands.assert_refused(call("--out", tmp_path / "out", "--drive-step", 6, *options), words)
     assert not (tmp_path / "out").exists()
 

@@ -18,8 +18,8 @@ from tactile_bayes.contours import paper_profile
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.load_cell import LoadCell, RandomWalk
-from tactile_bayes.record import read_record, write_record
-from tactile_bayes.rig import Rig
+from tactile_bayes.record import write_record
+from tactile_bayes.rig import Rig, read_record
 from tactile_bayes.runs import contour as contour_run
 from tactile_bayes.runs import watch
 from tactile_bayes.runs.watch import open_watch

@@ -11,14 +11,11 @@ import pytest
 
 from helpers.record_tables import WIRE, columns
 from tactile_bayes.errors import RecordError, RecordWarning
-from tactile_bayes.record import make_record, read_record, write_record
+from tactile_bayes.record import write_record
+from tactile_bayes.rig import Rig, make_record, read_record
 
 RIG = Path(__file__).parents[2] / "data" / "synthetic" / "rig.csv"
-RIG_OPTIONS = {
-    "columns": {"drive_angle": "90-Angle[deg]", "holding_moment": "Mz", "force_x": "Fx[mN]", "force_y": "Fy"},
-    "split_sweeps": True,
-    "rod": WIRE,
-}
+OF_FILE = {"drive_angle": "90-Angle[deg]", "holding_moment": "Mz", "force_x": "Fx[mN]", "force_y": "Fy"}
 
 CELLS = [
     *("", " ", "0", "-0.0", "1e400", "-1e-400", "nan", "inf", "-inf", "1_0", "1,5", "1.5", "0x1F", "true", "١٢"),
@@ -60,11 +57,11 @@ def base_files(folder):
     path = folder / "base.csv"
     texts = {"note": ["", " a ", "1,5", '"', "\r\n", "ß€😀"], "t": np.arange(6.0), "count": [1, 2, 3, 4, 5, 6]}
     for rod in (None, WIRE):
-        write_record(make_record(columns(**texts), rod=rod, attrs={"operator": "me", "run": 5}), path)
-        yield path.read_bytes(), {}
+        write_record(make_record(columns(**texts), Rig(rod=rod), attrs={"operator": "me", "run": 5}), path)
+        yield path.read_bytes(), Rig()
     units = b"sweep,direction,drive_angle,holding_moment,force_x,force_y,sample\n,,deg,N mm,mN,mN,\n"
-    yield units + b"".join(b"0,forward,%d,%d.5,1,2,%c\n" % (50 + n, n, b"abcde"[n]) for n in range(5)), {"rod": WIRE}
-    yield b"\n".join(RIG.read_bytes().splitlines()[:20]) + b"\n", RIG_OPTIONS
+    yield units + b"".join(b"0,forward,%d,%d.5,1,2,%c\n" % (50 + n, n, b"abcde"[n]) for n in range(5)), Rig(WIRE)
+    yield b"\n".join(RIG.read_bytes().splitlines()[:20]) + b"\n", Rig(WIRE, file={**OF_FILE, "split_sweeps": True})
 
 
 def encoded(text):
@@ -113,7 +110,7 @@ def mutated(content, rng):
     return content
 
 
-def outcome(content, options, folder):
+def outcome(content, rig, folder):
     """What becomes of a file: "refused", or "read" and written again, the same."""
     path = folder / "mutated.csv"
     path.write_bytes(content)
@@ -121,7 +118,7 @@ def outcome(content, options, folder):
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RecordWarning)
-            record = read_record(path, **options)
+            record = read_record(path, rig)
     except RecordError as error:
         is_clear = str(error).startswith(f"{path}: ") and len(str(error)) < 2000 and "\0" not in str(error)
         return "refused" if is_clear else str(error)
@@ -142,7 +139,7 @@ def test_a_nul_in_a_unit_is_shown_as_such(tmp_path):
     path = tmp_path / "record.csv"
     path.write_bytes(units + b"0,forward,50,0.5,1,2\n")
     with pytest.raises(RecordError, match=r"line 2, column 'sweep' is in \[\\0\], but takes 1"):
-        read_record(path, rod=WIRE)
+        read_record(path, Rig(rod=WIRE))
 
 
 @pytest.mark.parametrize("cases", [16, pytest.param(600, marks=pytest.mark.slow)])
@@ -151,8 +148,8 @@ def test_mutated_files_are_refused_or_read_and_written_again(tmp_path, fuzz_seed
     bases = list(base_files(tmp_path))
     found = Counter()
     for number in range(cases):
-        content, options = bases[number % len(bases)]
-        found[outcome(mutated(content, rng), options, tmp_path)] += 1
+        content, rig = bases[number % len(bases)]
+        found[outcome(mutated(content, rng), rig, tmp_path)] += 1
     assert set(found) == {"refused", "read"}
     assert min(found.values()) > cases / 20
 
@@ -183,7 +180,7 @@ LINES_ABOVE = [
 ]
 
 
-class Rig:
+class WrittenTable:
     """A file of a rig, and how it is read: names, units in one place, cells, signs."""
 
     def __init__(self, rng):
@@ -227,7 +224,7 @@ class Rig:
     def content(self):
         return ("\n".join(self.lines) + "\n").encode()
 
-    def read(self, content, folder, **changes):
+    def read(self, content, folder, columns=None):
         """The record and its notes, or the refusal and no notes."""
         path = folder / "rig.csv"
         path.write_bytes(content)
@@ -235,7 +232,7 @@ class Rig:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", RecordWarning)
             try:
-                record = read_record(path, rod=WIRE, split_sweeps=True, **{"columns": self.columns, **changes})
+                record = read_record(path, Rig(WIRE, file={**(columns or self.columns), "split_sweeps": True}))
             except RecordError as error:
                 record = error
         assert time.thread_time() - began < LIMIT
@@ -314,7 +311,7 @@ SAME = [other_signs, other_digits, thousands, padded, odd_names, other_ends, oth
 def test_a_file_that_means_the_same_is_read_as_the_same(tmp_path, fuzz_seed, change):
     rng = np.random.default_rng([fuzz_seed, SAME.index(change)])
     for _ in range(6):
-        rig = Rig(rng)
+        rig = WrittenTable(rng)
         record, notes = rig.read(change(rig), tmp_path)
         assert not isinstance(record, RecordError), (record, rig.lines)
         assert record.sizes["sample"] == len(rig.cells)
@@ -366,7 +363,7 @@ FAULTS = [misspelt, contradicting_units]
 def test_a_file_with_a_fault_is_refused(tmp_path, fuzz_seed, fault):
     rng = np.random.default_rng([fuzz_seed, FAULTS.index(fault)])
     for _ in range(30):
-        rig = Rig(rng)
+        rig = WrittenTable(rng)
         content = fault(rig)
         record, _ = rig.read(content, tmp_path)
         assert isinstance(record, RecordError), content.decode()
@@ -375,12 +372,12 @@ def test_a_file_with_a_fault_is_refused(tmp_path, fuzz_seed, fault):
 def test_a_unit_that_contradicts_the_file_is_refused(tmp_path, fuzz_seed):
     rng = np.random.default_rng([fuzz_seed, 7])
     for _ in range(20):
-        rig = Rig(rng)
+        rig = WrittenTable(rng)
         rig.place = rig.pick(["name", "row", "header"])
         name = rig.pick(list(NAMES_OF))
         known = [unit for unit in WRONG[name] if unit not in ("kg", "lbf", "counts", "V")]
         wrong = f"{NAMES_OF[name]}[{rig.pick(known)}]"
-        record, _ = rig.read(rig.content, tmp_path, columns={**rig.columns, name: wrong})
+        record, _ = rig.read(rig.content, tmp_path, {**rig.columns, name: wrong})
         assert isinstance(record, RecordError), (wrong, rig.lines)
         assert wrong.partition("[")[2][:-1] in str(record)
 
@@ -388,15 +385,15 @@ def test_a_unit_that_contradicts_the_file_is_refused(tmp_path, fuzz_seed):
 def test_an_angle_of_another_turn_is_refused_with_the_number_to_subtract(tmp_path, fuzz_seed):
     rng = np.random.default_rng([fuzz_seed, 8])
     for _ in range(10):
-        rig = Rig(rng)
+        rig = WrittenTable(rng)
         turns = int(rng.choice([-3, -2, 2, 3]))
         for row, angle in zip(rig.cells, rig.values["drive_angle"], strict=True):
             row[0] = f"{angle + 360 * turns:.4f}".replace(".", rig.decimal)
         columns = rig.columns | {"drive_angle": rig.pick(["", "0+"]) + rig.columns["drive_angle"]}
-        record, _ = rig.read(rig.content, tmp_path, columns=columns)
+        record, _ = rig.read(rig.content, tmp_path, columns)
         assert isinstance(record, RecordError)
-        advice = re.search(r"columns=\{'drive_angle': '([^']*)'\}", str(record))[1]
-        record, _ = rig.read(rig.content, tmp_path, columns={**columns, "drive_angle": advice})
+        advice = re.search(r"file=\{'drive_angle': '([^']*)'\}", str(record))[1]
+        record, _ = rig.read(rig.content, tmp_path, {**columns, "drive_angle": advice})
         whole = 2.0 * np.pi * np.round((record["drive_angle"] - np.radians(rig.values["drive_angle"])) / (2.0 * np.pi))
         np.testing.assert_allclose(record["drive_angle"] - whole, np.radians(rig.values["drive_angle"]), atol=1e-9)
 
@@ -405,7 +402,7 @@ def test_a_file_that_is_cut_short_loses_no_more_than_its_last_row_and_says_so(tm
     rng = np.random.default_rng([fuzz_seed, 9])
     found = Counter()
     for _ in range(60):
-        rig = Rig(rng)
+        rig = WrittenTable(rng)
         content = rig.content
         last = content.rstrip(b"\n").rfind(b"\n") + 1
         cut = content[: int(rng.integers(last + 1, len(content)))] + b"\0" * int(rng.choice([0, 0, 0, 5]))
@@ -423,7 +420,7 @@ def test_a_wrong_cell_changes_no_other_row(tmp_path, fuzz_seed):
     rng = np.random.default_rng([fuzz_seed, 10])
     found = Counter()
     for _ in range(40):
-        rig = Rig(rng)
+        rig = WrittenTable(rng)
         row, column = int(rng.integers(len(rig.cells))), int(rng.integers(1, 4))
         cell, at = rig.cells[row][column], int(rng.integers(5))
         edits = [rig.pick(CELLS), cell[:at] + rig.pick("-+.,e0 '\"#x") + cell[at:], cell[:at] + cell[at + 1 :]]

@@ -29,9 +29,9 @@ from tactile_bayes.inference.ensembles.checkpoint import open_checkpoint
 from tactile_bayes.inference.ensembles.walkers import RandomState
 from tactile_bayes.inference.result import write_result
 from tactile_bayes.inference.streams.stream import Stream
-from tactile_bayes.record import make_record, write_record
+from tactile_bayes.record import write_record
 from tactile_bayes.report import writing
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.runs import (
     calibration,
@@ -73,7 +73,7 @@ def record(k):
         "force_x": [0.1, k],
         "force_y": [0.2, 0.0],
     }
-    return make_record(columns, missing=("holding_moment",))
+    return make_record(columns, Rig(file={"missing": ("holding_moment",)}))
 
 
 def returned(make):

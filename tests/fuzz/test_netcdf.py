@@ -13,7 +13,8 @@ from helpers.memory import COUNTING, own_peak
 from helpers.record_tables import WIRE, columns
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.result import read_result, write_result
-from tactile_bayes.record import make_record, netcdf_content, read_record, write_record
+from tactile_bayes.record import netcdf_content, write_record
+from tactile_bayes.rig import Rig, make_record, read_record
 
 SEALED, FOREIGN = 100, 4
 """Number of files with a checksum, and of those without, whose reading takes half a second, each of two kinds."""
@@ -32,7 +33,7 @@ LARGE = 400_000_000
 def originals(tmp_path_factory):
     """A record and a posterior: how each is read, what is in it, and its bytes."""
     folder, rng = tmp_path_factory.mktemp("originals"), np.random.default_rng(1)
-    record = make_record(columns(note=["", "a", "bc", "ß", "", "d"]), rod=WIRE, attrs={"run": 5})
+    record = make_record(columns(note=["", "a", "bc", "ß", "", "d"]), Rig(rod=WIRE), attrs={"run": 5})
     write_record(record, folder / "record.nc")
     draws = xr.Dataset(
         {name: (("chain", "draw"), rng.normal(size=(2, 20))) for name in ("a", "q")}, attrs={"made": "now"}

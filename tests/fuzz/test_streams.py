@@ -9,7 +9,8 @@ import xarray as xr
 import tactile_bayes as tb
 from helpers.record_tables import WIRE, columns
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.record import GrowingRecord, make_record, write_record
+from tactile_bayes.record import write_record
+from tactile_bayes.rig import GrowingRecord, Rig, make_record
 
 CASES, STEPS = 6, 10
 """Number of files that grow, and what happens to each."""
@@ -24,7 +25,7 @@ def content_of(rng, path):
     loads = {name: rng.normal(size=count) for name in ("holding_moment", "force_x", "force_y")}
     notes = rng.choice(["", "a", "two\nlines", 'a "word", or two', "ß€"], count)
     table = columns(sweep=0, direction="forward", base_x=0.0, base_y=0.25, drive_angle=angles, note=notes, **loads)
-    write_record(make_record(table, rod=WIRE), path)
+    write_record(make_record(table, Rig(rod=WIRE)), path)
     lines = path.read_bytes().splitlines(keepends=True)
     for _ in range(int(rng.integers(0, 3))):
         lines.insert(int(rng.integers(len(lines) - count, len(lines) + 1)), FAULTS[int(rng.integers(len(FAULTS)))])
@@ -76,7 +77,7 @@ def test_a_file_that_grows_is_read_as_the_whole_file_is(tmp_path, fuzz_seed):
     for number in range(CASES):
         path = tmp_path / f"{number}" / "record.csv"
         path.parent.mkdir()
-        growing, last = GrowingRecord(path, missing=()), None
+        growing, last = GrowingRecord(path, Rig(file={"missing": ()})), None
         rest = content_of(rng, path.with_name("next.csv"))
         for _ in range(STEPS):
             rest = changed(rng, path, rest)

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
-from tactile_bayes.record import make_record
+from tactile_bayes.rig import Rig, make_record
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 WALK = RandomWalk(moment=0.015, force=0.03)
@@ -82,7 +82,7 @@ def ideal(samples=5, missing=(), rod=None, **further):
         "force_y": np.linspace(0.0, 2.0, samples),
         **further,
     }
-    return make_record({k: v for k, v in table.items() if k not in missing}, missing=missing, rod=rod)
+    return make_record({k: v for k, v in table.items() if k not in missing}, Rig(rod=rod, file={"missing": missing}))
 
 
 # ---- for hypothesis to draw

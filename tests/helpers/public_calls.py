@@ -17,8 +17,7 @@ from tactile_bayes.diagnostics.inspection import Inspection
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.mechanics import elastica
 from tactile_bayes.planning.bands import Bands
-from tactile_bayes.rig import Rig
-from tactile_bayes.rig.file_format import FileFormat
+from tactile_bayes.rig import FileFormat, Rig
 
 PARABOLA = tb.contours.Parabola(0.5, 0.5)
 STATED = Rig(load_cell=CELL, unknown="nothing")
@@ -396,12 +395,11 @@ def _record_calls(folder: Path) -> dict[str, Call]:
     columns = {
         name: measured()[name].values for name in ("sweep", "direction", "drive_angle", "holding_moment", "force_x")
     }
-    reading = {"missing": (), "rod": None, "load_cell_frame": None}
     return {
         "make_record": Call(
-            tb.make_record, {**reading, "columns": columns, "attrs": {"rig": "1"}, "missing": ("force_y",)}
+            tb.make_record, {"columns": columns, "rig": Rig(file={"missing": "force_y"}), "attrs": {"rig": "1"}}
         ),
-        "read_record": Call(tb.read_record, {**reading, "path": file, "columns": None}),
+        "read_record": Call(tb.read_record, {"path": file, "rig": None}),
         "write_record": Call(tb.write_record, {"record": ideal(), "path": folder / "out.csv"}),
         "in_frame": Call(tb.record.in_frame, {"record": measured(), "frame": "turning"}),
         "inspect_record": Call(
@@ -470,10 +468,13 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
         ),
         "Rig": Call(
             tb.Rig,
-            {"rod": None, "load_cell": CELL, "unknown": {"lever": 0.0}, "calibration": None, "file": FileFormat()},
+            {"rod": None, "load_cell": CELL, "unknown": {"lever": 0.0}, "calibration": None, "file": {}},
         ),
+        "FileFormat": Call(FileFormat, {"columns": {"force_x": "Fx[mN]"}, "split_sweeps": False, "missing": ()}),
+        "FileFormat.of": Call(FileFormat.of, {"table": {"force_x": "Fx[mN]"}}),
         "Rig.is_named": Call(STATED.is_named, {"name": "lever_x"}),
         "Rig.of": Call(tb.Rig.of, {"posterior": posterior()}),
+        "Rig.of_tables": Call(tb.Rig.of_tables, {"tables": STATED.tables, "folder": folder}),
         "Rig.read": Call(tb.Rig.read, {"path": rig_file}),
         "Rig.with_unknown": Call(STATED.with_unknown, {"friction": 0.2}),
         "Rig.write": Call(STATED.write, {"path": folder / "other.toml"}),

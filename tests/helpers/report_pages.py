@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.record import read_record, write_record
-from tactile_bayes.rig import Rig
+from tactile_bayes.record import write_record
+from tactile_bayes.rig import Rig, read_record
 from tactile_bayes.runs import contour as run
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import scan

@@ -10,7 +10,8 @@ from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, LOAD_CELL_UNITS, frame_of, read_record, to_dimensionless, write_record
+from tactile_bayes.record import CHANNELS, LOAD_CELL_UNITS, frame_of, to_dimensionless, write_record
+from tactile_bayes.rig import read_record
 
 SIZES = ("force_noise", "moment_noise", "relative_noise", "force_resolution", "moment_resolution")
 rods = st.builds(Rod, st.floats(0.3, 3.0), st.floats(0.3, 3.0))

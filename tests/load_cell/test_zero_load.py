@@ -11,7 +11,8 @@ from tactile_bayes.errors import DriftWarning, RecordError
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.load_cell.contact_bounds import contact_bounds
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, in_frame, make_record, to_si
+from tactile_bayes.record import CHANNELS, in_frame, to_si
+from tactile_bayes.rig import make_record
 from tactile_bayes.sweep import scan
 
 RIG = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.1, -0.3, 0.7))
@@ -26,7 +27,7 @@ def ramp(before, loaded, after, slope, offset=0.5):
     return loads
 
 
-def record_of(*sweeps, **options):
+def record_of(*sweeps):
     """A record of sweeps of readings, each of shape (samples, 3)."""
     loads = np.concatenate(sweeps)
     columns = {
@@ -35,7 +36,7 @@ def record_of(*sweeps, **options):
         "drive_angle": np.concatenate([np.linspace(1.0, 2.0, len(sweep)) for sweep in sweeps]),
         **dict(zip(CHANNELS, loads.T, strict=True)),
     }
-    return make_record(columns, **options)
+    return make_record(columns)
 
 
 def noisy(loads, seed, deviation=1.0, bias=(0.0, 0.0, 0.0)):

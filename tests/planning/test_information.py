@@ -17,8 +17,8 @@ from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.rig.rig import expanded
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.unknown import expanded
 
 PROFILE = paper_profile("II", q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)

@@ -21,8 +21,8 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.plotting import posteriors, touch_map
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.plotting.tightening import _fit_map, _panels
-from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
-from tactile_bayes.rig import Rig
+from tactile_bayes.record import CHANNELS, in_frame, turned
+from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.sweep import Motion, Rotation, Translation, scan
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 
@@ -196,7 +196,7 @@ def test_noise_is_drawn_as_points_over_the_truth(noisy, plain):
 
 def test_record_of_a_rig_has_points_only():
     columns = {"sweep": 0, "direction": "backward", "drive_angle": [1.3, 1.2, 1.1], "holding_moment": [0.0, -0.4, -0.5]}
-    record = make_record(columns, missing=("force_x", "force_y"))
+    record = make_record(columns, Rig(file={"missing": ("force_x", "force_y")}))
     axes = plotting.observables(record)
     assert labels(axes[0]) == ["measured backward"]
     for ax in axes[1:]:

@@ -13,8 +13,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct, samples, samples_of
-from tactile_bayes.record import make_record
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import Rig, make_record
 
 CURVATURES = (-0.7, 0.4)
 NAMES = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
@@ -48,7 +47,7 @@ def swept(curvature: float, units: str = "dimensionless") -> Swept:
     }
     place = [sign * states.x, states.y, sign * states.slope_angle, wrench.contact_arclength]
     truth = np.array(place) * np.array([rod.length, rod.length, 1.0, rod.length])[:, None]
-    return Swept(make_record(columns, rod=rod), truth, np.array(PHASE_NAMES)[wrench.phase], rod)
+    return Swept(make_record(columns, Rig(rod=rod)), truth, np.array(PHASE_NAMES)[wrench.phase], rod)
 
 
 @pytest.fixture

@@ -16,8 +16,7 @@ from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides, doubtful_sweeps, reconstruct, with_sides
-from tactile_bayes.record import make_record
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING, Rig, make_record
 from tactile_bayes.runs.reconstruction import reconstruction_messages
 from tactile_bayes.sweep import scan
 

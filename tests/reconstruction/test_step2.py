@@ -12,8 +12,8 @@ from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples, reconstruct
-from tactile_bayes.record import in_frame, make_record
-from tactile_bayes.rig import Rig
+from tactile_bayes.record import in_frame
+from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.sweep import scan
 
 NUMBERS = ("contact_x", "contact_y", "contact_arclength", "slope_angle")
@@ -167,7 +167,7 @@ def test_a_contact_beyond_the_tip_keeps_its_numbers():
 def test_a_load_beyond_all_numbers_has_no_zero_of_curvature():
     """In SI units it is a number, in those of the rod it is none."""
     columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2, 1.2], "holding_moment": [1e300, 1e-5]}
-    contacts = reconstruct(make_record({**columns, "force_x": 0.0, "force_y": 1e-3}, rod=Rod(0.1, 1e-12)))
+    contacts = reconstruct(make_record({**columns, "force_x": 0.0, "force_y": 1e-3}, Rig(rod=Rod(0.1, 1e-12))))
     assert contacts.status.values[0] == "no zero of curvature"
     assert_statuses_tell_the_truth(contacts)
 
@@ -236,7 +236,7 @@ def test_unloaded_samples_are_taken_for_loaded_as_rarely_as_stated(missing):
     """Of 50 000 samples; the test itself fails for one seed in a million."""
     columns = {"sweep": 0, "direction": "forward", "drive_angle": np.full(50_000, 1.2)}
     columns |= {name: 0.0 for name in ("holding_moment", "force_x", "force_y") if name not in missing}
-    unloaded = make_record(columns, missing=missing)
+    unloaded = make_record(columns, Rig(file={"missing": missing}))
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(unloaded, rng=1)
     alarms = int(loaded_samples(measured).sum())
     assert binomtest(alarms, 50_000, FALSE_ALARM).pvalue > 1e-6

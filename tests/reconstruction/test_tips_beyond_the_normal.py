@@ -7,8 +7,7 @@ import tactile_bayes as tb
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.contacts.contact_coordinates import contact_states
 from tactile_bayes.mechanics.elastica import contact_from_wrench
-from tactile_bayes.record import make_record
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import Rig, make_record
 
 CELL = tb.LoadCell(force_noise=0.01, moment_noise=0.005)
 PSI1 = np.array([1.8, 2.0, 2.2])

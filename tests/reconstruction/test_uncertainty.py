@@ -12,8 +12,8 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, in_frame, make_record
-from tactile_bayes.rig import Rig
+from tactile_bayes.record import CHANNELS, in_frame
+from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.sweep import scan
 
 METHODS = pytest.mark.parametrize("method", ["raw", "constrained"])
@@ -395,7 +395,7 @@ def test_units_do_not_matter(method):
     measured = load_cell.measure(record, rng=1)
     table = {name: measured[name].values for name in ("sweep", "direction", "drive_angle")}
     table |= {name: measured[name].values * rod.force_unit for name in ("force_x", "force_y")}
-    in_si = make_record(table | {"holding_moment": measured.holding_moment.values * rod.moment_unit}, rod=rod)
+    in_si = make_record(table | {"holding_moment": measured.holding_moment.values * rod.moment_unit}, Rig(rod=rod))
     si_cell = LoadCell(
         force_noise=0.05 * rod.force_unit,
         moment_noise=0.02 * rod.moment_unit,

@@ -7,8 +7,9 @@ import xarray as xr
 from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.record import make_record, read_record, write_record
+from tactile_bayes.record import write_record
 from tactile_bayes.record.attribute_names import misspelt, stray_attribute, unused
+from tactile_bayes.rig import Rig, make_record, read_record
 
 WRONG = [
     ("rod_tapper", 0.4, "taper"),
@@ -44,8 +45,8 @@ FOREIGN = [
 @pytest.mark.parametrize(("name", "value", "meant"), WRONG)
 def test_a_misspelt_attribute_is_refused_in_memory_and_in_files(tmp_path, name, value, meant):
     with refused(RecordError, f"attribute '{name}'", meant):
-        make_record(columns(), rod=WIRE, attrs={name: value})
-    record = make_record(columns(), rod=WIRE)
+        make_record(columns(), Rig(rod=WIRE), attrs={name: value})
+    record = make_record(columns(), Rig(rod=WIRE))
     for suffix in (".csv", ".nc"):
         write_record(record, tmp_path / f"record{suffix}")
     text = (tmp_path / "record.csv").read_text(encoding="utf-8")
@@ -63,7 +64,7 @@ def test_a_misspelt_attribute_is_refused_in_memory_and_in_files(tmp_path, name, 
 @pytest.mark.parametrize(("name", "value"), FOREIGN)
 def test_a_foreign_attribute_is_kept_and_known_as_such(name, value):
     assert misspelt(name, value) is None
-    record = make_record(columns(), rod=WIRE, attrs={name: value})
+    record = make_record(columns(), Rig(rod=WIRE), attrs={name: value})
     assert (record.attrs[name], unused(record.attrs)) == (value, [name])
 
 
@@ -86,7 +87,7 @@ def test_an_attribute_in_another_form_is_refused(tmp_path, line, name):
     path = tmp_path / "record.csv"
     path.write_text(f"# {line}\nsweep,direction,drive_angle,holding_moment,force_x,force_y\n0,forward,1,0,0,0\n")
     with refused(RecordError, "line 1", name):
-        read_record(path, rod=WIRE)
+        read_record(path, Rig(rod=WIRE))
 
 
 @pytest.mark.parametrize(
@@ -99,7 +100,7 @@ def test_words_are_no_attributes(line):
 
 def test_words_about_a_stated_attribute_are_kept_for_inspection(tmp_path):
     path = tmp_path / "record.csv"
-    write_record(make_record(columns(), rod=WIRE, attrs={"operator": "me"}), path)
+    write_record(make_record(columns(), Rig(rod=WIRE), attrs={"operator": "me"}), path)
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("\n", "\n# rod length = 20 cm, see log\n", 1), encoding="utf-8")
     record = read_record(path)
@@ -110,7 +111,7 @@ def test_words_about_a_stated_attribute_are_kept_for_inspection(tmp_path):
 @pytest.mark.parametrize("line", ["column force_x: [mN]", "column force_x = number [mN]", "column Fx [mN]: number [N]"])
 def test_a_description_of_a_column_in_another_form_is_refused(tmp_path, line):
     path = tmp_path / "record.csv"
-    write_record(make_record(columns(), rod=WIRE), path)
+    write_record(make_record(columns(), Rig(rod=WIRE)), path)
     path.write_text(f"# {line}\n" + path.read_text(encoding="utf-8"), encoding="utf-8")
     with refused(RecordError, "line 1", "'# column NAME: KIND [UNIT] TEXT'"):
         read_record(path)

@@ -101,7 +101,7 @@ NAMED = COLUMNS | {"drive_angle": "/joint_states.position.wrist"}
 
 
 def found(path, **columns):
-    return read(path, columns=NAMED | columns)
+    return read(path, NAMED | columns)
 
 
 @pytest.fixture(params=[StoragePlugin.MCAP, StoragePlugin.SQLITE3], ids=["mcap", "sqlite3"])
@@ -109,8 +109,8 @@ def folder(request, tmp_path):
     return written(tmp_path / "sweep", request.param)
 
 
-def read(path, **changes):
-    return tb.read_record(path, **({"columns": COLUMNS, "split_sweeps": True, "rod": ROD} | changes))
+def read(path, columns=COLUMNS):
+    return tb.read_record(path, tb.Rig(rod=ROD, file=columns | {"split_sweeps": True}))
 
 
 def test_each_load_is_a_sample_at_the_angle_of_its_time(folder):
@@ -138,10 +138,10 @@ def test_samples_in_a_pause_of_the_drive_are_left_out(tmp_path):
 
 def test_what_a_bag_lacks_is_named(folder):
     with pytest.raises(RecordError, match=r"drive_angle=/(joint_states|cell/wrench)\.") as error:
-        read(folder, columns={"drive_angle": "Angle"})
+        read(folder, {"drive_angle": "Angle"})
     assert "/cell/wrench, /joint_states" in str(error.value)
     with pytest.raises(RecordError, match=r"/joint_states\.position\.2.*/joint_states\.position\.1"):
-        read(folder, columns=COLUMNS | {"drive_angle": "/joint_states.position.2"})
+        read(folder, COLUMNS | {"drive_angle": "/joint_states.position.2"})
 
 
 def test_what_is_no_bag_is_refused(tmp_path, monkeypatch):

@@ -32,7 +32,7 @@ def _stage(path, record, head="", columns=("base_x", "base_y", "holding_moment",
 )
 def test_a_clamped_rod_states_its_angle_once(tmp_path, head, columns):
     record = tb.scan(CIRCLE, drive=THERE).record
-    read = tb.read_record(_stage(tmp_path / "stage.csv", record, head), columns=columns, split_sweeps=True)
+    read = tb.read_record(_stage(tmp_path / "stage.csv", record, head), tb.Rig(file={**columns, "split_sweeps": True}))
     np.testing.assert_allclose(read.drive_angle, 1.2, atol=1e-4)
     assert carried_sweeps(read) == (0,)
     assert set(read.direction.values) == {"forward"}
@@ -43,7 +43,9 @@ def test_a_column_of_angles_precedes_an_angle_in_the_header(tmp_path):
     record = tb.scan(CIRCLE, drive=THERE).record
     columns = ("base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y")
     path = _stage(tmp_path / "stage.csv", record, "# drive_angle: 0.3\n", columns)
-    np.testing.assert_array_equal(tb.read_record(path, split_sweeps=True).drive_angle, record.drive_angle)
+    np.testing.assert_array_equal(
+        tb.read_record(path, tb.Rig(file={"split_sweeps": True})).drive_angle, record.drive_angle
+    )
 
 
 @pytest.mark.parametrize(
@@ -58,7 +60,7 @@ def test_a_column_of_angles_precedes_an_angle_in_the_header(tmp_path):
 def test_sweeps_and_directions_follow_from_the_motion(tmp_path, drive):
     record = tb.scan(CIRCLE, drive=drive).record
     columns = ("base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y")
-    read = tb.read_record(_stage(tmp_path / "stage.csv", record, columns=columns), split_sweeps=True)
+    read = tb.read_record(_stage(tmp_path / "stage.csv", record, columns=columns), tb.Rig(file={"split_sweeps": True}))
     np.testing.assert_array_equal(read.direction, record.direction)
     assert len(set(read.sweep.values.tolist())) == len(drive)
 
@@ -80,7 +82,7 @@ def test_a_record_of_both_kinds_is_parted_where_the_base_begins_or_stops_to_move
     angle = record.drive_angle.values + np.random.default_rng(1).normal(0.0, noise, record.sizes["sample"])
     record = record.assign(drive_angle=("sample", angle, record.drive_angle.attrs))
     columns = ("base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y")
-    read = tb.read_record(_stage(tmp_path / "stage.csv", record, columns=columns), split_sweeps=True)
+    read = tb.read_record(_stage(tmp_path / "stage.csv", record, columns=columns), tb.Rig(file={"split_sweeps": True}))
     ends, found = (np.flatnonzero(np.diff(one.sweep)) for one in (record, read))
     assert found.size == ends.size
     assert np.abs(found - ends).max() <= 1  # a sample at which the drive turns back belongs to either sweep
@@ -92,7 +94,7 @@ def test_a_rod_that_moves_along_itself_has_no_direction(tmp_path):
     path = tmp_path / "stage.csv"
     path.write_text("base_x,drive_angle,holding_moment,force_x,force_y\n" + "".join(f"{v},0,0,0,0\n" for v in x))
     with refused(RecordError, "no side of the rod leads", "line 2"):
-        tb.read_record(path, split_sweeps=True)
+        tb.read_record(path, tb.Rig(file={"split_sweeps": True}))
 
 
 def test_travels_are_ways_where_the_base_is_carried():
@@ -130,6 +132,6 @@ def test_lengths_of_a_stage_are_in_metres(tmp_path):
     record = tb.scan(tb.contours.Circle(0.03, 0.08), drive=drive, rig=Rig(rod=ROD)).record
     path = _stage(tmp_path / "stage.csv", record, "# drive_angle: 68.75 [deg]\n")
     with pytest.warns(tb.errors.RecordWarning, match="for base_x, holding_moment, force_x and force_y: taken as m,"):
-        read = tb.read_record(path, rod=ROD, split_sweeps=True)
+        read = tb.read_record(path, tb.Rig(rod=ROD, file={"split_sweeps": True}))
     assert travels_of(read)[-1] == pytest.approx(0.16)
     assert set(read.direction.values) == {"forward"}

@@ -8,7 +8,8 @@ from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import MEASURED, make_record, present_channels, rod_of, validate
+from tactile_bayes.record import MEASURED, present_channels, rod_of, validate
+from tactile_bayes.rig import Rig, make_record
 
 
 def test_a_record_without_a_rod_is_dimensionless():
@@ -21,11 +22,11 @@ def test_a_record_without_a_rod_is_dimensionless():
     }
     assert tuple(record.data_vars) == MEASURED
     assert record["force_x"].attrs == {"units": "1", "long_name": "horizontal support reaction"}
-    assert make_record(columns(), rod=Rod()).identical(record)
+    assert make_record(columns(), Rig(rod=Rod())).identical(record)
 
 
 def test_a_record_with_a_rod_is_si():
-    record = make_record(columns(), rod=WIRE)
+    record = make_record(columns(), Rig(rod=WIRE))
     assert record.attrs["units"] == "SI"
     assert rod_of(record) == WIRE
     assert [record[name].attrs["units"] for name in MEASURED] == ["1", "1", "m", "m", "rad", "N m", "N", "N"]
@@ -82,7 +83,7 @@ def test_a_channel_may_be_missing_as_a_whole(empty):
 
 @pytest.mark.parametrize("missing", [("force_x",), ["force_x"], "force_x"])
 def test_a_channel_may_be_declared_missing(missing):
-    record = make_record(columns(force_x=None), missing=missing)
+    record = make_record(columns(force_x=None), Rig(file={"missing": missing}))
     assert present_channels(record) == ("holding_moment", "force_y")
     assert validate(record).identical(record)
 
@@ -95,18 +96,18 @@ def test_attributes_are_kept_as_plain_strings_and_numbers():
 
 
 def test_attributes_may_state_units_and_rod():
-    si = make_record(columns(), rod=WIRE)
+    si = make_record(columns(), Rig(rod=WIRE))
     assert make_record(columns(), attrs=si.attrs).identical(si)
 
 
 def test_declaring_missing_what_is_no_channel_is_refused():
     with refused(ParameterError, "'force_z'", "holding_moment, force_x, force_y"):
-        make_record(columns(), missing=("force_z",))
+        make_record(columns(), Rig(file={"missing": ("force_z",)}))
 
 
 def test_declaring_missing_what_has_values_is_refused():
-    with refused(RecordError, "column 'force_x' has values, but is declared missing: leave it out of missing="):
-        make_record(columns(), missing=("force_x",))
+    with refused(RecordError, "column 'force_x' has values, but is declared missing"):
+        make_record(columns(), Rig(file={"missing": ("force_x",)}))
 
 
 def test_columns_of_different_lengths_are_refused():

@@ -9,7 +9,8 @@ from helpers import commands
 from helpers.record_tables import WIRE
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError, RecordWarning
-from tactile_bayes.record import read_record, record_hash
+from tactile_bayes.record import record_hash
+from tactile_bayes.rig import Rig, read_record
 
 NAMES = "Winkel;Mz;Fx;Fy"
 ROWS = ("60,0;0,1;1;2", "61,0;0,25;-1,5;40")
@@ -20,7 +21,7 @@ STATED = {"drive_angle": "Winkel[deg]", "holding_moment": "Mz[N mm]", "force_x":
 def read(tmp_path, *lines, columns=COLUMNS, encoding="utf-8", end="\n", rod=WIRE):
     path = tmp_path / "rig.csv"
     path.write_bytes((end.join(lines) + end).encode(encoding))
-    return read_record(path, columns=columns, split_sweeps=True, rod=rod)
+    return read_record(path, Rig(rod=rod, file={**columns, "split_sweeps": True}))
 
 
 @pytest.fixture
@@ -95,7 +96,7 @@ def test_a_row_of_units_also_tells_those_of_names_that_a_record_has(tmp_path):
 
 def read_record_of(tmp_path, *lines):
     (tmp_path / "rig.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return read_record(tmp_path / "rig.csv", rod=WIRE)
+    return read_record(tmp_path / "rig.csv", Rig(rod=WIRE))
 
 
 @pytest.mark.parametrize(
@@ -105,7 +106,7 @@ def read_record_of(tmp_path, *lines):
             [NAMES + ";T", "°;mN m;mX;mN;°C", ROWS[0] + ";20"],
             "line 2: this looks like a row of units, but 'mX' below 'Fx' is none that is known here: empty that cell",
         ),
-        ([NAMES, "°;mN m;s;mN", *ROWS], "line 2, column 'force_x' ('Fx' in the file) is in [s], but takes N, kN, mN"),
+        ([NAMES, "°;mN m;s;mN", *ROWS], "line 2, column 'force_x' ('Fx' as given) is in [s], but takes N, kN, mN"),
         ([NAMES, ROWS[0], "°;mN m;mN;mN"], "line 3, column 'Winkel': '°' is not a number"),
         ([NAMES, "°;mN m;mN;mN", *ROWS, "62;x;1;1"], "line 5, column 'Mz': 'x' is not a number"),
         ([NAMES, "°;mN m;mN", *ROWS], "line 2: there are 3 cells in 4 columns"),
@@ -125,7 +126,7 @@ def test_what_is_wrong_in_or_below_a_row_of_units_has_its_line(tmp_path, lines, 
 
 
 def test_a_unit_that_is_given_beside_another_in_the_row_is_refused(tmp_path):
-    with refused(RecordError, "line 2, column 'force_x' ('Fx' in the file) is in [mN], but [N] is given for it"):
+    with refused(RecordError, "line 2, column 'force_x' ('Fx' as given) is in [mN], but [N] is given for it"):
         read(tmp_path, NAMES, "°;mN m;mN;mN", *ROWS, columns={**COLUMNS, "force_x": "Fx[N]"})
 
 
@@ -172,4 +173,4 @@ def test_windows_1252_far_below_keeps_the_lines_of_errors(tmp_path):
 def test_what_is_neither_utf8_nor_windows_1252_is_refused(tmp_path, content, message):
     (tmp_path / "rig.csv").write_bytes(content)
     with refused(RecordError, re.sub(r"^", f"{tmp_path / 'rig.csv'}: ", message)):
-        read_record(tmp_path / "rig.csv", columns=COLUMNS, split_sweeps=True)
+        read_record(tmp_path / "rig.csv", Rig(file={**COLUMNS, "split_sweeps": True}))

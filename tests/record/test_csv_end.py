@@ -4,7 +4,7 @@ import pytest
 
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError, RecordWarning
-from tactile_bayes.record import read_record
+from tactile_bayes.rig import read_record
 
 NAMES = "sweep,direction,drive_angle,holding_moment,force_x,force_y"
 ROWS = [f"0,forward,{1 + k / 100},0.1,0.2" for k in range(14)]

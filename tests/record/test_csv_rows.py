@@ -11,8 +11,9 @@ from hypothesis import HealthCheck, given, settings
 
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.record import csv_rows, parsing, read_record
+from tactile_bayes.record import csv_rows, parsing
 from tactile_bayes.record.csv_format import read_csv
+from tactile_bayes.rig import read_record
 
 TESTS = Path(__file__).parents[1]
 NAMES = ["sweep", "direction", "drive_angle", "force_x", "note", "count"]
@@ -146,7 +147,7 @@ def test_a_refusal_far_down_names_its_line(tmp_path):
 READING = """
 import sys
 from helpers.memory import own_peak
-from tactile_bayes.record import read_record
+from tactile_bayes.rig import read_record
 
 read_record(sys.argv[2])  # what reading loads
 before = own_peak()

@@ -12,19 +12,19 @@ from hypothesis.extra import numpy as hnp
 from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError, RecordWarning
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import (
     CHANNELS,
     FRAMES,
     column_of,
-    make_record,
     parsing,
     present_channels,
-    read_record,
     record_hash,
     rod_of,
     write_record,
 )
+from tactile_bayes.rig import Rig, make_record, read_record
 
 HEADER = "sweep,direction,drive_angle,holding_moment,force_x,force_y"
 ROW = "0,forward,1.25,0.5,0.125,0.25"
@@ -63,7 +63,7 @@ def records(draw):
     attrs = draw(st.dictionaries(names, words | st.floats(allow_nan=False) | st.integers(-(2**63), 2**63 - 1)))
     attrs = {name: value for name, value in attrs.items() if name != "units" and not name.startswith(("rod_", "load_"))}
     rod, frame = draw(st.sampled_from([None, WIRE, Rod(0.1, 1e-300)])), draw(st.sampled_from([None, *FRAMES]))
-    return make_record(table, rod=rod, attrs=attrs, load_cell_frame=frame)
+    return make_record(table, Rig(rod=rod, load_cell=LoadCell(frame=frame)), attrs=attrs)
 
 
 def awkward_record():
@@ -85,7 +85,7 @@ def awkward_record():
         **{'key: "x" [m], #': time},
     )
     attrs = {"a: b": "1.0", "empty": "", "padded": " a,", "lines": "a\r\nb\u2028c", "run": 2**63 - 1, "limit": np.inf}
-    return make_record(table, rod=WIRE, attrs=attrs)
+    return make_record(table, Rig(rod=WIRE), attrs=attrs)
 
 
 def assert_nothing_is_lost(record, path):
@@ -150,7 +150,7 @@ def test_remarks_of_very_different_length_are_kept_as_objects(tmp_path, monkeypa
 def test_a_load_cell_has_no_entries_but_its_own(tmp_path, line, message):
     path = write_text(tmp_path / "lab.csv", f"# {line}", HEADER, ROW)
     with refused(RecordError, message) as caught:
-        read_record(path, rod=WIRE)
+        read_record(path, Rig(rod=WIRE))
     assert str(caught.value).startswith(f"{path}: line 1, ")
 
 
@@ -190,14 +190,14 @@ def test_names_that_are_only_values_make_no_line_of_names(tmp_path):
     """What is given for all samples stands in lines of samples too."""
     path = write_text(tmp_path / "rig.csv", "Angle,Sense", "1.25,forward")
     with refused(RecordError, "there is no column 'holding_moment' (columns: Angle, Sense)"):
-        read_record(path, columns={"drive_angle": "1.25-Angle", "sweep": "0", "direction": "forward"})
+        read_record(path, Rig(file={"drive_angle": "1.25-Angle", "sweep": "0", "direction": "forward"}))
     with refused(RecordError, "there is no column 'drive_angle', but a column 'Angle': did you mean 'drive_angle'?"):
-        read_record(path, columns={"sweep": "0", "direction": "forward"})
+        read_record(path, Rig(file={"sweep": "0", "direction": "forward"}))
 
 
 @pytest.mark.parametrize("name", ["t", "index"])
 def test_the_one_dimension_of_a_netcdf_file_may_have_any_name(tmp_path, name):
-    record = make_record(columns(), rod=WIRE)
+    record = make_record(columns(), Rig(rod=WIRE))
     record.rename_dims(sample=name).to_netcdf(tmp_path / "rig.nc", engine="h5netcdf")
     assert read_record(tmp_path / "rig.nc").identical(record)
     timed = record.rename_dims(sample=name).assign_coords({name: np.arange(6.0)})
@@ -249,12 +249,12 @@ def test_a_file_without_header_is_assumed_to_be_dimensionless(tmp_path):
     path = write_text(tmp_path / "plain.csv", HEADER, ROW)
     record = read_record(path)
     assert (record.attrs["units"], record.attrs["units_source"]) == ("dimensionless", "assumed")
-    assert "units_source" not in read_record(path, rod=Rod()).attrs
+    assert "units_source" not in read_record(path, Rig(rod=Rod())).attrs
 
 
 def test_a_file_without_header_is_si_with_a_rod(tmp_path):
     with pytest.warns(RecordWarning, match="force_x and force_y: taken as rad, N m, N and N"):
-        record = read_record(write_text(tmp_path / "plain.csv", HEADER, ROW), rod=WIRE)
+        record = read_record(write_text(tmp_path / "plain.csv", HEADER, ROW), Rig(rod=WIRE))
     assert record.attrs["units"] == "SI"
     assert rod_of(record) == WIRE
     assert "units_source" not in record.attrs
@@ -263,13 +263,13 @@ def test_a_file_without_header_is_si_with_a_rod(tmp_path):
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_a_given_rod_completes_or_repeats_the_stated_one(tmp_path, suffix):
     path = tmp_path / f"record{suffix}"
-    write_record(make_record(columns(), rod=WIRE), path)
-    assert rod_of(read_record(path, rod=WIRE)) == WIRE
+    write_record(make_record(columns(), Rig(rod=WIRE)), path)
+    assert rod_of(read_record(path, Rig(rod=WIRE))) == WIRE
     with refused(RecordError, f"{path}: the SI record states {WIRE}, but {Rod(0.1, 1e-5)} was given"):
-        read_record(path, rod=Rod(0.1, 1e-5))
+        read_record(path, Rig(rod=Rod(0.1, 1e-5)))
     write_record(make_record(columns()), path)
     with refused(RecordError, f"but {WIRE} was given"):
-        read_record(path, rod=WIRE)
+        read_record(path, Rig(rod=WIRE))
 
 
 def test_si_without_a_rod_is_refused_or_completed(tmp_path):
@@ -280,7 +280,7 @@ def test_si_without_a_rod_is_refused_or_completed(tmp_path):
         "flexural_rigidity=...), length and flexural_rigidity under [rod] of rig.toml",
     ):
         read_record(path)
-    assert rod_of(read_record(path, rod=WIRE)) == WIRE
+    assert rod_of(read_record(path, Rig(rod=WIRE))) == WIRE
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
@@ -290,9 +290,9 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         write_text(path, "sweep,direction,drive_angle,holding_moment", "0,forward,1.25,0.5")
     else:
         make_record(columns()).drop_vars(["force_x", "force_y"]).to_netcdf(path, engine="h5netcdf")
-    with refused(RecordError, "missing=('force_x',)"):
-        read_record(path, missing=("force_y",))
-    assert present_channels(read_record(path, missing=("force_x", "force_y"))) == ("holding_moment",)
+    with refused(RecordError, "Rig(file={'missing': ['force_x']})"):
+        read_record(path, Rig(file={"missing": ("force_y",)}))
+    assert present_channels(read_record(path, Rig(file={"missing": ("force_x", "force_y")}))) == ("holding_moment",)
 
 
 @pytest.mark.parametrize(
@@ -431,7 +431,7 @@ def test_writing_that_fails_leaves_the_old_file(tmp_path, suffix, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", full_disk)
     with pytest.raises(OSError, match="no space left"):
-        write_record(make_record(columns(), rod=WIRE), path)
+        write_record(make_record(columns(), Rig(rod=WIRE)), path)
     assert path.read_bytes() == old
     assert list(tmp_path.iterdir()) == [path]
 

@@ -12,20 +12,19 @@ from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import (
     CHANNELS,
     FRAMES,
     frame_of,
     in_frame,
-    make_record,
-    read_record,
     record_hash,
     to_dimensionless,
     turned,
     validate,
     write_record,
 )
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import Rig, make_record, read_record
 
 EPS = np.finfo(float).eps
 ANGLES = np.array(columns()["drive_angle"])
@@ -54,7 +53,7 @@ def test_a_force_along_the_rod_is_axial_and_one_to_its_left_is_transversal():
 def test_there_and_back_is_the_same_record(forces, turn, frame):
     names = ("force_x", "force_y", "truth_force_x", "truth_force_y")
     table = columns(**dict(zip(names, forces, strict=True)), drive_angle=ANGLES + turn)
-    record = make_record(table, load_cell_frame=frame)
+    record = make_record(table, Rig(load_cell=LoadCell(frame=frame)))
     other = in_frame(record, next(name for name in FRAMES if name != frame))
     back = in_frame(other, frame)
     assert back.attrs == record.attrs
@@ -131,7 +130,7 @@ def test_truth_that_is_unknown_stays_unknown():
 
 
 def test_units_and_frame_convert_in_any_order():
-    record = make_record(columns(), rod=WIRE, attrs={"load_cell_force_noise": 0.1})
+    record = make_record(columns(), Rig(rod=WIRE), attrs={"load_cell_force_noise": 0.1})
     one, other = to_dimensionless(in_frame(record, "turning")), in_frame(to_dimensionless(record), "turning")
     xr.testing.assert_allclose(one, other, rtol=4 * EPS, atol=4 * EPS)
     assert one.attrs == other.attrs
@@ -145,7 +144,7 @@ def test_units_and_frame_convert_in_any_order():
 @pytest.mark.parametrize(("name", "other"), [("force_x", "force_y"), ("force_y", "force_x")])
 def test_one_force_alone_is_refused(name, other, frame):
     wanted = next(other_frame for other_frame in FRAMES if other_frame != frame)
-    record = make_record(columns(**{name: None}), missing=(name,), load_cell_frame=frame)
+    record = make_record(columns(**{name: None}), Rig(load_cell=LoadCell(frame=frame), file={"missing": (name,)}))
     assert in_frame(record, frame) is record
     with refused(
         RecordError,
@@ -156,7 +155,7 @@ def test_one_force_alone_is_refused(name, other, frame):
 
 
 def test_without_any_force_there_is_nothing_to_lose():
-    record = make_record(columns(force_x=None, force_y=None), missing=("force_x", "force_y"))
+    record = make_record(columns(force_x=None, force_y=None), Rig(file={"missing": ("force_x", "force_y")}))
     turning = in_frame(record, "turning")
     assert frame_of(turning) == "turning"
     xr.testing.assert_equal(turning, record)
@@ -183,7 +182,7 @@ def test_a_record_that_states_no_frame_is_fixed():
 @pytest.mark.parametrize("way", ["keyword", "attribute", "later"])
 def test_a_record_may_be_said_to_turn(way):
     if way == "keyword":
-        record = make_record(columns(), load_cell_frame="turning")
+        record = make_record(columns(), Rig(load_cell=LoadCell(frame="turning")))
     elif way == "attribute":
         record = make_record(columns(), attrs={"load_cell_frame": "turning"})
     else:
@@ -211,8 +210,6 @@ def test_a_frame_that_is_none_is_refused(frame):
             use(record)
     with refused(RecordError, message):
         make_record(columns(), attrs={"load_cell_frame": frame})
-    with refused(RecordError, message):
-        make_record(columns(), load_cell_frame=frame)
 
 
 def test_a_frame_to_convert_to_that_is_none_is_refused(scanned):
@@ -227,8 +224,8 @@ def test_what_is_no_record_is_refused():
 
 def test_two_statements_that_differ_are_refused():
     with refused(RecordError, "the record states load_cell_frame 'fixed', but 'turning' was given"):
-        make_record(columns(), attrs={"load_cell_frame": "fixed"}, load_cell_frame="turning")
-    twice = make_record(columns(), attrs={"load_cell_frame": "turning"}, load_cell_frame="turning")
+        make_record(columns(), Rig(load_cell=LoadCell(frame="turning")), attrs={"load_cell_frame": "fixed"})
+    twice = make_record(columns(), Rig(load_cell=LoadCell(frame="turning")), attrs={"load_cell_frame": "turning"})
     assert frame_of(twice) == "turning"
 
 
@@ -251,17 +248,17 @@ def test_the_hash_sees_the_frame():
 @pytest.mark.parametrize("frame", FRAMES)
 def test_files_carry_the_frame(tmp_path, suffix, frame):
     path = tmp_path / f"record{suffix}"
-    record = make_record(columns(truth_force_x=np.ones(6)), rod=WIRE, load_cell_frame=frame)
+    record = make_record(columns(truth_force_x=np.ones(6)), Rig(rod=WIRE, load_cell=LoadCell(frame=frame)))
     write_record(record, path)
     assert read_record(path).identical(record)
-    assert read_record(path, load_cell_frame=frame).identical(record)
+    assert read_record(path, Rig(load_cell=LoadCell(frame=frame))).identical(record)
     with refused(RecordError, f"{path}: the record states load_cell_frame '{frame}', but "):
-        read_record(path, load_cell_frame=next(other for other in FRAMES if other != frame))
+        read_record(path, Rig(load_cell=LoadCell(frame=next(other for other in FRAMES if other != frame))))
 
 
 def test_a_csv_file_states_the_frame_in_its_header(tmp_path):
     path = tmp_path / "lab.csv"
-    write_record(make_record(columns(), load_cell_frame="turning"), path)
+    write_record(make_record(columns(), Rig(load_cell=LoadCell(frame="turning"))), path)
     lines = path.read_text(encoding="utf-8").splitlines()
     assert "# load_cell_frame: turning" in lines
     assert "# column force_x: number [1] axial support reaction" in lines
@@ -274,6 +271,6 @@ def test_a_file_that_states_no_frame_may_be_told_it(tmp_path):
     path = tmp_path / "plain.csv"
     path.write_text(f"sweep,direction,drive_angle,{','.join(CHANNELS)}\n0,forward,1.2,0.5,0.1,0.2\n", encoding="utf-8")
     assert frame_of(read_record(path)) == "fixed"
-    record = read_record(path, load_cell_frame="turning")
+    record = read_record(path, Rig(load_cell=LoadCell(frame="turning")))
     assert frame_of(record) == "turning"
     assert record["force_x"].attrs["long_name"] == "axial support reaction"

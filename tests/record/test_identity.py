@@ -7,11 +7,12 @@ import numpy as np
 
 from helpers.record_tables import WIRE, columns, edited
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, make_record, record_hash
+from tactile_bayes.record import CHANNELS, record_hash
+from tactile_bayes.rig import Rig, make_record
 
 
 def test_the_hash_ignores_truth_order_and_remarks():
-    record = make_record(columns(), rod=WIRE)
+    record = make_record(columns(), Rig(rod=WIRE))
     same = record[list(reversed(list(record.data_vars)))].assign(truth_force_x=record["force_x"], note=record["sweep"])
     same.attrs["rig"] = "bench"
     assert record_hash(same) == record_hash(record)
@@ -21,8 +22,8 @@ def test_the_hash_ignores_truth_order_and_remarks():
 def test_the_hash_sees_every_measured_value_unit_and_rod():
     variants = [
         make_record(columns()),
-        make_record(columns(), rod=WIRE),
-        make_record(columns(), rod=Rod(0.2, 2.4e-3)),
+        make_record(columns(), Rig(rod=WIRE)),
+        make_record(columns(), Rig(rod=Rod(0.2, 2.4e-3))),
         make_record(columns(sweep=[0, 0, 0, 2, 2, 2])),
         make_record(columns(direction=["forward"] * 6, drive_angle=[1, 1.1, 1.2, 1.8, 1.8, 1.8])),
         make_record(columns(drive_angle=[1, 1.1, 1.2, 1.8, 1.8, 1.8])),

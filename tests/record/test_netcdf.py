@@ -20,8 +20,9 @@ from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, RecordError, TactileBayesError
 from tactile_bayes.inference.result import read_result, write_result
-from tactile_bayes.record import make_record, read_record, write_record
+from tactile_bayes.record import write_record
 from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
+from tactile_bayes.rig import Rig, make_record, read_record
 
 SEAL = b"\ntactile_bayes: SHA-256 of all bytes before this line "
 SIZE = len(SEAL) + 65
@@ -43,7 +44,7 @@ def small_posterior():
 def write_both(folder):
     """A record and a posterior; each with its reader."""
     record, posterior = folder / "record.nc", folder / "posterior.nc"
-    write_record(make_record(columns(note=["", "a", "bc", "ß", "", "d"]), rod=WIRE, attrs={"run": 5}), record)
+    write_record(make_record(columns(note=["", "a", "bc", "ß", "", "d"]), Rig(rod=WIRE), attrs={"run": 5}), record)
     write_result(small_posterior(), posterior)
     return {record: read_record, posterior: read_result}
 

@@ -10,9 +10,10 @@ from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError, RecordError, RecordWarning
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import make_record, read_record, rod_of, to_dimensionless, write_record
+from tactile_bayes.record import rod_of, to_dimensionless, write_record
 from tactile_bayes.record.origin import Origin, column_entry, origins_of
 from tactile_bayes.record.table import Source
+from tactile_bayes.rig import Rig, make_record, read_record
 
 
 @pytest.mark.parametrize(
@@ -83,8 +84,6 @@ def test_one_value_for_all_samples(target, text, origin):
 @pytest.mark.parametrize(
     ("target", "text", "message"),
     [
-        ("force", "Fx", "columns: 'force' is no column of a record: did you mean 'force_x'?"),
-        ("Q", "Fx", "columns: 'Q' is no column of a record"),
         ("force_x", "0.5", "'0.5' is given for 'force_x', which is measured"),
         ("sweep", "-Fx", "'-Fx' is given for 'sweep', which has no unit, factor, sign or zero"),
         ("sweep", "2*Fx", "'2*Fx' is given for 'sweep', which has no unit, factor, sign or zero"),
@@ -156,8 +155,8 @@ def assert_same_measurement(record, other):
     ],
 )
 def test_a_rig_is_read_by_its_own_names_units_signs_and_zeros(tmp_path, name, options):
-    record = read_record(rig_file(tmp_path / name, **options), columns=NAMED, rod=WIRE)
-    assert_same_measurement(record, make_record(columns(), rod=WIRE))
+    record = read_record(rig_file(tmp_path / name, **options), Rig(rod=WIRE, file=NAMED))
+    assert_same_measurement(record, make_record(columns(), Rig(rod=WIRE)))
     assert [name for name in record if name not in columns()] == ["Zeit [s]"]  # what stands for a column is not kept
     assert record["Zeit [s]"].values.tolist() == list(range(6))
     write_record(record, tmp_path / "again.csv")
@@ -167,7 +166,7 @@ def test_a_rig_is_read_by_its_own_names_units_signs_and_zeros(tmp_path, name, op
 def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):
     path = rig_file(tmp_path / "rig.csv", delimiter=";", decimal=",")
     path.write_bytes(b"\xef\xbb\xbfsep=;\r\n" + path.read_bytes().replace(b"\n", b"\r\n"))
-    assert_same_measurement(read_record(path, columns=NAMED, rod=WIRE), make_record(columns(), rod=WIRE))
+    assert_same_measurement(read_record(path, Rig(rod=WIRE, file=NAMED)), make_record(columns(), Rig(rod=WIRE)))
 
 
 def test_units_in_names_are_read_without_being_told(tmp_path):
@@ -181,7 +180,7 @@ def test_units_in_names_are_read_without_being_told(tmp_path):
         "base_x [cm]": [5.0, 5.0],
     }
     table = {name: np.broadcast_to(values, 2) for name, values in table.items()}
-    record = read_record(rig_file(tmp_path / "rig.csv", table), rod=WIRE)
+    record = read_record(rig_file(tmp_path / "rig.csv", table), Rig(rod=WIRE))
     read = {name: values.values.tolist() for name, values in record.items()}
     assert read["drive_angle"] == [np.radians(60.0), np.radians(61.0)]
     assert (read["holding_moment"], read["force_x"], read["force_y"]) == ([0, 2e-3], [0, -3e-3], [0, 4e3])
@@ -199,8 +198,8 @@ def test_an_angle_that_counts_on_is_refused_with_what_to_subtract(tmp_path, lead
     path.write_text("\n".join(["Angle,Mz,Fx,Fy", *(f"{angle:.1f},1,2,3" for angle in angles), ""]), encoding="utf-8")
     given = {"drive_angle": f"{lead}Angle[{unit}]", "holding_moment": "Mz[Nm]", "force_x": "Fx[N]", "force_y": "Fy[N]"}
     with refused(RecordError, "line 2", "beyond a turn", f'drive_angle = "{advice}" under [file]'):
-        read_record(path, columns=given, split_sweeps=True, rod=WIRE)
-    angle = read_record(path, columns={**given, "drive_angle": advice}, split_sweeps=True, rod=WIRE).drive_angle
+        read_record(path, Rig(rod=WIRE, file={**given, "split_sweeps": True}))
+    angle = read_record(path, Rig(rod=WIRE, file={**given, "drive_angle": advice, "split_sweeps": True})).drive_angle
     assert np.abs(angle).max() <= 2.0 * np.pi
     np.testing.assert_allclose(np.cos(angle), np.cos(np.radians(angles)), atol=1e-12)
 
@@ -225,7 +224,7 @@ def test_two_units_that_contradict_each_other_are_refused(tmp_path, names, below
     first = given.get("force_x", names.split(",")[2])
     units = {unit for unit in ("kg", "mN", "N") if re.search(rf"\b{unit}\b|_{unit}", f"{first} {below.split(',')[2]}")}
     with refused(RecordError, *units):
-        read_record(path, columns=columns, split_sweeps=True, rod=WIRE)
+        read_record(path, Rig(rod=WIRE, file={**columns, "split_sweeps": True}))
 
 
 def test_a_description_may_leave_out_the_unit_in_the_name(tmp_path):
@@ -234,9 +233,9 @@ def test_a_description_may_leave_out_the_unit_in_the_name(tmp_path):
     columns = {"drive_angle": "A[deg]", "holding_moment": "Mz[N m]", "force_x": "Fx", "force_y": "Fy[N]"}
     path.write_text(text, encoding="utf-8")
     with refused(RecordError, "[N]", "[mN]"):
-        read_record(path, columns=columns, split_sweeps=True, rod=WIRE)
+        read_record(path, Rig(rod=WIRE, file={**columns, "split_sweeps": True}))
     path.write_text(text.replace("[N]", "[mN]"), encoding="utf-8")
-    assert read_record(path, columns=columns, split_sweeps=True, rod=WIRE).force_x[0] == 2e-3
+    assert read_record(path, Rig(rod=WIRE, file={**columns, "split_sweeps": True})).force_x[0] == 2e-3
 
 
 def test_units_in_the_header_are_converted_for_columns_and_attributes(tmp_path):
@@ -260,7 +259,7 @@ def test_units_in_the_header_are_converted_for_columns_and_attributes(tmp_path):
 
 
 def test_units_of_netcdf_variables_are_converted(tmp_path):
-    table = make_record(columns(), rod=WIRE)
+    table = make_record(columns(), Rig(rod=WIRE))
     scaled = table.copy(deep=True)
     scaled["force_x"].values *= 1e3
     scaled["force_x"].attrs["units"] = "mN"
@@ -279,30 +278,30 @@ def test_packed_integers_of_a_netcdf_file_are_unpacked(tmp_path):
 
 def test_dimensionless_records_take_degrees_and_no_other_unit(tmp_path):
     path = rig_file(tmp_path / "rig.csv", {**columns(), "drive_angle": np.degrees(columns()["drive_angle"])})
-    record = read_record(path, columns={"drive_angle": "drive_angle[deg]"})
+    record = read_record(path, Rig(file={"drive_angle": "drive_angle[deg]"}))
     assert (record.attrs["units"], record.attrs["units_source"]) == ("dimensionless", "assumed")
     np.testing.assert_allclose(record["drive_angle"], columns()["drive_angle"], rtol=1e-15)
     with refused(
         RecordError,
         f"{path}: line 1, column 'force_x' is in [mN], but the record is dimensionless, so that it takes [1]",
     ):
-        read_record(path, rod=Rod(), columns={"drive_angle": "drive_angle[deg]", "force_x": "force_x[mN]"})
+        read_record(path, Rig(rod=Rod(), file={"drive_angle": "drive_angle[deg]", "force_x": "force_x[mN]"}))
 
 
 def test_a_unit_of_force_says_that_the_record_is_si(tmp_path):
     path = rig_file(tmp_path / "rig.csv", columns())
     with refused(RecordError, "the record is SI, but rod_length and rod_flexural_rigidity of its rod are not stated"):
-        read_record(path, columns={"force_x": "force_x[N]"})
+        read_record(path, Rig(file={"force_x": "force_x[N]"}))
 
 
 def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
     path = rig_file(tmp_path / "rig.csv", columns())
     plain = read_record(path)
-    turned = read_record(path, columns={"force_x": "-force_y", "force_y": "force_x"})
+    turned = read_record(path, Rig(file={"force_x": "-force_y", "force_y": "force_x"}))
     assert turned["force_x"].values.tolist() == (-plain["force_y"].values).tolist()
     assert turned["force_y"].values.tolist() == plain["force_x"].values.tolist()
     path = rig_file(tmp_path / "rig.csv", columns(force_x=None))
-    twice = read_record(path, columns={"force_x": "-force_y", "force_y": "force_y"})
+    twice = read_record(path, Rig(file={"force_x": "-force_y", "force_y": "force_y"}))
     assert twice["force_x"].values.tolist() == (-twice["force_y"].values).tolist()
 
 
@@ -318,12 +317,12 @@ def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
         (
             {},
             {"force_y": "Fy[mm]"},
-            "line 1, column 'force_y' ('Fy' in the file) is in [mm], but takes N, kN, mN, µN or gf",
+            "line 1, column 'force_y' ('Fy' as given) is in [mm], but takes N, kN, mN, µN or gf",
         ),
         (
             {},
             {"holding_moment": "Moment[N]"},
-            "line 1, column 'holding_moment' ('Moment' in the file) is in [N], but takes N m, N mm, mN m, µN m or mN",
+            "line 1, column 'holding_moment' ('Moment' as given) is in [N], but takes N m, N mm, mN m, µN m or mN",
         ),
         ({}, {"base_y": "12[deg]"}, "column 'base_y' is in [deg], but takes m, cm, mm or µm"),
         ({}, {"force_x": "Fx (mN)[N]"}, "column 'Fx (mN)' is in [mN] by its name, but [N] is given for it"),
@@ -331,19 +330,19 @@ def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
         (
             {"Fy": ["1", "2", "", "4", "5", "6"]},
             {},
-            "line 4, column 'force_y' ('Fy' in the file): the value is missing (nan)",
+            "line 4, column 'force_y' ('Fy' as given): the value is missing (nan)",
         ),
         (
             {"Fz [ch1]": np.zeros(6)},
             {"force_y": "Fz [ch1]"},
-            "line 1, column 'force_y' ('Fz [ch1]' in the file) is in [ch1], but takes N, kN, mN, µN or gf",
+            "line 1, column 'force_y' ('Fz [ch1]' as given) is in [ch1], but takes N, kN, mN, µN or gf",
         ),
     ],
 )
 def test_what_does_not_fit_the_file_is_refused_with_its_place(tmp_path, changes, given, message):
     path = rig_file(tmp_path / "rig.csv", {**RIG, **changes})
     with refused(RecordError, message) as caught:
-        read_record(path, columns={**NAMED, **given}, rod=WIRE)
+        read_record(path, Rig(rod=WIRE, file={**NAMED, **given}))
     assert str(caught.value).startswith(f"{path}: ")
 
 
@@ -353,7 +352,7 @@ def test_what_does_not_fit_the_file_is_refused_with_its_place(tmp_path, changes,
 )
 def test_a_further_column_with_a_slash_is_kept_under_a_name_that_every_file_can_store(tmp_path, name, kept):
     path = rig_file(tmp_path / "rig.csv", {**RIG, name: np.arange(6.0)})
-    record = read_record(path, columns=NAMED, rod=WIRE)
+    record = read_record(path, Rig(rod=WIRE, file=NAMED))
     assert record[kept].values.tolist() == list(range(6))
     assert record[kept].attrs == {"units": "unknown", "long_name": name}
     for suffix in ("csv", "nc"):
@@ -365,7 +364,7 @@ def test_a_further_column_with_a_slash_keeps_its_description(tmp_path):
     path = rig_file(
         tmp_path / "rig.csv", {**RIG, "T / °C": np.arange(6.0)}, header=['# column "T / °C": number [°C] air']
     )
-    assert read_record(path, columns=NAMED, rod=WIRE)["T [°C]"].attrs == {"units": "°C", "long_name": "air"}
+    assert read_record(path, Rig(rod=WIRE, file=NAMED))["T [°C]"].attrs == {"units": "°C", "long_name": "air"}
 
 
 SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
@@ -379,13 +378,13 @@ SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
         (
             {"Fy": ["1", "2", "", "4", "5", "6"]},
             {},
-            "line 4, column 'force_y' ('Fy' in the file): the value is missing",
+            "line 4, column 'force_y' ('Fy' as given): the value is missing",
         ),
         (
             {"Moment": None},
             {"holding_moment": None},
             "there is no column 'holding_moment' (columns: Zeit [s], Hub, Richtung, Winkel [°], Fx (mN), Fy, a / b, "
-            "a [b]): add it, or say what stands for it, columns={'holding_moment': 'NAME[UNIT]'}, or "
+            "a [b]): add it, or say what stands for it, Rig(file={'holding_moment': 'NAME[UNIT]'}), or "
             'holding_moment = "NAME[UNIT]" under [file] of rig.toml, or declare the channel missing',
         ),
     ],
@@ -396,7 +395,7 @@ def test_what_is_wrong_with_a_measured_column_comes_before_a_name_that_cannot_be
     table = {name: values for name, values in {**RIG, **SLASHES, **changes}.items() if values is not None}
     named = {target: text for target, text in {**NAMED, **given}.items() if text is not None}
     with refused(RecordError, message):
-        read_record(rig_file(tmp_path / "rig.csv", table), columns=named, rod=WIRE)
+        read_record(rig_file(tmp_path / "rig.csv", table), Rig(rod=WIRE, file=named))
 
 
 def test_a_column_that_is_nearly_one_of_a_record_is_called_as_in_the_file(tmp_path):
@@ -404,7 +403,7 @@ def test_a_column_that_is_nearly_one_of_a_record_is_called_as_in_the_file(tmp_pa
     with refused(
         RecordError,
         "there is no column 'drive_angle', but a column 'drive/angle': did you mean 'drive_angle'? Rename it, or say "
-        "what stands for it, columns={'drive_angle': 'drive/angle'}, or "
+        "what stands for it, Rig(file={'drive_angle': 'drive/angle'}), or "
         'drive_angle = "drive/angle" under [file] of rig.toml',
     ):
         read_record(path)
@@ -413,19 +412,19 @@ def test_a_column_that_is_nearly_one_of_a_record_is_called_as_in_the_file(tmp_pa
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("A", "columns={'drive_angle': 'A[deg]'} of read_record, or drive_angle = \"A[deg]\" under [file] of rig.toml"),
-        ("-A", "columns={'drive_angle': '-A[deg]'} of read_record"),
-        ("-A+90", "columns={'drive_angle': '90-A[deg]'} of read_record"),
-        ("A-0.5", "columns={'drive_angle': '-0.5+A[deg]'} of read_record"),
+        ("A", "Rig(file={'drive_angle': 'A[deg]'}), or drive_angle = \"A[deg]\" under [file] of rig.toml"),
+        ("-A", "Rig(file={'drive_angle': '-A[deg]'})"),
+        ("-A+90", "Rig(file={'drive_angle': '90-A[deg]'})"),
+        ("A-0.5", "Rig(file={'drive_angle': '-0.5+A[deg]'})"),
     ],
 )
 def test_what_looks_like_degrees_may_be_said_to_be_in_the_words_of_the_file(tmp_path, given, message):
     table = {**columns(sweep=None, direction=None, drive_angle=None), "A": np.degrees(columns()["drive_angle"])}
     path = rig_file(tmp_path / "rig.csv", table)
     with refused(RecordError, message):
-        read_record(path, columns={"drive_angle": given}, split_sweeps=True)
+        read_record(path, Rig(file={"drive_angle": given, "split_sweeps": True}))
     correction = re.search(r"'drive_angle': '(.*?)'", message)[1]
-    record = read_record(path, columns={"drive_angle": correction}, split_sweeps=True)
+    record = read_record(path, Rig(file={"drive_angle": correction, "split_sweeps": True}))
     offset, sign = {"A": (0, 1), "-A": (0, -1), "-A+90": (90, -1), "A-0.5": (-0.5, 1)}[given]
     np.testing.assert_allclose(record["drive_angle"], np.radians(offset + sign * table["A"]), rtol=1e-12)
 
@@ -445,9 +444,9 @@ def test_the_case_of_a_name_is_no_obstacle_to_finding_what_was_meant(wanted, the
 
 def test_a_unit_in_the_header_and_another_one_given_contradict_each_other(tmp_path):
     path = rig_file(tmp_path / "rig.csv", header=["# column Fy: number [mN]"])
-    read_record(path, columns={**NAMED, "force_y": "Fy"}, rod=WIRE)
-    with refused(RecordError, "line 1, column 'force_y' ('Fy' in the file) is in [mN], but [N] is given for it"):
-        read_record(path, columns={**NAMED, "force_y": "Fy[N]"}, rod=WIRE)
+    read_record(path, Rig(rod=WIRE, file={**NAMED, "force_y": "Fy"}))
+    with refused(RecordError, "line 1, column 'force_y' ('Fy' as given) is in [mN], but [N] is given for it"):
+        read_record(path, Rig(rod=WIRE, file={**NAMED, "force_y": "Fy[N]"}))
 
 
 @pytest.mark.parametrize("sense", [1, -1])
@@ -459,7 +458,7 @@ def test_an_entry_reads_a_column_with_another_sign_and_zero(tmp_path, given, add
 
     def read(text):
         channels = ("holding_moment", "force_y")
-        return read_record(path, columns={"force_x": text}, rod=Rod(0.1, 1.2e-5), missing=channels)["force_x"]
+        return read_record(path, Rig(rod=Rod(0.1, 1.2e-5), file={"force_x": text, "missing": channels}))["force_x"]
 
     first = read(given)
     text = column_entry(first, sense=sense, added=added)
@@ -475,7 +474,7 @@ def test_a_column_is_scaled_by_its_factor(tmp_path):
     path = tmp_path / "counts.csv"
     path.write_text("sweep,direction,phi,counts\n0,forward,130,2000\n0,forward,120,-500\n")
     given = {"drive_angle": "90-0.1*phi[deg]", "force_x": "1e-3*counts[N]", "force_y": "-0.5*counts[mN]"}
-    record = read_record(path, columns=given, rod=WIRE, missing=["holding_moment"])
+    record = read_record(path, Rig(rod=WIRE, file={**given, "missing": ["holding_moment"]}))
     np.testing.assert_allclose(np.degrees(record.drive_angle), [77.0, 78.0], rtol=1e-12)
     np.testing.assert_allclose(record.force_x, [2.0, -0.5], rtol=1e-12)
     np.testing.assert_allclose(record.force_y, [-1.0, 0.25], rtol=1e-12)
@@ -485,5 +484,5 @@ def test_there_is_no_entry_after_a_conversion_by_the_rod(tmp_path):
     path = tmp_path / "lab.csv"
     path.write_text("sweep,direction,drive_angle [rad],Fx\n0,forward,1.2,18.25\n")
     missing = ("holding_moment", "force_y")
-    record = read_record(path, columns={"force_x": "Fx[mN]"}, rod=Rod(0.1, 1.2e-5), missing=missing)
+    record = read_record(path, Rig(rod=Rod(0.1, 1.2e-5), file={"force_x": "Fx[mN]", "missing": missing}))
     assert column_entry(to_dimensionless(record)["force_x"], added=1.0) == ""

@@ -8,10 +8,10 @@ import pytest
 from helpers.record_tables import WIRE
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.record import GrowingRecord, read_record
 from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.quantity import unit_of
 from tactile_bayes.record.spelling import is_misspelling, look_alikes, plain, visible
+from tactile_bayes.rig import GrowingRecord, Rig, read_record
 
 COLUMNS = {"holding_moment": "Mz[N mm]", "force_x": "Fx[mN]", "force_y": "Fy[mN]"}
 
@@ -57,7 +57,7 @@ def test_origins_of_columns(tmp_path, minus):
     path = tmp_path / "rig.csv"
     path.write_text("Angle,M\N{ZERO WIDTH SPACE}z,Fx,Fy\n30,1,2,3\n29,1,2,3\n", encoding="utf-8")
     given = {**COLUMNS, "drive_angle": f"90{minus}Angle[\N{MASCULINE ORDINAL INDICATOR}]", "force_x": f"{minus}Fx[mN]"}
-    record = read_record(path, columns=given, split_sweeps=True, rod=WIRE)
+    record = read_record(path, Rig(rod=WIRE, file={**given, "split_sweeps": True}))
     np.testing.assert_allclose(record.drive_angle, np.radians([60, 61]))
     np.testing.assert_allclose(record.force_x, -2e-3)
 
@@ -66,7 +66,7 @@ def test_what_cannot_be_read_is_named(tmp_path):
     path = tmp_path / "rig.csv"
     path.write_text("Angle,Mz,Fx,Fy\n30,1,1\N{THIN SPACE}2,3\n", encoding="utf-8")
     with refused(RecordError, "line 2, column 'Fx'", "U+2009 THIN SPACE"):
-        read_record(path, columns={**COLUMNS, "drive_angle": "Angle[deg]"}, split_sweeps=True, rod=WIRE)
+        read_record(path, Rig(rod=WIRE, file={**COLUMNS, "drive_angle": "Angle[deg]", "split_sweeps": True}))
     assert look_alikes("\N{ZERO WIDTH SPACE}") == " (U+200B ZERO WIDTH SPACE cannot be seen)"
     assert not look_alikes("µ é ß - °")
 

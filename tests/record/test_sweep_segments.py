@@ -7,9 +7,10 @@ from hypothesis import given
 
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.record import make_record, read_record, write_record
+from tactile_bayes.record import write_record
 from tactile_bayes.record.sweep_segments import split_at_turns, turning_points
 from tactile_bayes.record.table import Source, Table
+from tactile_bayes.rig import Rig, make_record, read_record
 
 
 def split(angle, **columns):
@@ -97,14 +98,14 @@ def table_of(**changes):
 def test_a_file_without_sweeps_is_split(tmp_path, suffix):
     missing = ("force_x", "force_y")
     labels = {"sweep": np.repeat([0, 1], 101), "direction": np.repeat(["forward", "backward"], 101)}
-    record = make_record(table_of(**labels), missing=missing)
+    record = make_record(table_of(**labels), Rig(file={"missing": missing}))
     path = tmp_path / f"record{suffix}"
     if suffix == ".nc":
         record.drop_vars(["sweep", "direction"]).to_netcdf(path, engine="h5netcdf")
     else:
         record.drop_vars(["sweep", "direction"]).to_dataframe().to_csv(path, index=False)
         path.write_text("# units: dimensionless\n" + path.read_text())
-    assert read_record(path, split_sweeps=True).identical(record)
+    assert read_record(path, Rig(file={"split_sweeps": True})).identical(record)
     with refused(
         RecordError,
         "there is no column 'sweep' (columns: base_x, base_y, drive_angle, holding_moment, force_x, force_y)",
@@ -112,12 +113,12 @@ def test_a_file_without_sweeps_is_split(tmp_path, suffix):
         read_record(path)
     with refused(
         RecordError,
-        "or have the record split where the drive turns back: split_sweeps=True, or split_sweeps = true under [file]",
+        "where the drive turns back: Rig(file={'split_sweeps': True}), or split_sweeps = true under [file]",
     ):
         read_record(path)
     write_record(record, path)
     with refused(RecordError, "column 'sweep' is there already: do without split_sweeps, or remove the column"):
-        read_record(path, split_sweeps=True)
+        read_record(path, Rig(file={"split_sweeps": True}))
 
 
 @pytest.mark.parametrize(
@@ -145,4 +146,4 @@ def test_what_cannot_be_split_is_refused_with_its_place(tmp_path, angle, message
     path = tmp_path / "record.csv"
     path.write_text("drive_angle,holding_moment\n" + "".join(f"{value},0.1\n" for value in angle))
     with refused(RecordError, f"{path}: {message}"):
-        read_record(path, split_sweeps=True, missing=("force_x", "force_y"))
+        read_record(path, Rig(file={"split_sweeps": True, "missing": ("force_x", "force_y")}))

@@ -10,7 +10,8 @@ from helpers.record_tables import WIRE, columns, edited
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, make_record, rod_of, to_dimensionless, to_si
+from tactile_bayes.record import CHANNELS, rod_of, to_dimensionless, to_si
+from tactile_bayes.rig import Rig, make_record
 
 # Numbers whose quotients are far from underflow, where digits would be lost.
 moderate = st.floats(-1e6, 1e6).filter(lambda value: value == 0 or abs(value) > 1e-280)
@@ -25,7 +26,7 @@ def test_units_convert_there_and_back(values, length, rigidity, diameter, turn):
     names = (*CHANNELS, "truth_contact_x", "truth_force_y")
     si = make_record(
         columns(**dict(zip(names, values.T, strict=True)), base_x=np.full(6, values[0, 0])),
-        rod=rod,
+        Rig(rod=rod),
         attrs={"load_cell_force_noise": 0.5, "load_cell_moment_noise": 0.25, "rig": "bench"},
     )
     dimensionless = to_dimensionless(si)
@@ -52,7 +53,7 @@ def test_units_convert_there_and_back(values, length, rigidity, diameter, turn):
 
 
 def test_a_record_in_si_stays_so_with_its_own_rod_only():
-    si = make_record(columns(), rod=WIRE)
+    si = make_record(columns(), Rig(rod=WIRE))
     assert to_si(si, WIRE) is si
     with refused(RecordError, "the record is SI already, with Rod(length=0.2,"):
         to_si(si, Rod(0.1, 1e-5))
@@ -67,4 +68,4 @@ def test_a_rod_of_another_diameter_is_refused():
 
 def test_a_conversion_that_overflows_is_refused():
     with refused(RecordError, "sample 5, column 'force_y': the value is inf"):
-        to_dimensionless(make_record(edited("force_y", 5, 1e308), rod=WIRE))
+        to_dimensionless(make_record(edited("force_y", 5, 1e308), Rig(rod=WIRE)))

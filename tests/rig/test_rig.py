@@ -17,8 +17,9 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, STANDARD, members
-from tactile_bayes.rig.rig import expanded, rig_of
+from tactile_bayes.rig.rig import rig_of
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.unknown import expanded
 from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -210,3 +211,17 @@ def test_a_rig_travels_to_another_process():
 def test_every_name_is_one_of_the_table():
     for name in (*PARAMETERS, *GROUPS, "base", "base_x", "base_4_y"):
         assert list(Rig(unknown={name: "default"}).entries) == [name]
+
+
+def test_a_rig_shows_what_is_said_and_no_addresses():
+    found = RigPrior({"friction": stats.norm(0.3, 0.1)}, np.eye(1), 0.0, "sha", posterior=None)
+    file = {"force_x": "-Fx[mN]", "split_sweeps": True}
+    said = {"lever": 0.0, "drift": "default", "backlash": stats.lognorm(0.5, scale=0.01)}
+    rig = Rig(Rod(0.1, 1e-5), LoadCell(force_noise=0.05, moment_noise=0.02), said, found, file)
+    assert repr(rig) == (
+        "Rig(rod=Rod(length=0.1, flexural_rigidity=1e-05, diameter=0.0), load_cell=LoadCell(force_noise=0.05, "
+        "moment_noise=0.02), unknown={'lever': 0.0, 'drift': 'default', 'backlash': lognorm(s=0.5, scale=0.01)}, "
+        "calibration=RigPrior(friction=norm(0.3, 0.1)), file={'force_x': '-Fx[mN]', 'split_sweeps': True})"
+    )
+    assert repr(Rig()) == "Rig()"
+    assert " at 0x" not in repr(Rig(unknown={"lever": stats.Mixture([stats.Normal(sigma=0.1)])}))

@@ -5,8 +5,8 @@ import pytest
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import MEASURED, read_record, rod_of, write_record
-from tactile_bayes.rig import Rig
+from tactile_bayes.record import MEASURED, rod_of, write_record
+from tactile_bayes.rig import Rig, read_record
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 from tactile_bayes.sweep import scan
 

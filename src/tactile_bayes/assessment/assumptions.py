@@ -23,7 +23,7 @@ from tactile_bayes.inference.parameters.nuisances import belongs, stated_values
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import STANDARD
-from tactile_bayes.rig.rig import DEFAULT
+from tactile_bayes.rig.unknown import DEFAULT
 from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 

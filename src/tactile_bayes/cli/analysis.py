@@ -170,8 +170,7 @@ def demo(
     output: Output,
 ) -> Answer:
     """Simulate a steel wire that sweeps along a parabola, and infer the contour with a band from its noisy record."""
-    from tactile_bayes.record import read_record
-    from tactile_bayes.rig import Rig
+    from tactile_bayes.rig import Rig, read_record
     from tactile_bayes.runs.contour import analyse
     from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 

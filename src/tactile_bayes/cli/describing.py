@@ -136,11 +136,11 @@ def _words(rig: Rig, said: dict[str, str]) -> Iterator[Any]:
         yield f"rod         {', '.join([*of_rod, *rod.shape_in_words('1/m')])}"
     entries = {} if cell is None else cell.entries()
     yield f"load cell   {_list(entries) or 'as the record states, or its noise is found'}"
-    yield f"columns     {_list(rig.file.columns) or 'as in the file'}"
-    if rig.file.split_sweeps:
+    yield f"columns     {_list(rig.format.columns) or 'as in the file'}"
+    if rig.format.split_sweeps:
         yield "sweeps      found by the turns of the drive"
-    if rig.file.missing:
-        yield f"missing     {', '.join(rig.file.missing)}"
+    if rig.format.missing:
+        yield f"missing     {', '.join(rig.format.missing)}"
     yield ""
     yield table_of(["parameter", "what is said of it"], said.items(), left=["parameter", "what is said of it"])
     yield ""
@@ -153,6 +153,4 @@ def _list(entries: Any) -> str:
 
 
 def _numbers(rig: Rig, said: dict[str, str]) -> dict[str, Any]:
-    from tactile_bayes.rig.rig_file import tables_of_rig
-
-    return {"rig": tables_of_rig(rig), "known": rig.known, "said": said}
+    return {"rig": rig.tables, "known": rig.known, "said": said}

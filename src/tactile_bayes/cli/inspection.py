@@ -70,10 +70,13 @@ class _FileOptions(RigOptions):
 
         rig = super().stated
         file = replace(
-            rig.file,
-            columns={**rig.file.columns, **assigned("--column", self.column, "COLUMN=NAME[UNIT], like force_x=Fx[mN]")},
-            split_sweeps=self.split_sweeps or rig.file.split_sweeps,
-            missing=(*rig.file.missing, *(self.missing or ())),
+            rig.format,
+            columns={
+                **rig.format.columns,
+                **assigned("--column", self.column, "COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
+            },
+            split_sweeps=self.split_sweeps or rig.format.split_sweeps,
+            missing=(*rig.format.missing, *(self.missing or ())),
         )
         cell = rig.load_cell
         return replace(
@@ -113,7 +116,7 @@ def inspect(
             measured, of_record = rig.read(record)
         found = inspect_record(measured, of_record, progress=show)
         beside = _beside(measured)
-        contents = [*_contents(found, of_record.file.columns), *(f"{name:<12}{text}" for name, text in beside)]
+        contents = [*_contents(found, of_record.format.columns), *(f"{name:<12}{text}" for name, text in beside)]
         files: Mapping[str, Path] = {}
         if out is not None:
             from tactile_bayes.runs.inspection import write_inspection

@@ -39,7 +39,8 @@ def measure(
     refuse_other_suffix(out)
     from tactile_bayes.errors import ParameterError
     from tactile_bayes.load_cell import LoadCell
-    from tactile_bayes.record import read_record, write_record
+    from tactile_bayes.record import write_record
+    from tactile_bayes.rig import read_record
     from tactile_bayes.rig.corrected import corrected
 
     stated = rig.stated

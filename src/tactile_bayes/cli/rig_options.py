@@ -87,7 +87,7 @@ class RigFile:
         RecordError
             If the file holds no record.
         """
-        from tactile_bayes.record import read_record
+        from tactile_bayes.rig import read_record
 
         rig = self.stated
         record = read_record(path, rig)

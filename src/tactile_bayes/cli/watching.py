@@ -21,7 +21,7 @@ from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tactile_bayes.record import GrowingRecord, Growth
+    from tactile_bayes.rig import GrowingRecord, Growth
     from tactile_bayes.runs.watch import Watch, WatchUpdate
 
 __all__ = ["watch"]
@@ -93,7 +93,7 @@ def watch(
     of each update, and of the end.
     """
     from tactile_bayes.errors import ParameterError
-    from tactile_bayes.record import GrowingRecord
+    from tactile_bayes.rig import GrowingRecord
     from tactile_bayes.runs.watch import open_watch
 
     if until_width is not None and between is None:
@@ -114,7 +114,7 @@ def watch(
         particles=particles,
         rig=stated.without_bare_cell,
     ) as watched:
-        follower = _Follower(record, growing, watched, stated.file.split_sweeps, output, poll, idle)
+        follower = _Follower(record, growing, watched, stated.format.split_sweeps, output, poll, idle)
         try:
             with acknowledge_interrupt(_STOPPING):
                 reason = follower.follow()

@@ -21,7 +21,8 @@ from tactile_bayes.datasets.specification_reading import read_specification, rea
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, COLUMNS, column_of, make_record
+from tactile_bayes.record import CHANNELS, COLUMNS, column_of
+from tactile_bayes.rig import Rig, make_record
 
 __all__ = ["contour_of", "record"]
 
@@ -153,7 +154,7 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
         rod = Rod(**{name: float(data[f"rod_{name}"]) for name in spec.rod})
     order = [name for name in COLUMNS if name in columns] + [name for name in columns if name not in COLUMNS]
     known = {name: columns[name] for name in order if column_of(name) is not None}
-    return make_record(known, rod=rod, attrs=attrs, load_cell_frame=spec.frame)
+    return make_record(known, Rig(rod=rod, load_cell=LoadCell(frame=spec.frame)), attrs=attrs)
 
 
 def _restore_limits(columns: dict[str, Any], cell: LoadCell) -> None:

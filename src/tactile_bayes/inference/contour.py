@@ -28,7 +28,8 @@ from tactile_bayes.inference.result import provenance
 from tactile_bayes.inference.starts.contour_start import Walk, walk_of
 from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
 from tactile_bayes.reconstruction import CONTACT_SIDES
-from tactile_bayes.rig.rig import Rig, expanded, rig_of
+from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.rig.unknown import expanded
 
 __all__ = ["Sampled", "calibrate_rig", "contours_of", "infer_contour", "rig_posterior", "sampled"]
 

@@ -8,9 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number, check_number
@@ -25,15 +26,13 @@ from tactile_bayes.distributions import (
     frozen,
     in_words,
     refuse_unknown_names,
+    stated_text,
     table_of_distribution,
+    text_or_unwritten,
 )
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.result import refuse_no_contour
-from tactile_bayes.rig.rig import UNWRITTEN
 from tactile_bayes.tasks.documents import read_json
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["Family", "PartlyKnown", "family_of"]
 
@@ -116,11 +115,10 @@ class Family:
     @property
     def text(self) -> str:
         """What is said of the parameters, as text; "not written" if a distribution is none of SciPy's."""
-        try:
-            said: dict[str, Any] = {**self.priors, **self.known}
-            return json.dumps({name: table_of_distribution(value) for name, value in said.items()})
-        except ParameterError:
-            return UNWRITTEN
+        said: dict[str, Any] = {**self.priors, **self.known}
+        return text_or_unwritten(
+            lambda: json.dumps({name: table_of_distribution(value) for name, value in said.items()})
+        )
 
     @classmethod
     def of(cls, posterior: xr.DataTree) -> Family:
@@ -132,10 +130,7 @@ class Family:
             If the posterior does not state it, since a distribution was none of SciPy's.
         """
         refuse_no_contour(posterior, "posterior")
-        text = posterior.attrs.get("family_parameters", UNWRITTEN)
-        if text == UNWRITTEN:
-            raise ParameterError("the posterior does not state its family, as a distribution of it is none of SciPy's")
-        said = read_json(text, "family_parameters")
+        said = read_json(stated_text(posterior.attrs, "family_parameters"), "family_parameters")
         return cls(str(posterior.attrs["family"]), **{n: distribution_of_table(v, n) for n, v in said.items()})
 
     def only(self, **said: Any) -> Family:

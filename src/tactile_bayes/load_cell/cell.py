@@ -128,10 +128,11 @@ class LoadCell(DataSheet):
 
         Examples
         --------
-        >>> from tactile_bayes.record import make_record
+        >>> from tactile_bayes.rig import Rig, make_record
         >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [0.5]}
         >>> attrs = {"load_cell_moment_noise": 0.02}
-        >>> LoadCell.from_record(make_record(columns, attrs=attrs, missing=("force_x", "force_y"))).moment_noise
+        >>> record = make_record(columns, Rig(file={"missing": ["force_x", "force_y"]}), attrs=attrs)
+        >>> LoadCell.from_record(record).moment_noise
         0.02
         """
         entries = stated_entries(validate(record))
@@ -233,9 +234,9 @@ class LoadCell(DataSheet):
 
         Examples
         --------
-        >>> from tactile_bayes.record import make_record
+        >>> from tactile_bayes.rig import Rig, make_record
         >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [0.5]}
-        >>> ideal = make_record(columns, missing=("force_x", "force_y"))
+        >>> ideal = make_record(columns, Rig(file={"missing": ["force_x", "force_y"]}))
         >>> measured = LoadCell(moment_noise=0.02).measure(ideal, rng=1)
         >>> float(measured["truth_holding_moment"][0]), round(float(measured["holding_moment"][0]), 3)
         (0.5, 0.507)

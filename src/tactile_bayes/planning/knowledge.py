@@ -20,7 +20,8 @@ from tactile_bayes.inference.result import contour_draws, known_of, posterior_dr
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import rod_of
-from tactile_bayes.rig.rig import DEFAULT, NOTHING, Rig, Unknown
+from tactile_bayes.rig.rig import Rig
+from tactile_bayes.rig.unknown import DEFAULT, NOTHING, Unknown
 from tactile_bayes.sweep import Drive, Rotation, blind_angles, record_template, recorded_drives
 from tactile_bayes.tasks.documents import read_json
 

@@ -1,9 +1,7 @@
 """The record of a tactile sensor: its schema, validation, units, frame, and files (CSV and NetCDF)."""
 
-from tactile_bayes.record.construction import make_record
-from tactile_bayes.record.files import read_record, write_record
+from tactile_bayes.record.files import write_record
 from tactile_bayes.record.frame import frame_of, in_frame, turned
-from tactile_bayes.record.growing import GrowingRecord, Growth
 from tactile_bayes.record.identity import record_hash
 from tactile_bayes.record.positions import means_of_positions, positions_of
 from tactile_bayes.record.schema import (
@@ -31,19 +29,15 @@ __all__ = [
     "REQUIRED",
     "Column",
     "Frame",
-    "GrowingRecord",
-    "Growth",
     "base_of_sample",
     "bases_of",
     "carried_sweeps",
     "column_of",
     "frame_of",
     "in_frame",
-    "make_record",
     "means_of_positions",
     "positions_of",
     "present_channels",
-    "read_record",
     "record_hash",
     "rod_of",
     "rows_of_sweeps",

@@ -57,20 +57,6 @@ def read_bag_table(path: Path, columns: Mapping[str, str]) -> Table:
     The time of a message is that of its header, if its topic has any, and a message without is none. All times are
     those of reception if the headers of a topic go back, state one time for different values, or have another clock
     than other topics. A message that is in the bag again counts once.
-
-    Parameters
-    ----------
-    path : Path
-        A file, or a folder as ROS 2 writes it.
-    columns : mapping of str to str
-        Origins of the columns of the record, as for `read_record`.
-
-    Raises
-    ------
-    RecordError
-        If the package rosbags is missing, the bag cannot be read, or no column is of one of its topics; if an element
-        has a number, and messages have different names for it; if the messages of a column are of several frames, or of
-        several publishers at a time; if there is no clock.
     """
     source = Source(str(path))
     with opened_bag(path, source) as reader:
@@ -109,13 +95,7 @@ class _Column(NamedTuple):
     """A turn in the unit of the field, if it is an angle."""
 
     def series(self, times: Index) -> tuple[Index, NDArray[Any]]:
-        """Return times and values in ascending order, each once.
-
-        Raises
-        ------
-        _ClockError
-            If times go back, or there are different values at one time.
-        """
+        """Return times and values in ascending order, each once; refuse times that go back or have two values."""
         at, values = times[self.field.messages], np.array(self.field.values)
         known = at > 0
         if self.is_smooth and values.dtype.kind == "f":
@@ -191,13 +171,7 @@ def _turn_in(unit: str | None) -> float:
 
 
 def _times(topics: Mapping[str, Topic], by_header: bool) -> dict[str, Index]:
-    """Return the times of all messages [ns], 0 if unknown, of their headers or of reception.
-
-    Raises
-    ------
-    _ClockError
-        If topics have different clocks.
-    """
+    """Return the times of all messages [ns], 0 if unknown, of headers or of reception; refuse different clocks."""
     times, delays = {}, {}
     for name, topic in topics.items():
         received, stamps = np.array(topic.received, dtype=np.int64), np.array(topic.stamps, dtype=np.int64)
@@ -215,13 +189,7 @@ def _times(topics: Mapping[str, Topic], by_header: bool) -> dict[str, Index]:
 
 
 def _table(topics: Mapping[str, Topic], times: Mapping[str, Index], asked: list[_Column], source: Source) -> Table:
-    """Return the table of the columns that were asked for, and of all other fields of their topics.
-
-    Raises
-    ------
-    _ClockError
-        If messages have no times.
-    """
+    """Return the table of the columns that were asked for, and of all other fields of their topics."""
     main = asked[0]
     at, _ = main.series(times[main.topic])
     cells, known = {}, np.ones(at.size, dtype=bool)

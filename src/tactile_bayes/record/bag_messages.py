@@ -24,17 +24,10 @@ _LONGEST = 64
 
 @dataclass(frozen=True)
 class Field:
-    """Values of a field, in the order of reception.
+    """Values of a field in the order of reception, with the numbers of the messages that have it.
 
-    Attributes
-    ----------
-    messages : list of int
-        Numbers of the messages of the topic that have it.
-    values : list
-    labels : set of str or None
-        Names that messages state for an element, as of a joint.
-    is_named : bool
-        True if an element is called by such a name, False if by its number.
+    `labels` are names that messages state for an element, as of a joint; `is_named` if it is called by one, not a
+    number.
     """
 
     is_named: bool
@@ -45,15 +38,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Topic:
-    """Messages of a topic, in the order of reception.
-
-    Attributes
-    ----------
-    received, stamps : list of int
-        Times of reception, and of the headers, 0 where there is none [ns].
-    publishers : list of int
-    fields : dict of str to Field
-    """
+    """Messages of a topic in the order of reception, with the times of it and of headers, 0 where none is [ns]."""
 
     received: list[int] = field(default_factory=list)
     stamps: list[int] = field(default_factory=list)

@@ -7,76 +7,30 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
-from tactile_bayes.checks import check_mapping, check_names, check_optional, refused, unmasked
+from tactile_bayes.checks import check_mapping, refused, unmasked
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attributes import completed_attributes
 from tactile_bayes.record.cell import number_in
-from tactile_bayes.record.schema import CHANNELS, Frame
+from tactile_bayes.record.schema import Frame
 from tactile_bayes.record.table import Cells, Source, Table
 from tactile_bayes.record.validation import checked_record
 
-__all__ = ["completed_record", "make_record"]
+__all__ = ["completed_record", "table_of_columns"]
+
+_FRAME = "the DataFrame"
+"""Name of a table of pandas in messages."""
 
 
-def make_record(
-    columns: Mapping[str, Any],
-    *,
-    rod: Rod | None = None,
-    attrs: Mapping[str, Any] | None = None,
-    missing: Collection[str] = (),
-    load_cell_frame: Frame | None = None,
-) -> xr.Dataset:
-    """Make a record from a mapping of columns.
-
-    Parameters
-    ----------
-    columns : mapping of str to array, shape (n_samples,)
-        The columns of `MEASURED`, in the units of the record (angles in radians), and any further columns of numbers
-        or text; a single value stands for a whole column. base_x and base_y are 0 by default. A channel that the rig
-        does not measure is a column of NaN, or named in `missing`. Attributes `units` and `long_name` of a column (of a
-        DataArray) are kept; true and false become 1 and 0.
-    rod : Rod, optional
-        The rod, with length and stiffness in SI units; the record is then SI. Without it, or with the dimensionless
-        `Rod()`, the record is dimensionless: lengths in rod lengths L, moments in EI/L, forces in EI/L². Units and rod
-        in `attrs` have precedence.
-    attrs : mapping, optional
-        Attributes of the record, strings and numbers: `load_cell_force_noise` and `load_cell_moment_noise` belong to
-        the data sheet of the sensor, in the record's units; others are kept as they are.
-    missing : collection of str, optional
-        Channels that the rig does not measure.
-    load_cell_frame : {"fixed", "turning"}, optional
-        Frame of force_x and force_y: the axes of the laboratory, or those of a load cell that turns with the drive,
-        along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0), with the drive angle φ0. By
-        default as `attrs` state, else "fixed".
-
-    Returns
-    -------
-    xr.Dataset
-        The record, dimension "sample"; every variable has attributes `units` and `long_name`.
-
-    Raises
-    ------
-    RecordError
-        If the columns are not a valid record; see `validate`.
-    ParameterError
-        If `missing` names something that is not a channel.
-
-    Examples
-    --------
-    >>> from tactile_bayes.record import present_channels
-    >>> record = make_record(
-    ...     {"sweep": 0, "direction": "forward", "drive_angle": [1.2, 1.3], "holding_moment": [0.0, 0.4]},
-    ...     missing=("force_x", "force_y"),
-    ... )
-    >>> record.attrs["units"], present_channels(record)
-    ('dimensionless', ('holding_moment',))
-    """
-    if not isinstance(columns, Mapping) or isinstance(columns, xr.DataTree):
-        raise refused("columns", columns, "give arrays by name of a column")
+def table_of_columns(columns: Mapping[str, Any] | pd.DataFrame, attrs: Mapping[str, Any] | None) -> Table:
+    """Return a table of columns by name, in which a single value stands for a whole column."""
     check_mapping("attrs", attrs, "give strings and numbers by name")
-    check_optional("the rod", rod, Rod)
+    if isinstance(columns, pd.DataFrame):
+        return Table(_cells_of_frame(columns), attrs or {}, Source(_FRAME))
+    if not isinstance(columns, Mapping) or isinstance(columns, xr.DataTree):
+        raise refused("columns", columns, "give arrays by name of a column, or a pandas DataFrame")
     cells = {str(name): (np.array(unmasked(values)), getattr(values, "attrs", {})) for name, values in columns.items()}
     source = Source()
     lengths = [len(values) for values, _ in cells.values() if values.ndim == 1]
@@ -87,12 +41,26 @@ def make_record(
         elif values.shape != shape:
             expected = f"others have {shape}" if lengths else "(n_samples,) is wanted"
             raise source.error(f"column {name!r} has shape {values.shape}, where {expected}: give one value per sample")
-    return completed_record(Table(cells, attrs or {}, source), rod, missing, load_cell_frame)
+    return Table(cells, attrs or {}, source)
+
+
+def _cells_of_frame(frame: pd.DataFrame) -> dict[str, Cells]:
+    names = [*frame.columns]
+    for name in names:
+        if not isinstance(name, str):
+            raise refused("columns", names, f"the column {name!r} has no text as its name: rename it")
+        if names.count(name) > 1:
+            raise refused("columns", names, f"there are two columns {name!r}: rename or remove one of them")
+    empty = {"na_value": np.nan}  # instead of the NA of pandas
+    return {
+        name: (column.to_numpy(copy=True, **(empty if pd.api.types.is_extension_array_dtype(column) else {})), {})
+        for name, column in frame.items()
+    }
 
 
 def completed_record(table: Table, rod: Rod | None, missing: Collection[str], frame: Frame | None) -> xr.Dataset:
     """Make a record from a table, with the given rod, missing channels and frame."""
-    columns = _with_missing(table, [missing] if isinstance(missing, str) else check_names("missing", missing))
+    columns = _with_missing(table, missing)
     return checked_record(Table(columns, completed_attributes(table.attrs, rod, frame, table.source), table.source))
 
 
@@ -100,13 +68,11 @@ def _with_missing(table: Table, missing: Collection[str]) -> dict[str, Cells]:
     """Add an empty column for each channel that is declared missing."""
     columns = dict(table.columns)
     for name in missing:
-        if name not in CHANNELS:
-            raise refused("missing", missing, f"{name!r} is no channel; the channels are {', '.join(CHANNELS)}")
         if name not in columns:
             columns[name] = (np.full(table.samples, np.nan), {})
         elif not all(_is_empty(cell) for cell in columns[name][0].tolist()):
             raise table.source.error(
-                f"column {name!r} has values, but is declared missing: leave it out of missing=, or empty the column"
+                f"column {name!r} has values, but is declared missing: do not declare it, or empty the column"
             )
     return columns
 

@@ -29,7 +29,7 @@ from tactile_bayes.record.csv_rows import Layout, read_rows
 from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
 from tactile_bayes.record.origin import any_meant, found_column, meant_kinds, origins_of
 from tactile_bayes.record.quantity import Unit, unit_of, units_disagree
-from tactile_bayes.record.rig_entry import rig_entry
+from tactile_bayes.record.rig_entry import file_entry
 from tactile_bayes.record.schema import MEASURED, Kind
 from tactile_bayes.record.table import Source, Table
 from tactile_bayes.tasks import write_atomically
@@ -192,11 +192,6 @@ def _units_below(file: BinaryIO, header: Header, meant: Mapping[str, Kind], sour
 
     In such a row a measured column has a unit, and no cell is a number; a unit of another column, like °C, may be
     unknown. Pure numbers alone are no row of units: 1 and - may be units, but readings too.
-
-    Raises
-    ------
-    RecordError
-        If a measured column has an unknown unit, or one that differs from the header.
     """
     cells = cells_in(next(iter(lines_below(file)), ""), header.delimiter)
     texts = [_without_brackets(cell) for cell in cells]
@@ -230,8 +225,7 @@ def _refuse_unit(
         raise source.line_error(
             number,
             f"this looks like a row of units, but {text!r} below {name!r} is none that is known here: empty that cell; "
-            "or remove the row, and give units with the columns, columns={'force_x': 'Fx[mN]'}, or "
-            f"{rig_entry('force_x', 'Fx[mN]')}",
+            f"or remove the row, and give units with the columns, {file_entry('force_x', 'Fx[mN]')}",
         )
     stated = header.descriptions.get(name, {}).get("units")
     if stated is not None and (is_measured or None not in (unit, unit_of(stated))) and units_disagree(stated, text):

@@ -43,26 +43,10 @@ _QUANTITY = re.compile(r"(?P<number>[^\[\]]+)(?:\[(?P<unit>[^\]]*)\])?")
 
 @dataclass(frozen=True)
 class Header:
-    """Content of a CSV file before its first sample.
+    """Content of a CSV file before its first sample; columns without a name have the name "".
 
-    Parameters
-    ----------
-    attrs : mapping
-        Attributes of the record; quantities are in SI, or in units of the rod.
-    descriptions : mapping of str to mapping
-        Descriptions of columns: `kind`, `units`, `long_name`.
-    heads : mapping of str to int
-        Line of the description of each column.
-    stated : mapping of str to int
-        Line of each attribute.
-    names : list of str
-        Names of the columns; "" for a column without a name.
-    delimiter : str
-        Separator of the columns.
-    line : int
-        Line of the names.
-    remarks : tuple of str
-        Commented lines without a meaning, with their numbers.
+    `descriptions` have `kind`, `units` and `long_name`; `heads` and `stated` are the lines of the descriptions and of
+    the attributes, and `line` is that of the names. Quantities in `attrs` are in SI, or in units of the rod.
     """
 
     attrs: Mapping[str, Any]

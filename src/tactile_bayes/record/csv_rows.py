@@ -37,22 +37,11 @@ _ROUNDING: dict[str, Any] = (
 
 @dataclass
 class Layout:
-    """Known properties of the columns of a file before they are read.
+    """Known properties of the columns of a file before they are read; `line` is the one above the first row.
 
-    Parameters
-    ----------
-    names : list of str
-        Names of the columns.
-    delimiter : str
-        Separator of the columns. If it is not a comma, a comma may separate decimals.
-    line : int
-        Line above the first row.
-    meant : mapping of str to {"integer", "number", "text"}
-        Kinds of the columns of a record.
-    described : mapping of str to {"integer", "number", "text"}
-        Kinds of other columns that the header describes.
-    guessed : dict of str to {"integer", "number", "text"}
-        Kinds of the remaining columns, inferred from their cells during reading.
+    `meant` are the kinds of the columns of a record, `described` those of others that the header describes, and
+    `guessed` those of the remaining ones, inferred from their cells. If the delimiter is no comma, a comma may separate
+    decimals.
     """
 
     names: list[str]

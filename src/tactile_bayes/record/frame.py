@@ -29,25 +29,7 @@ between the frames is not known."""
 
 
 def frame_of(record: xr.Dataset) -> Frame:
-    """Return the frame of a record's forces, "fixed" or "turning"; "fixed" if the record states none.
-
-    Parameters
-    ----------
-    record : xr.Dataset
-        A record.
-
-    Raises
-    ------
-    RecordError
-        If its attribute `load_cell_frame` has another value.
-
-    Examples
-    --------
-    >>> from tactile_bayes.record import make_record
-    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": 0.5, "force_x": 0.1}
-    >>> frame_of(make_record(columns, missing="force_y", load_cell_frame="turning"))
-    'turning'
-    """
+    """Return the frame of a record's forces, "fixed" or "turning"; "fixed" if the record states none."""
     return stated_frame(record.attrs, Source())
 
 
@@ -116,19 +98,7 @@ def in_frame(record: xr.Dataset, frame: Frame) -> xr.Dataset:
 
 
 def turned(force_x: ArrayLike, force_y: ArrayLike, angle: ArrayLike) -> tuple[Floats, Floats]:
-    """Components of forces along axes that are turned counter-clockwise by an angle.
-
-    Parameters
-    ----------
-    force_x, force_y : array_like
-        Components along the original axes, in any unit.
-    angle : array_like
-        Angle of the turn [rad]; broadcasts with the forces.
-
-    Returns
-    -------
-    (ndarray, ndarray)
-        Components along the turned axes, of the broadcast shape.
+    """Return the components of forces along axes that are turned counter-clockwise by an angle [rad].
 
     Examples
     --------

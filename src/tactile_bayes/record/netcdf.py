@@ -43,14 +43,6 @@ def write_netcdf(
     line of the file, beyond the end that HDF5 knows, is the SHA-256 of all bytes before it; `read_netcdf` verifies it.
     Programs that modify the file drop that line.
 
-    Parameters
-    ----------
-    content : xr.Dataset or xr.DataTree
-    path : path-like
-        File to write.
-    encoding : mapping of str to mapping, optional
-        Encoding of the variables of a dataset, as in xarray.
-
     Examples
     --------
     >>> import tempfile
@@ -97,30 +89,12 @@ def read_netcdf(
     sha256: str | None = None,
     **options: Any,
 ) -> Content:
-    """Read a NetCDF 4 file of this or another program into memory.
+    """Read a NetCDF 4 file of this or another program into memory, by `xarray.open_dataset` or `open_datatree`.
 
-    A file that ends with its SHA-256 is verified first, since damage may cause HDF5 to crash, to hang, or to take all
-    memory. A file of another program, or an earlier version, is read by a process of its own, with a limit of time
-    and memory, which takes half a second longer. Neither is read if it leads to other files.
-
-    Parameters
-    ----------
-    path : Path
-    opened : callable
-        `xarray.open_dataset` or `xarray.open_datatree`.
-    refused : callable
-        Makes the error from a description of the fault; the error names the file and says what to do.
-    sha256 : str, optional
-        SHA-256 of the file if it is stated elsewhere.
-    **options
-        Options of `xarray.open_dataset`.
-
-    Raises
-    ------
-    Exception
-        The error from `refused`, if the file is damaged, not a NetCDF 4 file, or leads to other files.
-    OSError
-        If it cannot be opened.
+    A file that ends with its SHA-256 is verified first, or with the one that is stated elsewhere, since damage may
+    cause HDF5 to crash, to hang, or to take all memory. A file of another program, or an earlier version, is read by a
+    process of its own, with a limit of time and memory, which takes half a second longer. One that is damaged, no
+    NetCDF 4 file, or leads to other files raises what `refused` makes of a description of the fault.
     """
     content = path.read_bytes()
     if sha256 is not None:

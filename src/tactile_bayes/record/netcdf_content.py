@@ -77,15 +77,7 @@ def is_cut_short(content: bytes) -> bool:
 
 
 def content_of(content: bytes, with_groups: bool) -> dict[str, Group]:
-    """Return the content of a NetCDF 4 file by the path of its groups, or of the root alone.
-
-    Raises
-    ------
-    UnsafeError
-        If the file refers to other files, or states more than its bytes can hold.
-    Exception
-        Any other, if it is damaged or not NetCDF 4.
-    """
+    """Return the content of a NetCDF 4 file by the path of its groups, or of the root alone; refuse an unsafe one."""
     with h5py.File(io.BytesIO(content), "r") as hdf5:
         refuse_unsafe(hdf5, len(content))
     with h5netcdf.File(io.BytesIO(content), "r", decode_vlen_strings=True, phony_dims="access") as file:
@@ -95,11 +87,8 @@ def content_of(content: bytes, with_groups: bool) -> dict[str, Group]:
 def refuse_unsafe(hdf5: h5py.File, size: int) -> None:
     """Refuse a file that leads to other files or to programs, or states more than its bytes can hold.
 
-    Raises
-    ------
-    UnsafeError
-        If it has links other than that of each object to its group, variables outside of it or made of others, types
-        other than numbers and text, filters of plugins, or sizes that do not fit the file.
+    It has no links but that of each object to its group, no variables outside of it or made of others, no types but
+    numbers and text, no filters of plugins, and no sizes that do not fit the file.
     """
     known, total, waiting = {_address(hdf5)}, 0, [(hdf5, 0)]
     _refuse_attributes(hdf5, size)
@@ -124,13 +113,7 @@ def refuse_unsafe(hdf5: h5py.File, size: int) -> None:
 
 
 def refuse_unsafe_variable(hdf5: h5py.File, name: str, size: int) -> None:
-    """Refuse a variable of the root as `refuse_unsafe` does, whatever else is in the file.
-
-    Raises
-    ------
-    UnsafeError
-        If it is not numbers or text in this file.
-    """
+    """Refuse a variable of the root as `refuse_unsafe` does, whatever else is in the file."""
     if not isinstance(part := _part_of(hdf5, name), h5py.Dataset):
         raise UnsafeError(f"/{name} is no variable")
     _size_of(part, size)

@@ -15,19 +15,10 @@ __all__ = ["content_elsewhere"]
 
 
 def content_elsewhere(content: bytes, with_groups: bool) -> dict[str, Group]:
-    """Return what `content_of` returns, from a process with limits of time and memory.
+    """Return what `content_of` returns, or raise what it raises, from a process with limits of time and memory.
 
     The process runs a script, not a function of multiprocessing: it then needs no `__main__` that can be imported, and
     a worker, which may have no processes of multiprocessing, can start it.
-
-    Raises
-    ------
-    UnsafeError
-        If the file is not to be read.
-    ValueError
-        If it is damaged, or the process ends over it.
-    OSError
-        If no process can be started.
     """
     if is_cut_short(content):
         raise ValueError("it is no HDF5, or has fewer bytes than it states")

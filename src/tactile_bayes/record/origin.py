@@ -16,7 +16,7 @@ import xarray as xr
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.quantity import OTHER_UNITS, accepted_units, converted, unit_of, units_disagree
-from tactile_bayes.record.schema import COLUMNS, DIRECTIONS, MEASURED, Column, Kind, column_of
+from tactile_bayes.record.schema import DIRECTIONS, MEASURED, Column, Kind, column_of
 from tactile_bayes.record.spelling import look_alikes, nearest, plain
 from tactile_bayes.record.storable import storable
 from tactile_bayes.record.table import Cells, Source, Table
@@ -55,20 +55,7 @@ _UNIT_IN_NAME = re.compile(
 class Origin:
     """Origin of a column of a record: offset + sign · factor · (a column of the file), or one value for all samples.
 
-    Parameters
-    ----------
-    column : str or None
-        Column of the file; None for a value.
-    unit : str or None
-        Unit of column (times factor) and offset, if it is given with the column or in its name.
-    sign : {1, -1}
-        −1 for an opposite sign in the file.
-    offset : float
-        Offset that is added.
-    value : str, float, int or None
-        Value for all samples.
-    factor : float
-        Positive number by which the column is multiplied.
+    `unit` is that of column (times factor) and offset, if it is given with the column or in its name.
     """
 
     column: str | None
@@ -92,22 +79,10 @@ class Origin:
 
 
 def column_entry(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, digits: int = 3) -> str:
-    """Return the source that reads a column of a record as sense · (its values) + added, as `read_record` takes it.
+    """Return the source that reads a column of a record as sense · (its values) + added, rounded to digits.
 
-    Parameters
-    ----------
-    column : xr.DataArray
-        Column of the record; if it was not read from a file, its name in the file is the same, and its unit too.
-    sense : {1, -1}
-    added : float
-        In the unit of the record.
-    digits : int
-        Number of significant digits of what is added.
-
-    Returns
-    -------
-    str
-        "" if the origin does not have the unit of the record, as after a conversion by the rod.
+    A column that was not read from a file has the same name and unit there. "" if its origin does not have the unit of
+    the record, as after a conversion by the rod.
 
     Examples
     --------
@@ -136,23 +111,9 @@ def with_origin(column: xr.DataArray) -> xr.DataArray:
 
 
 def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source) -> dict[str, Origin]:
-    """Find the origins of the columns of a record that have other names in a file.
+    """Find the origins of the columns of a record that have other names in a file, by their columns there.
 
-    Parameters
-    ----------
-    columns : mapping of str to str
-        Origins by the name of a column of a record; see `read_record`. Columns like "force_x [mN]" need no entry.
-    names : iterable of str
-        Columns of the file.
-    source : Source
-        The file.
-
-    Raises
-    ------
-    ParameterError
-        If a key is not a column of a record, or a value cannot be parsed.
-    RecordError
-        If the file lacks a column, or has a column with the name of one of the keys.
+    Columns like "force_x [mN]" need no entry. What cannot be parsed, or is not in the file, is refused.
 
     Examples
     --------
@@ -263,11 +224,7 @@ def _cells(target: str, origin: Origin, found: Cells, is_shared: bool, source: S
 
 
 def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
-    column = column_of(target)
-    if column is None:
-        near = nearest(target, COLUMNS)
-        hint = f"did you mean {near!r}?" if near else f"choose from {', '.join(MEASURED)}"
-        raise ParameterError(f"columns: {target!r} is no column of a record: {hint}")
+    column = _column(target)
     text = text.strip()
     readings = list(_readings(text))
     if plain(text) != text:

@@ -80,16 +80,6 @@ def text_array(texts: Sequence[str]) -> NDArray[Any]:
 
     NumPy gives every cell the width of the longest one, four bytes a character. If that is much, and less than half of
     it would be used, the cells are objects, with one object for equal texts.
-
-    Parameters
-    ----------
-    texts : sequence of str, length n_samples
-        Cells.
-
-    Examples
-    --------
-    >>> text_array(["a", "bc"]).dtype
-    dtype('<U2')
     """
     width = max(map(len, texts), default=0)
     if 4 * width * len(texts) > FREE and width * len(texts) > 2 * (sum(map(len, texts)) + len(texts)):

@@ -16,13 +16,7 @@ __all__ = ["columns_in"]
 
 
 def columns_in(path: Path, names: Sequence[str], what: str = "point") -> list[Floats]:
-    """Return columns of a CSV file, a line for each point or pose.
-
-    Raises
-    ------
-    ParameterError
-        If the file cannot be read, lacks a column, or a value is no number.
-    """
+    """Return columns of numbers of a CSV file, a line for each point or pose, or refuse it."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.DictReader(line for line in file if not line.startswith("#")))

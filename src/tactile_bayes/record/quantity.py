@@ -87,20 +87,7 @@ _SEPARATOR = re.compile(r"[\s·⋅•*.]+|-(?=[^\W\d])")
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit: its size in SI units, and its dimension.
-
-    Parameters
-    ----------
-    scale : Fraction
-        Size of the unit in SI units.
-    dimension : tuple of int
-        Powers of length, force, time and angle.
-
-    Examples
-    --------
-    >>> unit_of("N mm") == unit_of("mN·m")
-    True
-    """
+    """A unit: its size in SI units, and its dimension, powers of length, force, time and angle."""
 
     scale: Fraction
     dimension: Dimension
@@ -119,23 +106,10 @@ def unit_of(text: str) -> Unit | None:
     powers. N m², N·m^2, N*m2, N-m² and Nm² are the same unit. Without a separator a prefix has precedence over a
     product: mN is a millinewton, and m N a newton metre.
 
-    Parameters
-    ----------
-    text : str
-        Text of a unit.
-
-    Returns
-    -------
-    Unit or None
-
     Examples
     --------
-    >>> unit_of("µN m").scale
-    Fraction(1, 1000000)
-    >>> unit_of("Nmm2") == unit_of("N mm²")
-    True
-    >>> unit_of("furlong") is None
-    True
+    >>> unit_of("Nmm2") == unit_of("N mm²"), unit_of("furlong")
+    (True, None)
     """
     if len(text) > _LONGEST:
         return None
@@ -189,20 +163,7 @@ def _factors(piece: str) -> tuple[Unit, ...] | None:
 
 
 def converted(values: Any, unit: Unit, other: Unit) -> Any:
-    """Convert values to another unit of the same quantity, an array in place, with one rounding for a power of ten.
-
-    Parameters
-    ----------
-    values : float or array of float64
-        Values in `unit`.
-    unit, other : Unit
-        Unit of the values, and unit of the result.
-
-    Examples
-    --------
-    >>> converted(12.0, unit_of("mm"), unit_of("m"))
-    0.012
-    """
+    """Convert values to another unit of the same quantity, an array in place, with one rounding for a power of ten."""
     ratio = unit.scale / other.scale
     out = values if isinstance(values, np.ndarray) else None
     with np.errstate(over="ignore"):  # infinities are refused later
@@ -215,11 +176,6 @@ def converted(values: Any, unit: Unit, other: Unit) -> Any:
 
 def accepted_units(expected: str) -> str:
     """List common units of the quantity of a unit, for messages.
-
-    Parameters
-    ----------
-    expected : str
-        Text of a unit.
 
     Examples
     --------

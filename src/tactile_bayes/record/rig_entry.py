@@ -6,7 +6,7 @@ from typing import Any
 
 from tactile_bayes.tasks.documents import toml_key, toml_value
 
-__all__ = ["rig_entries", "rig_entry"]
+__all__ = ["file_entry", "rig_entries", "rig_entry"]
 
 
 def rig_entry(name: str, value: Any, table: str = "file") -> str:
@@ -18,6 +18,11 @@ def rig_entry(name: str, value: Any, table: str = "file") -> str:
     'force_x = "-Fx[mN]" under [file] of rig.toml'
     """
     return rig_entries({name: value}, table)
+
+
+def file_entry(name: str, value: Any) -> str:
+    """Return an entry of a rig's file format as an argument, and as one of rig.toml."""
+    return f"Rig(file={{{name!r}: {value!r}}}), or {rig_entry(name, value)}"
 
 
 def rig_entries(entries: dict[str, Any], table: str = "file") -> str:

@@ -47,29 +47,10 @@ LARGEST_DRIVE_ANGLE = 2.0 * math.pi + 0.5
 
 @dataclass(frozen=True)
 class Column:
-    """Meaning of a column of a record.
+    """Meaning of a column of a record, with its unit in an SI record, "1" for pure numbers and text.
 
-    Parameters
-    ----------
-    name : str
-        Name of the column.
-    kind : {"integer", "number", "text"}
-        Kind of the cells.
-    unit : str
-        Unit in an SI record; "1" for pure numbers and text.
-    scale : {"length_unit", "moment_unit", "force_unit"} or None
-        Property of `Rod` that converts a dimensionless value to SI by multiplication; None if both are equal.
-    long_name : str
-        Description of the column.
-    turning_name : str, optional
-        Description for a load cell that turns with the drive, if it differs.
-
-    Examples
-    --------
-    >>> COLUMNS["force_x"].unit, COLUMNS["force_x"].unit_in("dimensionless")
-    ('N', '1')
-    >>> COLUMNS["force_x"].long_name_in("fixed"), COLUMNS["force_x"].long_name_in("turning")
-    ('horizontal support reaction', 'axial support reaction')
+    `scale` is the property of `Rod` that converts a dimensionless value to SI by multiplication, None if both are
+    equal, and `turning_name` the description for a load cell that turns with the drive, if it differs.
     """
 
     name: str
@@ -184,23 +165,12 @@ ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
 
 
 def column_of(name: str) -> Column | None:
-    """Return the meaning of a column, or None for a column that the schema does not know.
-
-    Parameters
-    ----------
-    name : str
-        Name of a column, with or without the prefix `truth_`.
-
-    Returns
-    -------
-    Column or None
+    """Return the meaning of a column, with or without the prefix `truth_`; None for one that the schema does not know.
 
     Examples
     --------
-    >>> column_of("truth_contact_x").scale
-    'length_unit'
-    >>> column_of("temperature") is None
-    True
+    >>> column_of("truth_contact_x").scale, column_of("temperature")
+    ('length_unit', None)
     """
     known = COLUMNS.get(name.removeprefix("truth_"))
     if known is None or known.name == name:
@@ -224,22 +194,5 @@ def _plain(unit: str) -> str:
 
 
 def present_channels(record: xr.Dataset) -> tuple[str, ...]:
-    """Return the channels of a record that are not NaN throughout.
-
-    Parameters
-    ----------
-    record : xr.Dataset
-        A record.
-
-    Returns
-    -------
-    tuple of str
-
-    Examples
-    --------
-    >>> from tactile_bayes.record import make_record
-    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "force_y": [0.1], "force_x": [0.0]}
-    >>> present_channels(make_record(columns, missing=("holding_moment",)))
-    ('force_x', 'force_y')
-    """
+    """Return the channels of a record that are not NaN throughout."""
     return tuple(name for name in CHANNELS if not np.isnan(record[name].values).all())

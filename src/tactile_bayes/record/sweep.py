@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.record.quantity import unit_of
-from tactile_bayes.record.rig_entry import rig_entry
+from tactile_bayes.record.rig_entry import file_entry
 from tactile_bayes.record.schema import DIRECTIONS, LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source
 
@@ -88,10 +88,10 @@ def _beyond_a_turn(angle: Floats, sample: int, source: Source) -> str:
     )
     if unit is not None:
         return f"{what}; or, as it is stated in [{stated}], {_counted_on(angle, sample, stated, 1.0, source)}"
-    if not source.names:
+    if not source.name:
         return what
     origin = source.origins.get("drive_angle", "drive_angle")
-    return f"{what}, or state its unit, as in {_given(f'{origin}[deg]')}"
+    return f"{what}, or state its unit, as in {file_entry('drive_angle', f'{origin}[deg]')}"
 
 
 def _counted_on(angle: Floats, sample: int, stated: str, scale: float, source: Source) -> str:
@@ -105,12 +105,7 @@ def _counted_on(angle: Floats, sample: int, stated: str, scale: float, source: S
     if "drive_angle" in source.origins and "drive_angle" not in source.aliases:  # one value for all samples
         return f"{what}: give {values[sample] - turns * turn:.6g}[{stated}]"
     shift = f"{origin}{-turns * turn:+.15g}[{stated}]"
-    return f"{what}: {'subtract' if turns > 0 else 'add'} {abs(turns) * turn:.15g}, {_given(shift)}"
-
-
-def _given(origin: str) -> str:
-    """Return the origin of a drive angle as an argument and as an entry of a rig's file."""
-    return f"columns={{'drive_angle': {origin!r}}} of read_record, or {rig_entry('drive_angle', origin)}"
+    return f"{what}: {'subtract' if turns > 0 else 'add'} {abs(turns) * turn:.15g}, {file_entry('drive_angle', shift)}"
 
 
 def carried_sweeps(record: xr.Dataset) -> tuple[int, ...]:

@@ -34,20 +34,6 @@ SHARE = 0.1
 def turning_points(angle: Floats, least: float) -> list[int]:
     """Find the extremes of an angle after which it returns by more than a threshold, minima and maxima alternating.
 
-    Noise of an encoder below the threshold causes no turning point.
-
-    Parameters
-    ----------
-    angle : array of float, shape (n_samples,)
-        Drive angles in the order of measurement [rad].
-    least : float
-        Threshold [rad].
-
-    Returns
-    -------
-    list of int
-        Indices of samples, in ascending order.
-
     Examples
     --------
     >>> turning_points(np.array([0.0, 1.0, 0.9, 2.0, 3.0, 1.0, 0.0, 2.0]), least=0.5)
@@ -66,22 +52,12 @@ def turning_points(angle: Floats, least: float) -> list[int]:
 
 
 def split_at_turns(table: Table, length: float = 1.0) -> Table:
-    """Add sweeps and directions to a table, from its drive angle, or from the motion of its base.
+    """Add sweeps and directions to a table, from its drive angle, or from the motion of its base; see `FileFormat`.
 
-    A sweep ends where the drive turns, that is where the angle returns from an extreme by more than a tenth of its
-    whole range, and where the pivot moves. An angle that returns within one sample was reset: the sweeps before and
-    after it have the same direction. The direction of a sweep is that of a straight line fitted to its angles.
-
-    If the base moves in more than half of the steps, the drive carries it. A sweep then ends in the same way where the
-    base turns back on the line along which it moves most, and it is forward if the rod's left side leads: if the middle
-    of the unloaded rod, of this length [length], moves to its left on average. In a record of both kinds each stretch
-    in which the base rests while the drive turns, or is carried, is split in its own way.
-
-    Raises
-    ------
-    RecordError
-        If the table has sweeps or directions already; if it has no samples, or an angle that does not change or that
-        jumps by a turn.
+    If the base moves in more than half of the steps, the drive carries it. A sweep then ends where the base turns back
+    on the line along which it moves most, and it is forward if the rod's left side leads: if the middle of the unloaded
+    rod, of this length [length], moves to its left on average. In a record of both kinds each stretch in which the base
+    rests while the drive turns, or is carried, is split in its own way.
     """
     source = table.source
     table.refuse_empty()

@@ -24,42 +24,28 @@ _LONGEST = 1500
 
 @dataclass(frozen=True)
 class Source:
-    """Source of a table, for the positions in messages.
-
-    Parameters
-    ----------
-    name : str
-        Name of the file, if there is one.
-    lines : sequence or array of int, optional
-        First line of each sample in the file.
-    heads : mapping of str to int, optional
-        Line of the description of each column.
-    aliases : mapping of str to str, optional
-        Name of a column in the file, if it differs.
-    names : sequence of str, optional
-        Columns of the file.
-    origins : mapping of str to str, optional
-        Origins of columns, with sign and zero, in the form that `read_record` takes, without the unit.
-    stated : mapping of str to int, optional
-        Line of each attribute.
-    units : mapping of str to str, optional
-        Unit that is stated for a column, before conversion.
-    remarks : sequence of str, optional
-        Commented lines without a meaning.
-    notes : sequence of str, optional
-        What was assumed or left out as the file was read.
-    """
+    """Source of a table, for the positions in messages."""
 
     name: str = ""
+    """Name of the file; "" for columns that come from none."""
     lines: Sequence[int] | NDArray[np.int64] | None = None
+    """First line of each sample in the file."""
     heads: Mapping[str, int] = field(default_factory=dict)
+    """Line of the description of each column."""
     aliases: Mapping[str, str] = field(default_factory=dict)
+    """Name of a column in the file, if it differs."""
     names: Sequence[str] = ()
+    """Columns of the file."""
     origins: Mapping[str, str] = field(default_factory=dict)
+    """Origins of columns, with sign and zero, in the form of `FileFormat`, without the unit."""
     stated: Mapping[str, int] = field(default_factory=dict)
+    """Line of each attribute."""
     units: Mapping[str, str] = field(default_factory=dict)
+    """Unit that is stated for a column, before conversion."""
     remarks: Sequence[str] = ()
+    """Commented lines without a meaning."""
     notes: Sequence[str] = ()
+    """What was assumed or left out as the file was read."""
 
     def row(self, sample: int) -> str:
         """Return the name of a sample in messages."""
@@ -112,22 +98,12 @@ class Source:
     def column(self, name: str) -> str:
         """Return the name of a column in messages."""
         alias = self.aliases.get(name, name)
-        return f"column {name!r}" if alias == name else f"column {name!r} ({alias!r} in the file)"
+        return f"column {name!r}" if alias == name else f"column {name!r} ({alias!r} as given)"
 
 
 @dataclass(frozen=True)
 class Table:
-    """Table that may become a record.
-
-    Parameters
-    ----------
-    columns : mapping of str to Cells
-        Columns, all of one length.
-    attrs : mapping
-        Attributes of the record.
-    source : Source
-        Source of both.
-    """
+    """Table that may become a record: columns, all of one length, and attributes, with their source."""
 
     columns: Mapping[str, Cells]
     attrs: Mapping[str, Any]

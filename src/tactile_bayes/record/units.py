@@ -27,45 +27,18 @@ __all__ = ["assumed_units", "in_units_of_record", "rod_of", "to_dimensionless", 
 def rod_of(record: xr.Dataset) -> Rod:
     """Return the rod of a record; for a dimensionless record `Rod()`, with a diameter in rod lengths.
 
-    Parameters
-    ----------
-    record : xr.Dataset
-        A record.
-
     Raises
     ------
     RecordError
         If the attributes of the record state no rod, or an invalid one.
-
-    Examples
-    --------
-    >>> from tactile_bayes.record import make_record
-    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [1e-4]}
-    >>> rod_of(make_record(columns, rod=Rod(0.1, 1.2e-5), missing=("force_x", "force_y")))
-    Rod(length=0.1, flexural_rigidity=1.2e-05, diameter=0.0)
     """
     return stated_rod(record.attrs, Source())
 
 
 def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
-    """Replace the rod that a record states, without a change of its values.
+    """Replace the rod that a record states, by default by itself, without a change of its values.
 
-    Parameters
-    ----------
-    record : xr.Dataset
-        A record.
-    rod : Rod, optional
-        Rod in the units of the record; by default the record is returned unchanged. Beside an SI record one without a
-        length gives the shape of its rod.
-
-    Returns
-    -------
-    xr.Dataset
-
-    Raises
-    ------
-    ParameterError
-        If the record is dimensionless and the rod is not.
+    A rod without a length gives the shape of that of an SI record; a dimensionless record takes no other.
     """
     check_optional("the rod", rod, Rod)
     if rod is None:
@@ -81,30 +54,16 @@ def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
 
 
 def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
-    """Convert a record to the units of its rod: lengths L, moments EI/L, forces EI/L².
+    """Convert a record to the units of its rod, unless it is in them: lengths L, moments EI/L, forces EI/L².
 
     Equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945. The data sheet of the load cell is converted with
     the columns. Columns that the schema does not know are kept as they are.
 
-    Parameters
-    ----------
-    record : xr.Dataset
-        A record. If it is dimensionless, it is returned unchanged.
-
-    Returns
-    -------
-    xr.Dataset
-
-    Raises
-    ------
-    RecordError
-        If `record` is not a record.
-
     Examples
     --------
-    >>> from tactile_bayes.record import make_record
+    >>> from tactile_bayes.rig import Rig, make_record
     >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [6e-5]}
-    >>> record = make_record(columns, rod=Rod(0.1, 1.2e-5), missing=("force_x", "force_y"))
+    >>> record = make_record(columns, Rig(Rod(0.1, 1.2e-5), file={"missing": ["force_x", "force_y"]}))
     >>> float(to_dimensionless(record)["holding_moment"][0])
     0.5
     """
@@ -116,30 +75,10 @@ def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
 def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
     """Convert a dimensionless record to SI units with a rod; the inverse of `to_dimensionless`.
 
-    Parameters
-    ----------
-    record : xr.Dataset
-        A dimensionless record, or an SI record with the same rod.
-    rod : Rod
-        Rod with length [m] and flexural rigidity [N m²]; its diameter and rest curvature must be those of the record's
-        rod.
-
-    Returns
-    -------
-    xr.Dataset
-
     Raises
     ------
     RecordError
-        If `record` is not a record, or has a rod of another diameter or rest curvature.
-
-    Examples
-    --------
-    >>> from tactile_bayes.record import make_record
-    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [0.5]}
-    >>> record = to_si(make_record(columns, missing=("force_x", "force_y")), Rod(0.1, 1.2e-5))
-    >>> float(record["holding_moment"][0]), record["holding_moment"].attrs["units"]
-    (6e-05, 'N m')
+        If `record` is not a record, or its rod has another diameter or shape in lengths of the rod.
     """
     stated = rod_of(record)
     if record.attrs.get("units") == "SI":
@@ -177,15 +116,10 @@ def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
 
 
 def in_units_of_record(table: Table, rod: Rod | None) -> Table:
-    """Convert every column that the schema knows to the unit of the record.
+    """Convert every column that the schema knows to the unit of the record, or refuse its unit.
 
     The attribute `units`, or else the rod, determines whether the record is SI or dimensionless; without both, a column
     with a unit like newtons or millimetres makes it SI. Arrays of float64 are converted in place.
-
-    Raises
-    ------
-    RecordError
-        If a column has the unit of another quantity, or an unknown one.
     """
     attrs: dict[str, Any] = dict(table.attrs)
     if "units" not in attrs and rod is None and any(_is_physical(*item) for item in table.columns.items()):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tactile_bayes.record.attributes import checked_attributes, stated_frame
 from tactile_bayes.record.origin import ORIGIN
 from tactile_bayes.record.parsing import parsed_column
-from tactile_bayes.record.rig_entry import rig_entry
+from tactile_bayes.record.rig_entry import file_entry
 from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, column_of, same_unit
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.record.storable import is_storable, is_storable_attribute, not_storable, storable
@@ -54,9 +54,9 @@ def validate(record: xr.Dataset) -> xr.Dataset:
 
     Examples
     --------
-    >>> from tactile_bayes.record import make_record
+    >>> from tactile_bayes.rig import Rig, make_record
     >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.3, 1.2], "holding_moment": [0.0, 0.4]}
-    >>> make_record(columns, missing=("force_x", "force_y"))
+    >>> make_record(columns, Rig(file={"missing": ["force_x", "force_y"]}))
     Traceback (most recent call last):
     ...
     tactile_bayes.errors.RecordError: sweep 0 is labelled 'forward', but its drive angle decreases, from 1.3 rad (sample 0) to 1.2 rad (sample 1): label it 'backward', or put its samples in the order in which they were measured
@@ -134,7 +134,7 @@ def _checked_column_attributes(
 
 def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
     unknown = [name for name in columns if column_of(name) is None]
-    is_file = bool(source.names)
+    is_file = bool(source.name)
     for name in MEASURED:
         if name in columns:
             continue
@@ -149,17 +149,11 @@ def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
         else:
             continue
         if is_file:
-            what += f", or say what stands for it, columns={{{name!r}: {stands!r}}}, or {rig_entry(name, stands)}"
+            what += f", or say what stands for it, {file_entry(name, stands)}"
         if name in CHANNELS:
-            what += (
-                f", or declare the channel missing, with an empty column or missing=({name!r},), or "
-                f"{rig_entry('missing', [name])}"
-            )
+            what += f", or declare the channel missing, with an empty column, {file_entry('missing', [name])}"
         elif name in ("sweep", "direction"):
-            what += (
-                ", or have the record split where the drive turns back: split_sweeps=True, or "
-                f"{rig_entry('split_sweeps', True)}"
-            )
+            what += f", or have the record split where the drive turns back: {file_entry('split_sweeps', True)}"
         elif not is_required:
             what += f", or add a column {name!r} (0 for a pivot in the origin)"
         raise source.error(what)

@@ -8,8 +8,8 @@ from typing import Any
 
 import xarray as xr
 
+from tactile_bayes.distributions import UNWRITTEN
 from tactile_bayes.inference.result import is_streamed
-from tactile_bayes.rig.rig import UNWRITTEN
 from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["command_of", "hindrances", "python_lines"]

@@ -46,17 +46,7 @@ class Corrected(NamedTuple):
 
 
 def corrected(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]) -> Corrected:
-    """Return a record and its rig with deviations from what is stated corrected.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        The record.
-    load_cell : LoadCell
-        The stated load cell.
-    rig : mapping of str to float
-        Parameters of the rig by name, known ones and inferred ones, in the record's units; others have no effect.
-    """
+    """Return a record and its rig with deviations from what is stated corrected; other parameters have no effect."""
 
     def by_channel(kind: str, default: float) -> np.ndarray[Any, np.dtype[np.float64]]:
         return np.array([rig.get(f"{channel}_{kind}", default) for channel in _CHANNEL_NAMES])

@@ -2,47 +2,30 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import Any, Literal, cast
 
-import numpy as np
+import xarray as xr
 
-from tactile_bayes.checks import as_number, check_kind, check_mapping, check_optional, shown
-from tactile_bayes.distributions import Distribution, check_distribution, frozen
+from tactile_bayes.checks import check_kind, check_optional, check_path
+from tactile_bayes.distributions import Distribution, in_words, stated_text, text_or_unwritten
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record.spelling import nearest
 from tactile_bayes.rig.file_format import FileFormat
-from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, STANDARD, members, parameter_named
+from tactile_bayes.rig.parameters import STANDARD, members
+from tactile_bayes.rig.rig_file import named_in_errors, read_tables, stated_in, tables_of, text_of, write_file
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.unknown import DEFAULT, Unknown, checked_unknown, expanded
+from tactile_bayes.tasks.documents import read_toml
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-__all__ = ["DEFAULT", "NOTHING", "Rig", "Unknown", "expanded", "rig_of", "rod_with"]
-
-Unknown = float | Distribution | Literal["default"]
-"""What is said of a parameter: a number if it is known, a distribution, or "default" for its default distribution."""
-
-DEFAULT: Literal["default"] = "default"
-
-NOTHING: Mapping[str, float] = MappingProxyType(
-    {name: float(PARAMETERS[next(members(name))].neutral or 0.0) for name in STANDARD}
-)
-"""Unknowns of a rig that is as stated: everything that is unknown of a real rig is known, and is as stated."""
-
-UNWRITTEN = "not written"
-"""Text of a rig of which a distribution is none of SciPy's."""
+__all__ = ["Rig", "rig_of", "rod_with"]
 
 _SHAPE = ("rest_curvature", "taper", "stem", "length")
-
-_BASES = ("base", "base_x", "base_y")
-"""Names of the shifts of all pivots but the first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +50,9 @@ class Rig:
         else is as stated. "nothing": all is as stated, without friction.
     calibration : RigPrior, optional
         Joint distribution of parameters that a known object has shown, from `calibrate_rig`.
-    file : FileFormat
-        How the rig writes its records.
+    file : FileFormat or mapping
+        How the rig writes its records; a mapping is the table [file] of rig.toml, like
+        {"force_x": "-Fx[mN]", "split_sweeps": True}.
 
     Raises
     ------
@@ -81,26 +65,42 @@ class Rig:
     >>> rig = Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02), unknown={"lever": 0.0})
     >>> rig.known
     {'lever_x': 0.0, 'lever_y': 0.0}
+    >>> Rig(unknown={"friction": stats.halfnorm(scale=0.3)}, file={"force_x": "-Fx[mN]"})
+    Rig(unknown={'friction': halfnorm(0, 0.3)}, file={'force_x': '-Fx[mN]'})
     """
 
     rod: Rod | None = None
     load_cell: LoadCell | None = None
     unknown: Mapping[str, Unknown] | Literal["nothing"] = field(default_factory=dict)
     calibration: RigPrior | None = None
-    file: FileFormat = field(default_factory=FileFormat)
+    file: FileFormat | Mapping[str, Any] = field(default_factory=FileFormat)
 
     def __post_init__(self) -> None:
         check_optional("the rod", self.rod, Rod)
         check_optional("load_cell", self.load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
         check_optional("calibration", self.calibration, RigPrior, "give that of a rig from calibrate_rig")
-        check_kind("file", self.file, FileFormat, "give FileFormat(columns={'force_x': '-Fx[mN]'})")
-        object.__setattr__(self, "unknown", MappingProxyType(_checked(self.unknown)))
+        if not isinstance(self.file, FileFormat):
+            object.__setattr__(self, "file", FileFormat.of(self.file))
+        object.__setattr__(self, "unknown", MappingProxyType(checked_unknown(self.unknown)))
         if self.calibration is not None:
             both = sorted(set(self._expanded) & set(self.calibration.priors))
             if both:
                 raise ParameterError(
                     f"unknown has {', '.join(both)}, which the calibration of the rig has found: leave one of the two"
                 )
+
+    def __repr__(self) -> str:
+        cell, found = self.load_cell, self.calibration
+        of_cell = "" if cell is None else ", ".join(f"{name}={value!r}" for name, value in cell.entries().items())
+        words = [(n, repr(v) if isinstance(v, float | str) else in_words(v)) for n, v in self.entries.items()]
+        said = {
+            "rod": "" if self.rod is None else repr(self.rod),
+            "load_cell": "" if cell is None else f"LoadCell({of_cell})",
+            "unknown": f"{{{', '.join(f'{name!r}: {text}' for name, text in words)}}}" if words else "",
+            "calibration": "" if found is None else repr(found),
+            "file": repr(self.format.table) if self.format.table else "",
+        }
+        return f"Rig({', '.join(f'{name}={text}' for name, text in said.items() if text)})"
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "unknown": self.entries}
@@ -112,6 +112,11 @@ class Rig:
     def entries(self) -> dict[str, Unknown]:
         """What `unknown` says of parameters and groups."""
         return dict(cast("Mapping[str, Unknown]", self.unknown))  # checked and written out at the beginning
+
+    @property
+    def format(self) -> FileFormat:
+        """How the rig writes its records."""
+        return cast("FileFormat", self.file)  # made at the beginning
 
     @property
     def _expanded(self) -> dict[str, Unknown]:
@@ -172,9 +177,20 @@ class Rig:
         FileNotFoundError
             If there is no such file.
         """
-        from tactile_bayes.rig.rig_file import read_rig
+        path = check_path("the rig", path, "give a file rig.toml")
+        with named_in_errors(path):
+            return cls.of_tables(read_tables(path), path.parent)
 
-        return read_rig(path)
+    @classmethod
+    def of_tables(cls, tables: Mapping[str, Any], folder: Path = Path()) -> Rig:
+        """Return the rig that tables state, as in rig.toml; the path of the rod's shape is relative to the folder.
+
+        Raises
+        ------
+        ParameterError
+            If an entry is unknown, misspelt or impossible.
+        """
+        return cls(**stated_in(tables, folder))
 
     @classmethod
     def of(cls, posterior: xr.DataTree) -> Rig:
@@ -185,26 +201,24 @@ class Rig:
         ParameterError
             If the posterior does not state it, since a distribution was none of SciPy's.
         """
-        import xarray as xr  # takes long to load
-
-        from tactile_bayes.rig.rig_file import rig_of_tables
-        from tactile_bayes.tasks.documents import read_toml
-
         check_kind("posterior", posterior, xr.DataTree, "give a result of infer_contour")
-        text = posterior.attrs.get("rig")
-        if not isinstance(text, str) or text == UNWRITTEN:
-            raise ParameterError("the posterior does not state its rig, as one of its distributions is none of SciPy's")
-        return rig_of_tables(read_toml(text))
+        return cls.of_tables(read_toml(stated_text(posterior.attrs, "rig")))
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """Tables that state the rig, as in rig.toml; the inverse of `of_tables`.
+
+        Raises
+        ------
+        ParameterError
+            If a distribution is none of SciPy's, which text cannot state.
+        """
+        return tables_of(self.rod, self.load_cell, self.entries, self.calibration, self.format)
 
     @property
     def text(self) -> str:
         """The rig as text, as in its file; "not written" if one of its distributions is none of SciPy's."""
-        from tactile_bayes.rig.rig_file import text_of_rig
-
-        try:
-            return text_of_rig(self)
-        except ParameterError:
-            return UNWRITTEN
+        return text_or_unwritten(lambda: text_of(self.tables))
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the rig to a TOML file, whole or not at all.
@@ -214,9 +228,7 @@ class Rig:
         ParameterError
             If a distribution is none of SciPy's, which text cannot state.
         """
-        from tactile_bayes.rig.rig_file import write_rig
-
-        write_rig(self, path)
+        write_file(self.tables, check_path("path", path, "give a file rig.toml"))
 
 
 def rig_of(rig: Rig | None) -> Rig:
@@ -236,59 +248,3 @@ def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
     length = rig.get("length", rod.length)
     curvature = rig.get("rest_curvature", rod.mean_rest_curvature * rod.length / length)
     return rod.reshaped(curvature, rig.get("taper", rod.taper), rig.get("stem"), length)
-
-
-def expanded(unknown: Mapping[str, Unknown]) -> dict[str, Unknown]:
-    """Return what is said of each parameter, groups first, so that one of a group may be an exception.
-
-    Examples
-    --------
-    >>> expanded({"moment_bias": 0.1, "bias": "default"})
-    {'moment_bias': 0.1, 'force_x_bias': 'default', 'force_y_bias': 'default'}
-    """
-    of_groups = {member: value for name, value in unknown.items() if name in GROUPS for member in GROUPS[name]}
-    return {**of_groups, **{name: value for name, value in unknown.items() if name not in GROUPS}}
-
-
-def _checked(unknown: Any) -> dict[str, Unknown]:
-    if isinstance(unknown, str) and unknown == "nothing":
-        return dict(NOTHING)
-    correction = 'give numbers and distributions by name, like {"lever": 0.0}, or "nothing"'
-    check_kind("unknown", unknown, Mapping, correction)
-    check_mapping("unknown", unknown, correction)
-    return {name: _said_of(name, frozen(value)) for name, value in unknown.items()}
-
-
-def _said_of(name: str, value: Any) -> Unknown:
-    _refuse_unknown_name(name)
-    if isinstance(value, str):
-        if value == DEFAULT:
-            return DEFAULT
-        raise ParameterError(f'unknown[{name!r}] is {shown(value)}: give a number, a distribution, or "default"')
-    number = as_number(value)
-    if number is None:
-        check_distribution(name, value)
-        found: Distribution = value
-        return found
-    for member in members(name):
-        parameter = PARAMETERS.get(member)
-        low, high = (parameter.low, parameter.high) if parameter is not None else (-np.inf, np.inf)
-        if not low and member not in (*MAY_VANISH, *GROUPS["discrepancy"]):
-            low = math.ulp(0.0)
-        if not (math.isfinite(number) and low <= number <= high):
-            raise ParameterError(f"unknown[{name!r}] is {number!r}: give a finite number from {low:.4g} to {high:.4g}")
-    return number
-
-
-def _refuse_unknown_name(name: Any) -> None:
-    names: Collection[str] = (*PARAMETERS, *GROUPS, *_BASES)
-    if isinstance(name, str) and (name in names or parameter_named(name) is not None):
-        if (shift := BASE.fullmatch(name)) and int(shift[1]) < 2:
-            raise ParameterError(
-                f"{name} is never unknown: a shift of pivot and object together changes no reading. Results are "
-                "relative to the first pivot as stated; add the uncertainty of its position"
-            )
-        return
-    near = nearest(str(name), names)
-    hint = f"did you mean {near!r}?" if near else f"there are {', '.join((*GROUPS, *PARAMETERS))} and base"
-    raise ParameterError(f"a rig has no parameter {name!r}: {hint}")

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tactile_bayes.checks import as_number, check_array, check_kind, check_number, check_path, shown
+from tactile_bayes.checks import as_number, check_array, check_kind, check_number, shown
 from tactile_bayes.distributions import distribution_of_table, table_of_distribution
 from tactile_bayes.errors import ParameterError, TactileBayesError
 from tactile_bayes.load_cell import LoadCell
@@ -25,12 +25,12 @@ from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, members, parameter_named
-from tactile_bayes.rig.rig import NOTHING, Rig
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.unknown import NOTHING
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
-__all__ = ["file_of_rig", "read_rig", "rig_of_tables", "tables_of_rig", "text_of_rig", "write_rig"]
+__all__ = ["file_of", "named_in_errors", "read_tables", "stated_in", "tables_of", "text_of", "write_file"]
 
 _ROD_UNITS = {
     "length": "m",
@@ -62,109 +62,81 @@ _HEAD = """\
 """
 
 
-def read_rig(path: str | os.PathLike[str]) -> Rig:
-    """Read a rig from a TOML file; see `Rig.read`."""
-    path = check_path("the rig", path, "give a file rig.toml")
+def read_tables(path: Path) -> dict[str, Any]:
+    """Read the tables of a TOML file."""
+    with open(path, encoding="utf-8-sig") as file:
+        text = file.read(_LARGEST + 1)
+    if len(text) > _LARGEST:
+        raise ParameterError(f"it has more than {_LARGEST} characters, and is no file of a rig")
+    return read_toml(text)
+
+
+@contextmanager
+def named_in_errors(path: Path) -> Iterator[None]:
+    """Begin the message of what is wrong with a file by its path."""
     try:
-        with open(path, encoding="utf-8-sig") as file:
-            text = file.read(_LARGEST + 1)
-        if len(text) > _LARGEST:
-            raise ParameterError(f"it has more than {_LARGEST} characters, and is no file of a rig")
-        return rig_of_tables(read_toml(text), path.parent)
+        yield
     except (TactileBayesError, UnicodeDecodeError) as error:
         raise ParameterError(f"{path}: {error}") from error
 
 
-def write_rig(rig: Rig, path: str | os.PathLike[str]) -> None:
-    """Write a rig to a TOML file, whole or not at all; see `Rig.write`."""
-    path, text = check_path("path", path, "give a file rig.toml"), file_of_rig(rig)
+def write_file(tables: Mapping[str, Any], path: Path) -> None:
+    """Write tables to a TOML file, whole or not at all."""
     with write_atomically(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.write_text(file_of(tables), encoding="utf-8", newline="\n")
 
 
-def file_of_rig(rig: Rig) -> str:
-    """Return the whole text of the file of a rig.
-
-    Raises
-    ------
-    ParameterError
-        If a distribution is none of SciPy's, which text cannot state.
-    """
-    return _HEAD + text_of_rig(rig)
+def file_of(tables: Mapping[str, Any]) -> str:
+    """Return the whole text of the file with tables of a rig."""
+    return _HEAD + text_of(tables)
 
 
-def text_of_rig(rig: Rig) -> str:
-    """Return the text in TOML that states a rig.
-
-    Raises
-    ------
-    ParameterError
-        If a distribution is none of SciPy's, which text cannot state.
-    """
-    tables = tables_of_rig(rig)
-    unknown = tables.pop("unknown") if isinstance(tables.get("unknown"), str) else None
-    first = "" if unknown is None else f"unknown = {toml_value(unknown)}\n\n"
+def text_of(tables: Mapping[str, Any]) -> str:
+    """Return the text in TOML of tables of a rig."""
+    unknown = tables.get("unknown")
+    first = f"unknown = {toml_value(unknown)}\n\n" if isinstance(unknown, str) else ""
     return first + "\n".join(
         f"[{name}]\n" + "".join(f"{toml_key(key)} = {toml_value(value)}\n" for key, value in table.items())
         for name, table in tables.items()
+        if not isinstance(table, str)
     )
 
 
-def tables_of_rig(rig: Rig) -> dict[str, Any]:
-    """Return the tables that state a rig; `rig_of_tables` is the inverse.
-
-    Raises
-    ------
-    ParameterError
-        If a distribution is none of SciPy's, which text cannot state.
-    """
+def tables_of(
+    rod: Rod | None,
+    load_cell: LoadCell | None,
+    unknown: Mapping[str, Any],
+    calibration: RigPrior | None,
+    file: FileFormat,
+) -> dict[str, Any]:
+    """Return the tables that state the arguments of `Rig`; the inverse of `stated_in`."""
     tables: dict[str, Any] = {}
-    if rig.rod is not None:
-        usual = {"length": 1.0, "flexural_rigidity": 1.0} if rig.rod.is_dimensionless else {}
-        given = {name: getattr(rig.rod, name) for name in _TABLES["rod"] if hasattr(rig.rod, name)}
+    if rod is not None:
+        usual = {"length": 1.0, "flexural_rigidity": 1.0} if rod.is_dimensionless else {}
+        given = {name: getattr(rod, name) for name in _TABLES["rod"] if hasattr(rod, name)}
         texts = {name: value.text if isinstance(value, Along) else value for name, value in given.items()}
         tables["rod"] = {n: v for n, v in texts.items() if v is not None and v != usual.get(n, 0.0)}
-    if rig.load_cell is not None:
-        tables["load_cell"] = rig.load_cell.entries()
-    file: dict[str, Any] = dict(rig.file.columns)
-    if rig.file.split_sweeps:
-        file["split_sweeps"] = True
-    if rig.file.missing:
-        file["missing"] = list(rig.file.missing)
-    if file:
-        tables["file"] = file
-    if rig.entries == dict(NOTHING):
+    if load_cell is not None:
+        tables["load_cell"] = load_cell.entries()
+    if file.table:
+        tables["file"] = file.table
+    if unknown == dict(NOTHING):
         tables["unknown"] = "nothing"
-    elif rig.entries:
-        said = rig.entries.items()
-        tables["unknown"] = {n: v if isinstance(v, str) else table_of_distribution(v) for n, v in said}
-    if rig.calibration is not None:
-        found = rig.calibration
+    elif unknown:
+        tables["unknown"] = {n: v if isinstance(v, str) else table_of_distribution(v) for n, v in unknown.items()}
+    if calibration is not None:
         tables["calibration"] = {
-            "source": found.source,
-            "error": found.error,
-            "parameters": {name: table_of_distribution(prior) for name, prior in found.priors.items()},
-            "correlation": found.correlation.tolist(),
-            "stated": {n: v.item() if isinstance(v, np.generic) else v for n, v in found.stated.items()},
+            "source": calibration.source,
+            "error": calibration.error,
+            "parameters": {name: table_of_distribution(prior) for name, prior in calibration.priors.items()},
+            "correlation": calibration.correlation.tolist(),
+            "stated": {n: v.item() if isinstance(v, np.generic) else v for n, v in calibration.stated.items()},
         }
     return tables
 
 
-def rig_of_tables(tables: Mapping[str, Any], folder: Path = Path()) -> Rig:
-    """Return the rig that tables state.
-
-    Parameters
-    ----------
-    tables : mapping
-        Tables rod, load_cell, file, unknown and calibration, as in rig.toml.
-    folder : Path
-        Folder to which the path of the rod's shape is relative.
-
-    Raises
-    ------
-    ParameterError
-        If a key is unknown or misspelt, or a value impossible.
-    """
+def stated_in(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the arguments of `Rig` that tables state; see `Rig.of_tables`."""
     _refuse_unknown(tables, _TABLES, "the rig")
     for name, table in tables.items():
         if name != "unknown" or table != "nothing":
@@ -174,13 +146,13 @@ def rig_of_tables(tables: Mapping[str, Any], folder: Path = Path()) -> Rig:
     rod = None if said is None else _rod(said, folder)
     is_si = rod is not None and not rod.is_dimensionless
     calibration = tables.get("calibration")
-    return Rig(
-        rod=rod,
-        load_cell=None if "load_cell" not in tables else _load_cell(tables["load_cell"], is_si),
-        unknown=_unknown(tables.get("unknown", {}), is_si),
-        calibration=None if calibration is None else _calibration(calibration),
-        file=_file(tables.get("file", {})),
-    )
+    return {
+        "rod": rod,
+        "load_cell": None if "load_cell" not in tables else _load_cell(tables["load_cell"], is_si),
+        "unknown": _unknown(tables.get("unknown", {}), is_si),
+        "calibration": None if calibration is None else _calibration(calibration),
+        "file": tables.get("file", {}),
+    }
 
 
 def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
@@ -233,14 +205,6 @@ def _load_cell(said: Mapping[str, Any], is_si: bool) -> LoadCell:
         else:
             entries[name] = _quantity(value, LOAD_CELL_UNITS[name], f"load_cell.{name}", is_si)
     return LoadCell.from_entries(entries)
-
-
-def _file(said: Mapping[str, Any]) -> FileFormat:
-    columns = {name: value for name, value in said.items() if name not in ("split_sweeps", "missing")}
-    missing = said.get("missing", [])
-    check_kind("file.missing", missing, list, "give a list of channels, like ['force_x']")
-    texts = {name: repr(value) if as_number(value) is not None else value for name, value in columns.items()}
-    return FileFormat(texts, said.get("split_sweeps", False), tuple(missing))
 
 
 def _unknown(said: Mapping[str, Any] | str, is_si: bool) -> Any:

@@ -12,7 +12,7 @@ import xarray as xr
 from scipy import stats
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.distributions import Distribution, numbers_of
+from tactile_bayes.distributions import Distribution, in_words, numbers_of
 
 __all__ = ["RigPrior"]
 
@@ -49,6 +49,9 @@ class RigPrior:
     source: str
     stated: Mapping[str, Any] = field(default_factory=dict)
     posterior: xr.DataTree | None = None
+
+    def __repr__(self) -> str:
+        return f"RigPrior({', '.join(f'{name}={in_words(prior)}' for name, prior in self.priors.items())})"
 
     @property
     def entries(self) -> dict[str, Any]:

@@ -13,8 +13,8 @@ from tactile_bayes.errors import ParameterError, RecordWarning, TactileBayesErro
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng
-from tactile_bayes.record import CHANNELS, MEASURED, read_record, rod_of, write_record
-from tactile_bayes.rig import Rig
+from tactile_bayes.record import CHANNELS, MEASURED, rod_of, write_record
+from tactile_bayes.rig import Rig, read_record
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR
 from tactile_bayes.sweep import scan
 from tactile_bayes.tasks import replace_together

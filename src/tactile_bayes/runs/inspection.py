@@ -14,7 +14,7 @@ from tactile_bayes.diagnostics.inspection import Inspection
 from tactile_bayes.diagnostics.inspection.shown_rig import shown_rig
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.rig import Rig
-from tactile_bayes.rig.rig_file import file_of_rig
+from tactile_bayes.rig.rig_file import file_of
 from tactile_bayes.runs.folder import Folder
 from tactile_bayes.runs.names import INSPECTION
 
@@ -97,7 +97,7 @@ def _rig_file(inspection: Inspection, rig: Rig) -> str:
     """Return the text of rig.toml, with a last line by which it is known again as long as nobody edits it."""
     against = [" ".join(message.split()) for message in inspection.messages] if inspection.is_suspect else []
     comments = "".join(f"# {message}\n" for message in ["inspect has found:", *against]) if against else ""
-    text = file_of_rig(shown_rig(inspection, rig)) + ("\n" + comments if comments else "")
+    text = file_of(shown_rig(inspection, rig).tables) + ("\n" + comments if comments else "")
     return f"{text}\n{_last_line(text)}"
 
 

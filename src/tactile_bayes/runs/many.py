@@ -22,8 +22,8 @@ from tactile_bayes.errors import ParameterError, TactileBayesError
 from tactile_bayes.inference.ensembles import SamplerSettings, settings_of
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
-from tactile_bayes.record import read_record
 from tactile_bayes.record.bag import is_bag
+from tactile_bayes.rig import read_record
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.runs.contour import analyse
 from tactile_bayes.runs.folder import Folder

@@ -21,8 +21,8 @@ from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN, Rod
-from tactile_bayes.record import make_record
 from tactile_bayes.record.schema import column_attributes
+from tactile_bayes.rig import make_record
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep.drive import Carried, Direction, Drive, Motion, Rotation, drives_of
 from tactile_bayes.sweep.events import SweepEvents, events_of
@@ -287,7 +287,7 @@ def scan(
             "the rod does not come free of the object: give angles before it too"
         )
     record = {name: np.concatenate([of_sweep[name] for of_sweep in columns]) for name in columns[0]}
-    return Scan(make_record(record, rod=rod), tuple(sweeps), contour)
+    return Scan(make_record(record, Rig(rod=rod)), tuple(sweeps), contour)
 
 
 def _rotations(base: Any, options: Mapping[str, Any]) -> list[Drive]:

@@ -11,7 +11,8 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, make_record
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.sweep.drive import Carried, Drive
 
 __all__ = ["blind_angles", "record_template"]
@@ -63,4 +64,4 @@ def record_template(drives: Sequence[Drive], drive_angles: Floats, rod: Rod | No
     columns: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
     columns["drive_angle"] = columns["drive_angle"] + load_cell.misread(columns["direction"])
     loads = {name: np.zeros(columns["sweep"].size) for name in CHANNELS}
-    return make_record(columns | loads, rod=rod, load_cell_frame=load_cell.frame or "fixed")
+    return make_record(columns | loads, Rig(rod=rod, load_cell=LoadCell(frame=load_cell.frame or "fixed")))

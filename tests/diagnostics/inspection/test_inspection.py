@@ -329,7 +329,7 @@ def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
     np.savetxt(tmp_path / "lab.csv", table, delimiter=",", header="Motor,Mz [N mm],Fx,Fy", comments="")
 
     def read(**own):
-        return tb.read_record(tmp_path / "lab.csv", columns=columns | own, split_sweeps=True, rod=ROD)
+        return tb.read_record(tmp_path / "lab.csv", tb.Rig(rod=ROD, file={**columns | own, "split_sweeps": True}))
 
     (sentence,) = words(read())
     (zero,) = re.findall(r'force_y = "(.*?)"', sentence)

@@ -23,9 +23,9 @@ from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLE
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import CHANNELS, make_record
+from tactile_bayes.record import CHANNELS
 from tactile_bayes.record.attributes import same_rod
-from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig import NOTHING, Rig, make_record
 from tactile_bayes.rig.rig import rod_with
 from tactile_bayes.sweep import Translation, scan
 
@@ -633,7 +633,7 @@ def test_zeros_and_noises_are_expected_in_the_unit_of_the_readings():
     """A cell that counts has zeros and noises of counts."""
     record = make_record(
         {"sweep": 0, "direction": "forward", "drive_angle": [1.0, 1.1, 1.2], "holding_moment": [0.0, 1.0, 2.0]},
-        missing=("force_x", "force_y"),
+        Rig(file={"missing": ("force_x", "force_y")}),
     )
     gain = ((-900.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     names = ["moment_bias", "moment_drift"]

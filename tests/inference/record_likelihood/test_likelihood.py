@@ -22,9 +22,9 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLE
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
+from tactile_bayes.record import CHANNELS, in_frame, rod_of
 from tactile_bayes.record.units import with_rod
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.sweep import Motion, Translation, scan
 
 SHARE = {False: 3e-4, True: 1e-6}

@@ -26,8 +26,8 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import with_rod
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.parameters import GROUPS
-from tactile_bayes.rig.rig import expanded
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.unknown import expanded
 from tactile_bayes.uncertainty.band import contour_band
 
 PIN, OBJECT = Circle(r=0.2, q=0.5), Parabola(0.7, 0.45)

@@ -9,10 +9,10 @@ from scipy.integrate import cumulative_simpson
 import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import ContourError, ParameterError
-from tactile_bayes.record import read_record, record_hash, rod_of, to_dimensionless, to_si, write_record
+from tactile_bayes.record import record_hash, rod_of, to_dimensionless, to_si, write_record
 from tactile_bayes.record.attributes import same_rod
 from tactile_bayes.record.units import with_rod
-from tactile_bayes.rig import Rig
+from tactile_bayes.rig import Rig, read_record
 
 ARC = tb.Rod(0.2, 2.4e-3, 7e-4, rest_curvature=2.5)
 CIRCLE = tb.contours.Circle(0.06, 0.1)
@@ -52,7 +52,7 @@ def test_a_rest_curvature_given_completes_a_record_that_does_not_state_it(tmp_pa
     record = tb.scan(CIRCLE, rig=Rig(rod=ARC), drive_step=0.1).record
     del record.attrs["rod_rest_curvature"]
     write_record(record, tmp_path / "arc.csv")
-    assert rod_of(read_record(tmp_path / "arc.csv", rod=ARC)) == ARC
+    assert rod_of(read_record(tmp_path / "arc.csv", Rig(rod=ARC))) == ARC
 
 
 @pytest.mark.parametrize("length", [1.0, 0.2])

@@ -36,7 +36,7 @@ def shown_rig(found: Inspection, rig: Rig) -> Rig:
     """
     columns = {name: column_entry(found.record[name], added=-zero) for name, zero in _zeros(found)}
     columns = {name: text for name, text in columns.items() if text}
-    rig = replace(rig, file=replace(rig.file, columns={**rig.file.columns, **columns}))
+    rig = replace(rig, file=replace(rig.format, columns={**rig.format.columns, **columns}))
     cell = found.load_cell
     if found.load_cell_source != "unloaded samples" or cell is None:
         return rig

@@ -22,8 +22,9 @@ from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod
 from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, parameter_named
 
 if TYPE_CHECKING:
-    from tactile_bayes.rig.rig import Rig, Unknown
+    from tactile_bayes.rig.rig import Rig
     from tactile_bayes.rig.rig_prior import RigPrior
+    from tactile_bayes.rig.unknown import Unknown
 
 __all__ = [
     "BIASES",

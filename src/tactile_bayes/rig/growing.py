@@ -6,26 +6,21 @@ import hashlib
 import io
 import os
 import time
-from collections.abc import Collection, Mapping
 from itertools import pairwise
 from statistics import median
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.checks import check_path
 from tactile_bayes.errors import RecordError
-from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record.csv_format import read_csv_content
-from tactile_bayes.record.files import record_in, refuse_no_file
-from tactile_bayes.record.reading import Reading
-from tactile_bayes.record.schema import Frame
+from tactile_bayes.record.files import refuse_no_file
 from tactile_bayes.record.sweep import carried_sweeps
-
-if TYPE_CHECKING:
-    from tactile_bayes.rig import Rig
+from tactile_bayes.rig.reading import record_in
+from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["GrowingRecord", "Growth"]
 
@@ -73,8 +68,8 @@ class GrowingRecord:
     ----------
     path : path-like
         A file with suffix .csv.
-    rig, columns, split_sweeps, rod, missing, load_cell_frame
-        As in `read_record`. With `split_sweeps` the sweeps of former samples may change.
+    rig : Rig, optional
+        As in `read_record`. Where it finds sweeps by the turns of the drive, those of former samples may change.
 
     Raises
     ------
@@ -87,29 +82,19 @@ class GrowingRecord:
     >>> from pathlib import Path
     >>> with tempfile.TemporaryDirectory() as directory:
     ...     path = Path(directory) / "record.csv"
-    ...     growing = GrowingRecord(path, missing=["force_x", "force_y"])
+    ...     growing = GrowingRecord(path, Rig(file={"missing": ["force_x", "force_y"]}))
     ...     _ = path.write_text("sweep,direction,drive_angle,holding_moment\\n0,forward,1.2,0.1\\n0,forw")
     ...     now = growing.poll()
     ...     print(now.record.sizes["sample"], growing.poll())
     1 None
     """
 
-    def __init__(
-        self,
-        path: str | os.PathLike[str],
-        rig: Rig | None = None,
-        *,
-        columns: Mapping[str, str] | None = None,
-        split_sweeps: bool = False,
-        rod: Rod | None = None,
-        missing: Collection[str] = (),
-        load_cell_frame: Frame | None = None,
-    ) -> None:
+    def __init__(self, path: str | os.PathLike[str], rig: Rig | None = None) -> None:
         self._path = check_path("path", path)
         refuse_no_file(self._path)
         if self._path.suffix.lower() != ".csv":
             raise RecordError(f"{self._path}: only a .csv file can be followed while it grows")
-        self._reading = Reading.of(rig, columns, split_sweeps, rod, missing, load_cell_frame)
+        self._rig = rig_of(rig)
         self._seen: tuple[int, int, int] | None = None
         self._content = b""
         self._left_out: set[int] = set()
@@ -121,8 +106,6 @@ class GrowingRecord:
 
         Raises
         ------
-        ParameterError
-            If an option is not valid.
         OSError
             If the file is there and cannot be opened.
         """
@@ -166,10 +149,10 @@ class GrowingRecord:
                 return None  # not even the names of columns
             try:
                 file = io.BytesIO(b"\n".join(lines))
-                table = read_csv_content(file, str(self._path), self._reading.columns)
+                table = read_csv_content(file, str(self._path), self._rig.format.columns)
                 if not table.samples:
                     return None
-                record = record_in(table, self._reading)
+                record = record_in(table, self._rig)
                 break
             except RecordError as error:
                 wrong = sorted(set(error.lines) - self._left_out)

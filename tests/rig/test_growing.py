@@ -8,7 +8,8 @@ import xarray as xr
 
 from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
-from tactile_bayes.record import GrowingRecord, read_record, write_record
+from tactile_bayes.record import write_record
+from tactile_bayes.rig import GrowingRecord, Rig, read_record
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +32,8 @@ def write(path, *parts):
     return path
 
 
-def polled(path, **options):
-    return GrowingRecord(path, **options).poll()
+def polled(path):
+    return GrowingRecord(path).poll()
 
 
 def with_cell(row, place, text):
@@ -216,7 +217,7 @@ def test_the_scatter_of_an_encoder_is_no_fault(path, measured, quantum):
 def test_sweeps_can_be_split_while_they_come(path, lines, measured):
     bare = [",".join(line.split(",")[2:]) for line in [lines[0][-1], *lines[1]]]
     head = [line for line in lines[0] if line.startswith("#") and "column" not in line]
-    growing = GrowingRecord(path, split_sweeps=True)
+    growing = GrowingRecord(path, Rig(file={"split_sweeps": True}))
     write(path, head, bare[:2])
     now = growing.poll()
     assert now.record is None

@@ -9,9 +9,8 @@ from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record import GrowingRecord, make_record, read_record, rod_of, with_rod, write_record
-from tactile_bayes.rig import Rig
-from tactile_bayes.rig.file_format import FileFormat
+from tactile_bayes.record import rod_of, with_rod, write_record
+from tactile_bayes.rig import FileFormat, GrowingRecord, Rig, make_record, read_record
 
 RIG = Rig(
     rod=WIRE,
@@ -29,22 +28,16 @@ def path(tmp_path):
     return path
 
 
-def test_a_rig_says_what_the_arguments_say(path):
+def test_a_file_is_read_as_its_rig_says(path):
     by_rig = read_record(path, RIG)
-    given = {"columns": dict(RIG.file.columns), "split_sweeps": True, "rod": WIRE, "missing": ("force_y",)}
-    xr.testing.assert_identical(by_rig, read_record(path, **given, load_cell_frame="turning"))
+    table = {"drive_angle": "phi[deg]", "holding_moment": "Mz[N mm]", "split_sweeps": True, "missing": "force_y"}
+    xr.testing.assert_identical(by_rig, read_record(path, Rig(WIRE, LoadCell(frame="turning"), file=table)))
     assert by_rig.attrs["load_cell_frame"] == "turning"
     xr.testing.assert_identical(GrowingRecord(path, RIG).poll().record, by_rig)
 
 
-def test_an_argument_comes_before_the_rig(path):
-    halved = read_record(path, RIG, columns={"holding_moment": "0.5*Mz[N mm]"}, rod=Rod(0.3, 1e-3))
-    np.testing.assert_allclose(halved.holding_moment, 0.5 * read_record(path, RIG).holding_moment)
-    assert rod_of(halved) == Rod(0.3, 1e-3)
-
-
 def test_a_rod_without_a_length_gives_the_shape_of_the_one_in_the_file(tmp_path):
-    record = make_record(columns(), rod=WIRE)
+    record = make_record(columns(), Rig(rod=WIRE))
     write_record(record, tmp_path / "record.csv")
     tapered = Rod(WIRE.length, WIRE.flexural_rigidity, WIRE.diameter, taper=0.4)
     assert rod_of(read_record(tmp_path / "record.csv", Rig(rod=Rod(taper=0.4)))) == tapered

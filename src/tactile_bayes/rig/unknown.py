@@ -1,0 +1,88 @@
+"""What is said of the unknowns of a rig: numbers are known, distributions are unknown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+
+from tactile_bayes.checks import as_number, check_kind, check_mapping, shown
+from tactile_bayes.distributions import Distribution, check_distribution, frozen
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.record.spelling import nearest
+from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, STANDARD, members, parameter_named
+
+__all__ = ["DEFAULT", "NOTHING", "Unknown", "checked_unknown", "expanded"]
+
+Unknown = float | Distribution | Literal["default"]
+"""What is said of a parameter: a number if it is known, a distribution, or "default" for its default distribution."""
+
+DEFAULT: Literal["default"] = "default"
+
+NOTHING: Mapping[str, float] = MappingProxyType(
+    {name: float(PARAMETERS[next(members(name))].neutral or 0.0) for name in STANDARD}
+)
+"""Unknowns of a rig that is as stated: everything that is unknown of a real rig is known, and is as stated."""
+
+_BASES = ("base", "base_x", "base_y")
+"""Names of the shifts of all pivots but the first."""
+
+
+def expanded(unknown: Mapping[str, Unknown]) -> dict[str, Unknown]:
+    """Return what is said of each parameter, groups first, so that one of a group may be an exception.
+
+    Examples
+    --------
+    >>> expanded({"moment_bias": 0.1, "bias": "default"})
+    {'moment_bias': 0.1, 'force_x_bias': 'default', 'force_y_bias': 'default'}
+    """
+    of_groups = {member: value for name, value in unknown.items() if name in GROUPS for member in GROUPS[name]}
+    return {**of_groups, **{name: value for name, value in unknown.items() if name not in GROUPS}}
+
+
+def checked_unknown(unknown: Any) -> dict[str, Unknown]:
+    """Return what is said of parameters and groups, "nothing" written out, or refuse it."""
+    if isinstance(unknown, str) and unknown == "nothing":
+        return dict(NOTHING)
+    correction = 'give numbers and distributions by name, like {"lever": 0.0}, or "nothing"'
+    check_kind("unknown", unknown, Mapping, correction)
+    check_mapping("unknown", unknown, correction)
+    return {name: _said_of(name, frozen(value)) for name, value in unknown.items()}
+
+
+def _said_of(name: str, value: Any) -> Unknown:
+    _refuse_unknown_name(name)
+    if isinstance(value, str):
+        if value == DEFAULT:
+            return DEFAULT
+        raise ParameterError(f'unknown[{name!r}] is {shown(value)}: give a number, a distribution, or "default"')
+    number = as_number(value)
+    if number is None:
+        check_distribution(name, value)
+        found: Distribution = value
+        return found
+    for member in members(name):
+        parameter = PARAMETERS.get(member)
+        low, high = (parameter.low, parameter.high) if parameter is not None else (-np.inf, np.inf)
+        if not low and member not in (*MAY_VANISH, *GROUPS["discrepancy"]):
+            low = math.ulp(0.0)
+        if not (math.isfinite(number) and low <= number <= high):
+            raise ParameterError(f"unknown[{name!r}] is {number!r}: give a finite number from {low:.4g} to {high:.4g}")
+    return number
+
+
+def _refuse_unknown_name(name: Any) -> None:
+    names: Collection[str] = (*PARAMETERS, *GROUPS, *_BASES)
+    if isinstance(name, str) and (name in names or parameter_named(name) is not None):
+        if (shift := BASE.fullmatch(name)) and int(shift[1]) < 2:
+            raise ParameterError(
+                f"{name} is never unknown: a shift of pivot and object together changes no reading. Results are "
+                "relative to the first pivot as stated; add the uncertainty of its position"
+            )
+        return
+    near = nearest(str(name), names)
+    hint = f"did you mean {near!r}?" if near else f"there are {', '.join((*GROUPS, *PARAMETERS))} and base"
+    raise ParameterError(f"a rig has no parameter {name!r}: {hint}")
