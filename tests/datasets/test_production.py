@@ -124,7 +124,7 @@ def test_manifest_states_everything(tmp_path):
 def test_progress_is_told(tmp_path):
     told = []
     generate(PLAIN, tmp_path, workers=Workers(1, progress=told.append))
-    assert [(p.records, p.wanted, p.made) for p in told] == [(8, 24, 8), (16, 24, 16), (24, 24, 24)]
+    assert [(p.done, p.wanted, p.made) for p in told] == [(8, 24, 8), (16, 24, 16), (24, 24, 24)]
     (tmp_path / "shard-000001.nc").unlink()
     generate(PLAIN, tmp_path, workers=Workers(1, progress=told.append))
     assert told[-1][:3] == (24, 24, 8)

@@ -23,6 +23,7 @@ ROOT = Path(__file__).parents[2]
 NOT_CALLED = {
     *(f"contours.{name}" for name in ("Contour", "Graph", "Single", "Locus")),
     *(f"datasets.{name}" for name in ("Specification", "Verification")),
+    "TaskProgress",
     *(f"elastica.{name}" for name in ("Contact", "Wrench", "forward_contacts", "lever_of_stem")),
 }
 """Bases, results, and parts of the forward model that its own code alone calls."""
@@ -61,7 +62,7 @@ SENSIBLE = {
     "load_cell": a_kind(tb.LoadCell),
     "rig": a_kind(tb.Rig),
     "settings": a_kind(tb.SamplerSettings),
-    "truth": a_kind(tb.contours.Contour, tb.Rig, tb.Misspecification),
+    "truth": a_kind(tb.contours.Contour, tb.Rig, tb.calibration.Misspecification),
     "posterior": a_kind(xr.DataTree, xr.Dataset),
     "record": a_kind(xr.Dataset),
     "measured": a_kind(xr.Dataset, np.ndarray),

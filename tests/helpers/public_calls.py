@@ -454,7 +454,8 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
             tb.infer_contours,
             {
                 **rig,
-                **sampled,
+                "rng": 1,
+                "settings": BRIEF,
                 "records": [broken],
                 "out": folder / "many",
                 "family": "parabola",
@@ -616,6 +617,10 @@ def _planning_calls() -> dict[str, Call]:
                 "rig": None,
             },
         ),
+        "Bands": Call(Bands, {"probability": 0.9, "family": None, "posterior_cells": 0, "posterior_replicates": 1}),
+        "Criterion": Call(tb.planning.Criterion, {"name": "band", "span": None, "probability": 0.9}),
+        "usual_drives": Call(tb.planning.usual_drives, {"known": posterior(), "rig": None, "drive_step": 0.1}),
+        "Workers": Call(tb.tasks.Workers, {"where": 1, "progress": None}),
         "error_map": Call(
             tb.planning.error_map,
             {

@@ -36,8 +36,9 @@ def in_si():
 @pytest.fixture(scope="module")
 def study():
     """Profile II at three distances, of which the last is out of reach."""
-    options = {"noise_factors": [1.0, 0.1], "replicates": 1, "rng": 1, "workers": 1, "drive_step": 0.2}
-    return error_map(["II"], distances=[0.4, 0.8, 1.5], rig=Rig(unknown="nothing"), **options)
+    options = {"replicates": 1, "rng": 1, "workers": 1, "drive": Rotation(drive_step=0.2)}
+    over = {"noise_factor": [1.0, 0.1], "distance": [0.4, 0.8, 1.5]}
+    return error_map(["II"], over=over, rig=Rig(unknown="nothing"), **options)
 
 
 def rods(status, width):

@@ -43,16 +43,6 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     """Draw a truth, sweep along it and measure.
 
     Loads are exact, from `Paths` and not from the compiled code of inference.
-
-    Parameters
-    ----------
-    experiment : SimulatedExperiment
-    rng : np.random.Generator
-
-    Raises
-    ------
-    ReachError
-        If the rod hardly ever reaches a contour of the prior.
     """
     model, truth = experiment.model, experiment.truth
     likelihood = model.likelihood

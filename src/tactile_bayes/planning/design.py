@@ -184,7 +184,8 @@ def usual_drives(
     record = record_of(known) if isinstance(known, xr.DataTree) else None
     drives = [] if record is None else recorded_drives(record)
     x, y = next((drive.base for drive in drives if isinstance(drive, Rotation)), (0.0, 0.0))
-    length = (rig_of(rig).rod or Rod() if record is None else rod_of(record)).length
+    stated = rig_of(rig).rod or Rod()
+    length = (stated if record is None else rod_of(record)).length
     pivots = [(float(x + length * dx), float(y + length * dy)) for dy in _ABOVE for dx in _ACROSS]
     return [Rotation(pivot, drive_step=drive_step) for pivot in pivots]
 
@@ -192,7 +193,7 @@ def usual_drives(
 def _candidates(drives: Any) -> tuple[Candidate, ...]:
     """Return the candidates, each of one drive or several."""
     correction = "give a list of drives, or of lists of them"
-    if not drives or not isinstance(drives, Sequence):
+    if not isinstance(drives, Sequence) or not drives:
         raise refused("drives", drives, correction)
     candidates = [Candidate(tuple(drives_of(drive))) for drive in drives]
     if len(set(candidates)) < len(candidates):

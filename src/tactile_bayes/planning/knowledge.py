@@ -93,23 +93,7 @@ def unmeasured(rig: Rig, family: Family | str = "parabola", drives: Sequence[Dri
 
 
 def known_from_prior(rig: Rig, family: Family, *, draws: int, rng: np.random.Generator) -> Knowledge:
-    """Draw truths from the priors of a rig and a family, restricted to contours within reach.
-
-    Parameters
-    ----------
-    rig : Rig
-    family : Family
-    draws : int
-        Number of draws.
-    rng : np.random.Generator
-
-    Raises
-    ------
-    ParameterError
-        If the family is shape-free.
-    ReachError
-        If the rod hardly ever reaches a contour of the prior.
-    """
+    """Draw truths from the priors of a rig and a family, restricted to contours within reach."""
     _refuse_shape_free(family.name)
     experiment = unmeasured(replace(rig, unknown=_without_shifts(rig.entries)), family)
     points, _ = experiment.model.draw_prior(rng, draws)
@@ -118,22 +102,7 @@ def known_from_prior(rig: Rig, family: Family, *, draws: int, rng: np.random.Gen
 
 
 def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.Generator) -> Knowledge:
-    """Draw truths from a posterior of `infer_contour`, with its rig, load cell and pivots.
-
-    Parameters
-    ----------
-    posterior : xr.DataTree
-    draws : int
-        Number of draws, at most all.
-    rng : np.random.Generator
-
-    Raises
-    ------
-    InferenceError
-        If the tree is no posterior of a contour.
-    ParameterError
-        If the contour is shape-free.
-    """
+    """Draw truths from a posterior of `infer_contour`, with its rig, load cell and pivots."""
     contour_draws(posterior)
     attrs: dict[Any, Any] = posterior.attrs
     _refuse_shape_free(str(attrs["family"]))

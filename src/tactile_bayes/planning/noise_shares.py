@@ -134,19 +134,7 @@ def noise_shares(
 def first_and_total(
     function: Callable[[Floats], Floats], distributions: Sequence[Any], samples: int, rng: Rng
 ) -> tuple[Floats, Floats]:
-    """Return first-order and total Sobol' indices of a function's values, shape (values, inputs) each.
-
-    Parameters
-    ----------
-    function : callable
-        Maps inputs, shape (inputs, n), to values, shape (values, n).
-    distributions : sequence of frozen scipy.stats distribution
-        Distributions of the independent inputs.
-    samples : int
-        Number of samples, a power of two.
-    rng : int, numpy.random.SeedSequence or numpy.random.Generator
-        Seed of the scrambled Sobol' sequences.
-    """
+    """Return first-order and total Sobol' indices of a function's values, shape (values, inputs) each."""
     found = stats.sobol_indices(func=function, n=samples, dists=distributions, rng=generator(rng))
     return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)  # SciPy squeezes a single value
 

@@ -28,17 +28,7 @@ def record_template(drives: Sequence[Drive], drive_angles: Floats, rod: Rod | No
 
     Its drive angles include the encoder's offset and backlash.
 
-    Parameters
-    ----------
-    drives : sequence of Rotation, Translation or Motion
-        In the unit of length of the record.
-    drive_angles : ndarray, shape (n,)
-        Drive angles of rotations that have no grid of their own [rad]. Drives that carry the base are sampled at as
-        many places if they have no step.
-    rod : Rod, optional
-        By default the dimensionless rod.
-    load_cell : LoadCell
-        Provides the frame, and the encoder's offset and backlash.
+    The angles are of rotations without a grid of their own; drives that carry the base have as many samples.
     """
     parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}
     sweeps: list[tuple[str, Floats]] = []
