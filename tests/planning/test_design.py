@@ -178,14 +178,14 @@ def test_it_goes_on_where_it_was_stopped(tmp_path):
     by_gap = designed(out=tmp_path, criterion="gap", **asked)  # of the same numbers
     assert by_gap.width.identical(found.width)
     with refused(StudyError, "another experiment", "seed is 1 there and 2 here"):
-        designed(out=tmp_path, **asked, seed=2)
+        designed(out=tmp_path, **asked, rng=2)
 
 
 @pytest.mark.slow
 def test_the_seed_decides():
     one = designed(draws=2, drives=pivots((0.0, 0.0)))
     assert one.identical(designed(draws=2, drives=pivots((0.0, 0.0))))
-    assert not one.width.identical(designed(draws=2, drives=pivots((0.0, 0.0)), seed=2).width)
+    assert not one.width.identical(designed(draws=2, drives=pivots((0.0, 0.0)), rng=2).width)
 
 
 @pytest.mark.slow
