@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any
@@ -251,7 +252,7 @@ def other_rods() -> str:
         likelihood = RecordLikelihood(measured, CELL)
         times[name] = best_time(lambda of=likelihood, rig=rig: of.log_likelihood(walkers, rig=rig), 50) / 64
     for name, drive in CARRIED.items():
-        measured = CELL.measure(tb.scan(CONTOUR, drive=drive, drive_step=_STEP_OF_TRAVEL).record, rng=1)
+        measured = CELL.measure(tb.scan(CONTOUR, drive=replace(drive, drive_step=_STEP_OF_TRAVEL)).record, rng=1)
         likelihood = RecordLikelihood(measured, CELL)
         times[name] = best_time(lambda of=likelihood: of.log_likelihood(walkers), 50) / 64
     straight = times.pop("straight")

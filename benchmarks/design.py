@@ -84,8 +84,9 @@ def compared(number: int) -> Outcome:
         posterior = _inferred(first, number)
         gap = tb.gap(posterior)
         x = np.linspace(*_span(posterior), PLACES)
-        candidates = [(float(across), float(above)) for above in ABOVE for across in ACROSS]
-        planned = tb.design(posterior, bases=candidates, drive_steps=[STEP], span=(x[0], x[-1]), rng=number, draws=8)
+        candidates = [tb.Rotation((across, above), drive_step=STEP) for above in ABOVE for across in ACROSS]
+        criterion = tb.planning.Criterion(span=(x[0], x[-1]))
+        planned = tb.design(posterior, drives=candidates, criterion=criterion, rng=number, draws=8)
         reached = planned.isel(candidate=np.flatnonzero(planned.reached.values == 1.0))
         best = reached.isel(candidate=int(np.argmin(reached.width.values)))
         bases = {

@@ -21,7 +21,9 @@ FACTORS = (3.0, 1.0, 0.1, 0.01)
 DRAWS = 2500.0
 SETTINGS = tb.SamplerSettings(ensembles=4, walkers=32, max_r_hat=1.01, min_ess=DRAWS, max_steps=4000)
 RIG = tb.Rig(load_cell=tb.LoadCell(force_noise=0.05, moment_noise=0.02))
-PLAN = tb.planning.Plan(tb.contours.paper_profile("II", q=0.5), RIG, drive_step=float(np.radians(2.0)))
+PLAN = tb.planning.Plan(
+    tb.contours.paper_profile("II", q=0.5), RIG, drive=tb.Rotation(drive_step=float(np.radians(2.0)))
+)
 
 
 def main(records: int = 8) -> None:

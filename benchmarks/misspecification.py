@@ -29,7 +29,7 @@ from tactile_bayes.rig import NOTHING
 
 OUT = Path("results/misspecification")
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-TWO_BASES = [(0.0, 0.0), (0.3, 0.0)]
+TWO_BASES = [tb.Rotation((0.0, 0.0)), tb.Rotation((0.3, 0.0))]
 SETTINGS = tb.SamplerSettings(ensembles=2, walkers=34, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
 """Posteriors of a wrong model may have many modes; those that take longer are reported as unconverged."""
 FEWER = 4
@@ -44,9 +44,9 @@ AS_STATED = tb.Rig(load_cell=CELL, unknown="nothing")
 
 
 class Run(NamedTuple):
-    """The rig that is simulated, the one that inference assumes, and other options of `calibrate`."""
+    """The truth that is simulated, the rig that inference assumes, and other options of `calibrate`."""
 
-    truth: tb.Rig
+    truth: tb.Rig | tb.calibration.Misspecification
     rig: tb.Rig = INFERRED
     options: Mapping[str, Any] = MappingProxyType({})
 
@@ -61,7 +61,12 @@ def _known_to_vary(**known: float) -> dict[str, Run]:
     return {"": Run(_real(**known)), "as stated": Run(_real(**{**NOTHING, **known}), AS_STATED)}
 
 
-def _untold(truth: tb.Rig, *, options: Mapping[str, Any] = MappingProxyType({}), **rigs: tb.Rig) -> dict[str, Run]:
+def _untold(
+    truth: tb.Rig | tb.calibration.Misspecification,
+    *,
+    options: Mapping[str, Any] = MappingProxyType({}),
+    **rigs: tb.Rig,
+) -> dict[str, Run]:
     """Return runs with properties that are not inferred by default, and with these inferred or stated."""
     return {"": Run(truth, options=options)} | {
         other.replace("_", " "): Run(truth, rig, options) for other, rig in rigs.items()
@@ -70,9 +75,9 @@ def _untold(truth: tb.Rig, *, options: Mapping[str, Any] = MappingProxyType({}),
 
 def _spotted(at: float) -> dict[str, Run]:
     """Return runs with a flat spot; a shape-free family takes parabolas for any smooth contour."""
-    spotted = tb.calibration.Misspecification(flat_spot=(at, 2.0))
-    free = {"family": "shape-free", "misspecification": replace(spotted, family="parabola")}
-    return {"": Run(_real(), options={"misspecification": spotted}), "shape free": Run(_real(), options=free)}
+    spotted = tb.calibration.Misspecification(_real(), flat_spot=(at, 2.0))
+    free = Run(replace(spotted, family="parabola"), options={"family": "shape-free"})
+    return {"": Run(spotted), "shape free": free}
 
 
 BIASES = {"moment_bias": 0.02, "force_x_bias": 0.05, "force_y_bias": 0.05}
@@ -82,13 +87,11 @@ CASES: Mapping[str, Mapping[str, Run]] = {
     "as assumed": _known_to_vary(),
     **{f"friction {mu}": _known_to_vary(friction=mu) for mu in (0.1, 0.3, 0.5)},
     **{
-        f"base off by 1 % L, {way}": _untold(
-            _real(), options={"misspecification": tb.calibration.Misspecification(base_shift=shift)}
-        )
+        f"base off by 1 % L, {way}": _untold(tb.calibration.Misspecification(_real(), base_shift=shift))
         for way, shift in (("across", (0.01, 0.0)), ("along", (0.0, 0.01)))
     },
     "second base off by 1 % L": _untold(
-        _real(base_2_x=0.01), options={"base": TWO_BASES}, base_inferred=INFERRED.with_unknown(base="default")
+        _real(base_2_x=0.01), options={"drive": TWO_BASES}, base_inferred=INFERRED.with_unknown(base="default")
     ),
     "EI off by 5 %": _known_to_vary(rigidity_scale=1.05),
     "encoder off by 1°": _known_to_vary(drive_angle_offset=float(np.radians(1.0))),

@@ -33,7 +33,9 @@ def sets() -> Iterator[tuple[str, dict[str, Unknown]]]:
 
 def row(unknown: dict[str, Unknown]) -> dict[str, float]:
     """Return widths and standard deviations in thousandths of the rod's length."""
-    plan = tb.planning.Plan(CONTOUR, tb.Rig(load_cell=CELL, unknown=unknown), drive_step=float(np.radians(2.0)))
+    plan = tb.planning.Plan(
+        CONTOUR, tb.Rig(load_cell=CELL, unknown=unknown), drive=tb.Rotation(drive_step=float(np.radians(2.0)))
+    )
     told = information(plan, probability=PROBABILITY)
     deviation = told.bound_with_priors.sel(parameter=list(PARAMETERS)).values
     widths = {"gap": float(told.gap_width), "beside": float(told.touched_width)}

@@ -51,8 +51,8 @@ WRONG: Mapping[str, dict[str, Any]] = {
     "friction of 0.3, not inferred": {"truth": SMOOTH.with_unknown(friction=0.3)},
     "rod tapered by 30 %": {"truth": SMOOTH.with_unknown(taper=0.3)},
     "rod curved by 0.2/L": {"truth": SMOOTH.with_unknown(rest_curvature=0.2)},
-    "circle": {"misspecification": tb.calibration.Misspecification(family="circle")},
-    "flat spot in the gap": {"misspecification": tb.calibration.Misspecification(flat_spot=(0.0, 2.0))},
+    "circle": {"truth": tb.calibration.Misspecification(family="circle")},
+    "flat spot in the gap": {"truth": tb.calibration.Misspecification(flat_spot=(0.0, 2.0))},
     "outliers (t, 2.5)": {"truth": replace(SMOOTH, load_cell=replace(CELL, degrees_of_freedom=2.5))},
 }
 """What the model does not have: it takes all for parabolas without friction and backlash."""
@@ -64,7 +64,7 @@ RECORDS = Kind("records", StudyError, dict, lambda row: {name: v for name, v in 
 def main(records: int = 100) -> None:
     identity = {"particles": str(PARTICLES), "blocks": str(BLOCKS), "seed": str(SEED)}
     with open_results_store(identity, OUT, RECORDS) as store:
-        kept = keep_outcomes(store, one, (), records, workers=None, scheduler=None, progress=None)
+        kept = keep_outcomes(store, one, (), records, workers=None)
     every = [kept[number] for number in range(records)]
     report([row for row in every if "error" not in row], [row["error"] for row in every if "error" in row])
 
@@ -92,7 +92,7 @@ def wrong(records: int = 20) -> None:
     for name in WRONG:
         folder = OUT / ("without-" + "".join(c if c.isalnum() else "-" for c in name))
         with open_results_store({"without": name, "seed": str(SEED)}, folder, RECORDS) as store:
-            kept = keep_outcomes(store, wrong_one, name, records, workers=None, scheduler=None, progress=None)
+            kept = keep_outcomes(store, wrong_one, name, records, workers=None)
         every = [row["e_values"] for row in kept.values() if row.get("e_values")]
         values = np.array([row + [row[-1]] * (BLOCKS - len(row)) for row in every])
         told = values > 1000.0

@@ -12,6 +12,7 @@ import math
 import sys
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,8 @@ import numpy as np
 
 from benchmarks.misspecification import CASES, SETTINGS
 from tactile_bayes.assessment.trust import trust
-from tactile_bayes.calibration.calibrate import calibration_replicate
+from tactile_bayes.calibration.calibrate import experiment_of
+from tactile_bayes.calibration.replicate import make_replicate
 from tactile_bayes.errors import StudyError, TactileBayesError
 from tactile_bayes.tasks import Kind, keep_outcomes, open_results_store
 
@@ -57,7 +59,7 @@ def made(name: str, other: str, records: int) -> list[Row]:
     identity = {"case": f"{name} {other}", "probability": repr(PROBABILITY)}
     folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in f"{name} {other}".strip())
     with open_results_store(identity, folder, RECORDS) as store:
-        kept = keep_outcomes(store, one, (name, other), records, workers=None, scheduler=None, progress=None)
+        kept = keep_outcomes(store, one, (name, other), records, workers=None)
     return [kept[number] for number in range(records)]
 
 
@@ -67,7 +69,8 @@ def one(task: tuple[tuple[str, str], int]) -> Row:
     run = CASES[name][other]
     options = {"rig": run.rig, "truth": run.truth, "settings": SETTINGS, **run.options}
     try:
-        replicate = calibration_replicate(number, rng=2031, probability=PROBABILITY, **options)
+        experiment = replace(experiment_of(rng=2031, **options), probability=PROBABILITY)
+        replicate = make_replicate(experiment, number, throw=True)
         found = trust(replicate.posterior, rng=1, replicates=0, assumptions=False)
     except TactileBayesError as error:
         return {"conclusion": LOST, "summary": str(error)}

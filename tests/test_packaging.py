@@ -78,7 +78,7 @@ from tactile_bayes import contours, load_cell, record
 from tactile_bayes.mechanics import elastica
 assert "numba" not in sys.modules
 measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(
-    tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.2).record, seed=1
+    tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.2).record, rng=1
 )
 print(tb.reconstruct(measured).sizes["sample"] > 10)
 """

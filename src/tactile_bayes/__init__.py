@@ -27,6 +27,7 @@ _ROOMS = (
     "mechanics",
     "paper_figures",
     "record",
+    "tasks",
     "uncertainty",
 )
 """Reached as attributes, for what is needed more seldom."""
@@ -83,6 +84,7 @@ if TYPE_CHECKING:
     from tactile_bayes import planning as planning
     from tactile_bayes import plotting as plotting
     from tactile_bayes import record as record
+    from tactile_bayes import tasks as tasks
     from tactile_bayes import uncertainty as uncertainty
     from tactile_bayes.assessment.trust import trust as trust
     from tactile_bayes.calibration.calibrate import calibrate as calibrate

@@ -28,12 +28,15 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import child
 from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.sweep import Rotation
+from tactile_bayes.tasks import Workers
 
 module = importlib.import_module("tactile_bayes.calibration.calibrate")
 making = importlib.import_module("tactile_bayes.calibration.replicate")
 
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
 ANGLES = np.radians(np.arange(-30.0, 211.0, 4.0))
+DRIVE = Rotation(drive_angles=ANGLES)
 
 FAMILY = Family("parabola", **PRIORS)
 AS_STATED = Rig(unknown="nothing")
@@ -45,7 +48,7 @@ BY_DEFAULT = SamplerSettings(ensembles=2, walkers=20, block_steps=25, max_r_hat=
 
 
 def quickly(**options):
-    asked = {"family": FAMILY, "rig": AS_STATED, "replicates": 2, "drive_angles": ANGLES, "rng": 1, "workers": 1}
+    asked = {"family": FAMILY, "rig": AS_STATED, "replicates": 2, "drive": DRIVE, "rng": 1, "workers": 1}
     return calibrate(**(asked | options))
 
 
@@ -207,7 +210,7 @@ def test_an_interrupt_in_the_sampler_loses_the_replicate_and_not_half_of_it(tmp_
 
 
 def again(number, **options):
-    asked = {"family": FAMILY, "rig": AS_STATED, "drive_angles": ANGLES, "settings": FEW_STEPS, "rng": 1}
+    asked = {"family": FAMILY, "rig": AS_STATED, "drive": DRIVE, "settings": FEW_STEPS, "rng": 1}
     return calibration_replicate(number, **(asked | options))
 
 
@@ -255,7 +258,7 @@ def test_what_has_not_converged_is_run_again_with_more_walkers(monkeypatch):
         return sampled(problem, settings=FEW_STEPS, **options)
 
     monkeypatch.setattr("tactile_bayes.calibration.replicate.sampled", spied)
-    asked = {"family": FAMILY, "rig": AS_STATED, "drive_angles": ANGLES, "rng": 1}
+    asked = {"family": FAMILY, "rig": AS_STATED, "drive": DRIVE, "rng": 1}
     assert not calibration_replicate(0, **asked).outcome.numbers["converged"]
     first, second = runs
     assert first == BY_DEFAULT
@@ -277,7 +280,7 @@ def test_defaults_of_one_replicate_are_those_of_all():
     own, all_of_them = (inspect.signature(function).parameters for function in (experiment_of, calibrate))
     assert {name: option.default for name, option in own.items()} == {name: all_of_them[name].default for name in own}
     others = set(all_of_them) - set(own)
-    assert others == {"replicates", "out", "workers", "scheduler", "progress"}
+    assert others == {"replicates", "out", "workers"}
 
 
 # ---- going on
@@ -307,8 +310,8 @@ def test_a_gap_is_filled(noted, tmp_path):
 
 def test_progress_is_told(noted, tmp_path):
     told = []
-    quickly(replicates=2, out=tmp_path, progress=told.append)
-    quickly(replicates=4, out=tmp_path, progress=told.append)
+    quickly(replicates=2, out=tmp_path, workers=Workers(1, told.append))
+    quickly(replicates=4, out=tmp_path, workers=Workers(1, told.append))
     assert [(state.done, state.wanted, state.made) for state in told] == [(1, 2, 1), (2, 2, 2), (3, 4, 1), (4, 4, 2)]
     assert all(state.seconds >= 0.0 for state in told)
 
@@ -319,7 +322,7 @@ def test_an_interrupt_keeps_what_is_done(noted, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        quickly(replicates=9, out=tmp_path, progress=interrupt)
+        quickly(replicates=9, out=tmp_path, workers=Workers(1, interrupt))
     rows = json.loads((tmp_path / REPLICATES.file).read_text())["replicates"]
     assert [row["number"] for row in rows] == [0, 1, 2]
     assert [path.name for path in tmp_path.iterdir()] == [REPLICATES.file]
@@ -330,11 +333,11 @@ def test_an_interrupt_keeps_what_is_done(noted, tmp_path):
 def test_what_is_done_is_noted_on_the_way(noted, tmp_path, monkeypatch):
     """A run that is killed without a word has lost little."""
     monkeypatch.setattr("tactile_bayes.tasks.results_store._WRITING_SHARE", 1e9)
-    there = []
+    there, kept = [], tmp_path / REPLICATES.file
     quickly(
         replicates=3,
         out=tmp_path,
-        progress=lambda state: there.append(len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"])),
+        workers=Workers(1, lambda state: there.append(len(json.loads(kept.read_text())["replicates"]))),
     )
     assert there == [1, 2, 3]
 
@@ -363,7 +366,7 @@ def test_a_killed_run_goes_on(tmp_path, wait):
     run.wait()
     done = len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"])
     told = []
-    found = quickly(replicates=done, out=tmp_path, progress=told.append)
+    found = quickly(replicates=done, out=tmp_path, workers=Workers(1, told.append))
     assert found.sizes["replicate"] == done > 0
     assert told == []
     assert [path.name for path in tmp_path.iterdir()] == [REPLICATES.file]
@@ -378,14 +381,13 @@ def test_a_killed_run_goes_on(tmp_path, wait):
         ({"rig": replace(AS_STATED, load_cell=LoadCell(force_noise=0.1, moment_noise=0.02))}, ("load_cell", 0.05, 0.1)),
         ({"truth": AS_STATED.with_unknown(friction=0.1)}, ["truth_unknown"]),
         ({"truth": replace(AS_STATED, rod=Rod(taper=0.1))}, ["truth_rod"]),
-        ({"misspecification": Misspecification(base_shift=(0.1, 0.0))}, ("misspecification", 0.1)),
-        ({"misspecification": Misspecification(family=Family("parabola", a=stats.norm(1.0)))}, ["truth_contour"]),
+        ({"truth": Misspecification(base_shift=(0.1, 0.0))}, ("misspecification", 0.1)),
+        ({"truth": Misspecification(family=Family("parabola", a=stats.norm(1.0)))}, ["truth_contour"]),
         ({"settings": FEW_STEPS}, ["settings"]),
-        ({"drive_angles": ANGLES[:-1]}, ["drive_angles"]),
-        ({"direction": "forward"}, ["directions"]),
+        ({"drive": Rotation(drive_angles=ANGLES[:-1])}, ["drives"]),
+        ({"drive": Rotation(direction="forward", drive_angles=ANGLES)}, ["drives"]),
         ({"family": "parabola"}, ["contour"]),
-        ({"base": (0.1, 0.0)}, ["drives"]),
-        ({"probability": 0.8}, ("probability", 0.9, 0.8)),
+        ({"drive": Rotation((0.1, 0.0), drive_angles=ANGLES)}, ["drives"]),
         ({"settings": replace(BY_DEFAULT, events=False)}, ("settings", "events", "false", "true")),
     ],
 )
@@ -402,8 +404,8 @@ def test_another_calibration_is_left_alone(noted, tmp_path, other, differs):
     "same",
     [
         {"rng": np.int64(1)},
-        {"probability": np.float64(0.9)},
-        {"misspecification": Misspecification(base_shift=[0.0, 0.0])},
+        {"drive": [Rotation(drive_angles=ANGLES[::-1])]},
+        {"truth": Misspecification(base_shift=[0.0, 0.0])},
         {"rig": Rig(unknown=NOTHING)},
         {"truth": AS_STATED},
         {"settings": replace(BY_DEFAULT, ensembles=np.int64(2))},
@@ -421,12 +423,11 @@ def test_what_an_experiment_is_follows_from_its_words():
     written_out = {
         "family": Family("parabola"),
         "rig": Rig(load_cell=LoadCell(force_noise=0.05, moment_noise=0.02), unknown="nothing"),
-        "drive_angles": np.radians(np.arange(-30.0, 211.0, 2.0))[::-1],
-        "base": [(0.0, 0.0)],
+        "drive": [Rotation((0, 0))],
         "settings": SamplerSettings(
             ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500
         ),
-        "misspecification": Misspecification(),
+        "truth": Misspecification(),
     }
     assert experiment_of(rng=1, **written_out).identity == words
     assert all(isinstance(said, str) for said in words.values())
@@ -440,20 +441,11 @@ def test_what_an_experiment_is_follows_from_its_words():
     [
         {"replicates": 0},
         {"rng": -1},
-        {"probability": 1},
-        {"probability": "high"},
         {"workers": 0},
-        {"direction": "up"},
-        {"direction": ["both"]},
-        {"drive_angles": "all"},
-        {"drive_angles": [0.0, 1.0]},
-        {"drive_angles": [0.0, 1.0, np.nan]},
-        {"drive_angles": [[0.0, 1.0], [2.0, 3.0]]},
-        {"base": [1.0, 2.0, 3.0]},
-        {"base": (np.nan, 0.0)},
+        {"drive": "all"},
+        {"drive": []},
         {"rig": "good"},
         {"settings": "quick"},
-        {"misspecification": "real"},
         {"truth": "real"},
     ],
     ids=lambda wrong: next(iter(wrong)),
@@ -471,6 +463,7 @@ def test_bad_arguments_are_told(noted, tmp_path, wrong):
     ("wrong", "named"),
     [
         ({"family": "cube"}, ["'cube'", "parabola"]),
+        ({"drive": Rotation(drive_angles=[0.0, 1.0])}, ["drive_angles", "3"]),
         ({"rig": Rig(load_cell=LoadCell())}, ["load cell", "noise"]),
         ({"truth": Rig(load_cell=LoadCell())}, ["load cell", "truth", "noise"]),
     ],

@@ -111,7 +111,7 @@ def test_by_default_the_rig_is_what_was_drawn():
     drawn = RigValues(
         *(np.array([value]) for value in (0.02, 1.1, 0.01, 0.2, 0.03)), base_shifts=np.full((1, 2, 2), 0.03)
     )
-    rig = Misspecification().rig(drawn, 2)
+    rig = Misspecification().shifted(drawn, 2)
     for mine, theirs in zip(rig, drawn, strict=True):
         np.testing.assert_array_equal(mine, theirs)
 
@@ -120,7 +120,7 @@ def test_all_pivots_are_shifted_on_top_of_what_was_drawn():
     shifts = np.zeros((1, 2, 2))
     shifts[0, 1] = [0.5, 0.0]
     drawn = RigValues(*(np.array([value]) for value in (0.02, 1.1, 0.01, 0.2, 0.03)), base_shifts=shifts)
-    rig = Misspecification(base_shift=(0.01, -0.02)).rig(drawn, 3)
+    rig = Misspecification(base_shift=(0.01, -0.02)).shifted(drawn, 3)
     np.testing.assert_allclose(rig.base_shifts, [[[0.01, -0.02], [0.51, -0.02], [0.01, -0.02]]], atol=1e-15)
     assert shifts[0, 0, 0] == 0.0  # what was drawn is as it was
     assert rig._replace(base_shifts=None) == drawn._replace(base_shifts=None)

@@ -26,14 +26,14 @@ from tactile_bayes.rig.rig_prior import RigPrior
 QUIET = LoadCell(force_noise=1e-12, moment_noise=1e-12)
 NOISY = LoadCell(force_noise=0.05, moment_noise=0.02)
 ANGLES = np.radians(np.arange(-30.0, 211.0, 5.0))
+DRIVE = tb.Rotation(drive_angles=ANGLES)
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
 FAMILY = Family("parabola", **PRIORS)
 SI = Rod(length=0.1, flexural_rigidity=1e-5)
 
 
-def experiment(family=FAMILY, *, unknown="nothing", load_cell=QUIET, rod=None, drive_angles=ANGLES, **options):
-    rig = Rig(rod=rod, load_cell=load_cell, unknown=unknown)
-    return experiment_of(family, rig, rng=1, drive_angles=drive_angles, **options)
+def experiment(family=FAMILY, *, unknown="nothing", load_cell=QUIET, rod=None, drive=DRIVE, truth=None):
+    return experiment_of(family, Rig(rod=rod, load_cell=load_cell, unknown=unknown), rng=1, drive=drive, truth=truth)
 
 
 def simulated(seed=0, **options):
@@ -88,7 +88,7 @@ def test_what_is_measured_is_what_a_scan_feels(seed):
 
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 def test_of_one_direction(direction):
-    made = simulated(direction=direction)
+    made = simulated(drive=replace(DRIVE, direction=direction))
     agree(made, scanned(made, direction=direction))
 
 
@@ -146,8 +146,7 @@ def test_the_truth_has_what_is_known_of_it():
         known |= dict(zip(names, values, strict=True))
     made = simulated(
         unknown=among("rigidity_scale", "bias", "drift", "taper"),
-        truth=real(**known),
-        misspecification=Misspecification(base_shift=(0.03, -0.02)),
+        truth=Misspecification(real(**known), base_shift=(0.03, -0.02)),
     )
     way = np.linspace(-0.5, 0.5, made.measured.sizes["sample"])[:, None]
     contour = Parabola(a=made.truth["a"], q=made.truth["q"] + 0.02, x_c=made.truth["x_c"] - 0.03)
@@ -181,7 +180,9 @@ def test_pivots_are_shifted():
     stated = [(0.0, 0.0), (0.2, 0.0), (-0.2, 0.05)]
     shift, further = np.array([0.03, -0.02]), np.array([0.01, 0.02])
     truth = real(base_x=further[0], base_y=further[1])
-    made = simulated(base=stated, truth=truth, misspecification=Misspecification(base_shift=tuple(shift)))
+    made = simulated(
+        drive=[replace(DRIVE, base=pivot) for pivot in stated], truth=Misspecification(truth, base_shift=tuple(shift))
+    )
     moved = np.array(stated) + shift + further * np.array([[0.0], [1.0], [1.0]])
     scan = scanned(made, base=[tuple(pivot) for pivot in moved])
     assert made.measured.sizes["sample"] == scan.record.sizes["sample"]
@@ -197,7 +198,7 @@ def test_of_an_si_rod():
         rod=SI,
         load_cell=cell,
         unknown=among("rigidity_scale", "bias"),
-        misspecification=Misspecification(base_shift=(0.003, 0.0)),
+        truth=Misspecification(base_shift=(0.003, 0.0)),
     )
     found = [made.truth[f"{name}_bias"] for name in ("moment", "force_x", "force_y")]
     contour = Parabola(a=made.truth["a"], q=made.truth["q"], x_c=made.truth["x_c"] - 0.003)
@@ -217,7 +218,7 @@ def test_forces_in_the_frame_of_a_cell_that_turns():
 
 def test_a_flat_spot_is_felt():
     """The object is what the simulation says it is."""
-    made = simulated(misspecification=Misspecification(flat_spot=(0.3, 2.0)))
+    made = simulated(truth=Misspecification(flat_spot=(0.3, 2.0)))
     scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
     np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
     assert np.max(np.abs(loads_of(made.measured) - loads_of(scanned(made).record))) > 1e-3
@@ -225,7 +226,7 @@ def test_a_flat_spot_is_felt():
 
 def test_contours_of_another_family():
     """With priors of its own; what is inferred is of the family that it is taken for."""
-    asked = experiment("parabola", misspecification=Misspecification(family="circle"))
+    asked = experiment("parabola", truth=Misspecification(family="circle"))
     made = simulate(asked, np.random.default_rng(2))
     scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
     np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
@@ -309,7 +310,7 @@ def test_the_encoder_of_a_cell_that_measures(told):
 
 def test_truths_come_from_the_other_family_and_inference_takes_its_own():
     other = Family("parabola", **PRIORS | {"a": stats.uniform(2.0, 0.1)})
-    asked = experiment(misspecification=Misspecification(family=other))
+    asked = experiment(truth=Misspecification(family=other))
     made = simulate(asked, np.random.default_rng(1))
     assert 2.0 < made.truth["a"] < 2.1
     assert asked.is_of_family
@@ -318,10 +319,10 @@ def test_truths_come_from_the_other_family_and_inference_takes_its_own():
 
 def test_what_is_known_of_a_family_is_not_drawn():
     known = Family("parabola", a=0.7, q=PRIORS["q"])
-    asked = experiment(misspecification=Misspecification(family=known))
+    asked = experiment(truth=Misspecification(family=known))
     assert simulate(asked, np.random.default_rng(1)).truth["a"] == 0.7
     assert asked.is_of_family
-    assert not experiment(known, misspecification=Misspecification(family="parabola")).is_of_family
+    assert not experiment(known, truth=Misspecification(family="parabola")).is_of_family
 
 
 def test_truths_have_the_distribution_of_the_prior():
@@ -342,7 +343,7 @@ def test_the_same_numbers_again():
 def test_a_rig_out_of_reach_is_told(monkeypatch):
     monkeypatch.setattr(simulation, "_TRIALS", 3)
     with refused(ReachError, "3 contours"):
-        simulated(misspecification=Misspecification(base_shift=(0.0, -5.0)))
+        simulated(truth=Misspecification(base_shift=(0.0, -5.0)))
 
 
 def test_noise_that_differs_between_channels_has_no_true_scale():
@@ -391,8 +392,8 @@ def test_the_true_value_of_what_is_inferred_is_that_of_the_simulated_rig():
         "parabola", a=stats.lognorm(s=0.4, scale=6.0), q=stats.uniform(0.03, 0.04), x_c=stats.norm(0.0, 0.01)
     )
     truth = Rig(rod=rod, load_cell=cell, unknown={**NOTHING, **known})
-    base = [(0.0, 0.0), (0.02, 0.0)]
-    made = simulated(family=family, rod=SI, base=base, unknown=among(*names), truth=truth)
+    drive = [DRIVE, replace(DRIVE, base=(0.02, 0.0))]
+    made = simulated(family=family, rod=SI, drive=drive, unknown=among(*names), truth=truth)
     model = Experiment(made.measured, Rig(load_cell=QUIET, unknown=among(*names))).model
     model.likelihood.exact = True
     assert set(model.names) <= set(made.truth)

@@ -90,7 +90,7 @@ def test_the_rig_of_the_truth_is_passed_on(call, tmp_path, rig_file, monkeypatch
     ((options),) = asked
     assert options["truth"].known == {"friction": 0.3, "base_2_x": 0.01}
     assert options["rig"].entries == dict(NOTHING)
-    assert options["workers"] == 1
+    assert options["workers"].where == 1
 
 
 # ---- one replicate again

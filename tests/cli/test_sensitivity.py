@@ -1,5 +1,6 @@
 """The command `sensitivity`, as a user calls it."""
 
+import importlib
 import json
 from functools import partial
 
@@ -8,12 +9,13 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-import tactile_bayes.planning.error_map as error_map_module
 from helpers import commands
 from tactile_bayes.contours import Joined, Parabola
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.error_cell import CellOutcome
 from tactile_bayes.runs import sensitivity as sensitivity_run
+
+error_map_module = importlib.import_module("tactile_bayes.planning.error_map")
 
 QUICK = ("--drive-step", "6", "-q")
 STUDY = ("--noise-factor", "0.3", "--noise-factor", "1", "--replicates", "1", "--workers", "1")
@@ -45,7 +47,7 @@ def done(tmp_path_factory, coarse_pictures):
 
 @pytest.fixture(scope="module")
 def analysed():
-    return tb.sensitivity(rng=1, drive_step=float(np.radians(6.0)), samples=8)
+    return tb.sensitivity(rng=1, drive=tb.Rotation(drive_step=float(np.radians(6.0))), samples=8)
 
 
 @pytest.fixture(scope="module")
@@ -148,8 +150,7 @@ def test_without_options_it_is_profile_ii_at_half_a_rod_length(asked, tmp_path):
     assert options["contour"] == Parabola(0.5, 0.5)
     assert (options["rig"].rod, options["rig"].load_cell, options["rig"].entries) == (None, None, {})
     assert options["rng"] == 1
-    assert options["base"] == [(0.0, 0.0)]
-    assert options["drive_step"] == pytest.approx(np.radians(1.0))
+    assert options["drive"] == [tb.Rotation(drive_step=float(np.radians(1.0)))]
     assert options["band_widths"] is None
     assert not (tmp_path / "study").exists()
 
@@ -175,7 +176,7 @@ def test_rig_and_options_arrive(asked, tmp_path, rig_file):
     cell = tb.LoadCell(force_noise=0.1, moment_noise=0.03, drive_angle_noise=float(np.radians(0.5)))
     assert options["rig"].load_cell == cell
     assert options["rig"].entries == {"friction": 0.2, "discrepancy": "default"}
-    assert options["base"] == [(0.1, 0.0), (0.2, 0.0)]
+    assert [drive.base for drive in options["drive"]] == [(0.1, 0.0), (0.2, 0.0)]
     assert options["rng"] == 3
     assert options["band_widths"] == [0.01, 0.02]
 
@@ -244,16 +245,15 @@ def test_another_study_is_refused(asked, tmp_path):
     ],
 )
 def test_refusals(tmp_path, monkeypatch, options, words):
-    monkeypatch.setattr("tactile_bayes.planning.sensitivity.amplification", lambda plan: amplification_at_once(plan))
+    module = importlib.import_module("tactile_bayes.planning.sensitivity")
+    monkeypatch.setattr(module, "amplification", lambda plan: amplification_at_once(plan))
     commands.assert_refused(call("--out", tmp_path / "out", "--drive-step", 6, *options), words)
     assert not (tmp_path / "out").exists()
 
 
 def amplification_at_once(plan):
     """On the drive angles of the record, and not close to its ends."""
-    from dataclasses import replace
-
-    return amplification(replace(plan, drive_angles=np.radians(np.arange(-30.0, 211.0, 10.0))))
+    return amplification(plan.at_angles(np.radians(np.arange(-30.0, 211.0, 10.0))))
 
 
 @pytest.mark.slow

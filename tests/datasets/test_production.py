@@ -21,6 +21,7 @@ from tactile_bayes.datasets import generate, production, verify
 from tactile_bayes.datasets.manifest import read_manifest, write_manifest
 from tactile_bayes.datasets.specification_text import toml_of
 from tactile_bayes.errors import ParameterError, SpecificationError
+from tactile_bayes.tasks import Workers
 
 TESTS = Path(__file__).resolve().parents[1]
 on_linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
@@ -122,12 +123,12 @@ def test_manifest_states_everything(tmp_path):
 
 def test_progress_is_told(tmp_path):
     told = []
-    generate(PLAIN, tmp_path, workers=1, progress=told.append)
-    assert [(p.records, p.wanted, p.made) for p in told] == [(8, 24, 8), (16, 24, 16), (24, 24, 24)]
+    generate(PLAIN, tmp_path, workers=Workers(1, progress=told.append))
+    assert [(p.done, p.wanted, p.made) for p in told] == [(8, 24, 8), (16, 24, 16), (24, 24, 24)]
     (tmp_path / "shard-000001.nc").unlink()
-    generate(PLAIN, tmp_path, workers=1, progress=told.append)
+    generate(PLAIN, tmp_path, workers=Workers(1, progress=told.append))
     assert told[-1][:3] == (24, 24, 8)
-    generate(PLAIN, tmp_path, workers=1, progress=told.append)
+    generate(PLAIN, tmp_path, workers=Workers(1, progress=told.append))
     assert len(told) == 4
 
 
@@ -241,7 +242,7 @@ def test_a_cluster_makes_the_same_though_a_worker_is_killed(many, tmp_path):
                 team[1].kill()
 
         out = tmp_path / "out"
-        generate(spec, out, scheduler=where, progress=kill_one)
+        generate(spec, out, workers=Workers(where, progress=kill_one))
         assert team[1].wait(10) == -signal.SIGKILL
         assert team[2].poll() is None
         assert hashes(out) == expected
@@ -253,11 +254,11 @@ def test_a_cluster_makes_the_same_though_a_worker_is_killed(many, tmp_path):
 
 def test_no_scheduler_is_told(tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    with refused(ParameterError, "'nowhere'", "missing port number"):
-        generate(PLAIN, tmp_path, scheduler="nowhere")
+    with refused(ParameterError, "'nowhere'", "tcp:"):
+        generate(PLAIN, tmp_path, workers="nowhere")
     monkeypatch.setitem(sys.modules, "distributed", None)
     with refused(ParameterError, "Dask", "'tactile-bayes[cluster]'"):
-        generate(PLAIN, tmp_path, scheduler="tcp://127.0.0.1:1")
+        generate(PLAIN, tmp_path, workers="tcp://127.0.0.1:1")
 
 
 # ---- folders
@@ -466,7 +467,7 @@ def test_two_runs_at_once_in_one_folder_are_refused(tmp_path):
         begun.set()
         go_on.wait(20)
 
-    first = threading.Thread(target=lambda: generate(PLAIN, tmp_path, workers=1, progress=wait))
+    first = threading.Thread(target=lambda: generate(PLAIN, tmp_path, workers=Workers(1, progress=wait)))
     first.start()
     try:
         assert begun.wait(20)

@@ -232,7 +232,7 @@ def test_a_prediction_that_is_no_number_is_named():
 
 @pytest.mark.parametrize(("friction", "named"), [(0.2, True), pytest.param(0.0, False, marks=pytest.mark.slow)])
 def test_a_sweep_that_goes_back_in_contact_is_named_where_there_is_friction(friction, named):
-    there_and_back = scan(Parabola(0.5, 0.5), drive=Motion(0.0, 0.0, [0.4, 2.2, 0.4]), drive_step=0.1).record
+    there_and_back = scan(Parabola(0.5, 0.5), drive=Motion(0.0, 0.0, [0.4, 2.2, 0.4], drive_step=0.1)).record
     back = np.arange(there_and_back.sizes["sample"]) > 18
     columns = {"sweep": ("sample", back.astype(int)), "direction": ("sample", np.where(back, "backward", "forward"))}
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(there_and_back.assign(columns), rng=1)

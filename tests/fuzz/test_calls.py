@@ -17,11 +17,13 @@ from helpers.refusals import refused
 from helpers.wrong_values import MORE, RESULTS, WRONG
 from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
+from tactile_bayes.tasks import Workers
 
 ROOT = Path(__file__).parents[2]
 NOT_CALLED = {
     *(f"contours.{name}" for name in ("Contour", "Graph", "Single", "Locus")),
-    *(f"datasets.{name}" for name in ("Production", "Specification", "Verification")),
+    *(f"datasets.{name}" for name in ("Specification", "Verification")),
+    "TaskProgress",
     *(f"elastica.{name}" for name in ("Contact", "Wrench", "forward_contacts", "lever_of_stem")),
 }
 """Bases, results, and parts of the forward model that its own code alone calls."""
@@ -57,12 +59,12 @@ SENSIBLE = {
     ),
     "paper_figures.figure(rng)": lambda value: value is None or SENSIBLE["rng"](value),
     "paper_figures.caption(rng)": lambda value: value is None or SENSIBLE["rng"](value),
-    "workers": lambda value: value is None or (type(value) is int and value > 0),
+    "workers": lambda value: value is None or isinstance(value, str | Workers) or (type(value) is int and value > 0),
     "rod": a_kind(tb.Rod),
     "load_cell": a_kind(tb.LoadCell),
     "rig": a_kind(tb.Rig),
     "settings": a_kind(tb.SamplerSettings),
-    "truth": a_kind(tb.contours.Contour),
+    "truth": a_kind(tb.contours.Contour, tb.Rig, tb.calibration.Misspecification),
     "posterior": a_kind(xr.DataTree, xr.Dataset),
     "record": a_kind(xr.Dataset),
     "measured": a_kind(xr.Dataset, np.ndarray),

@@ -20,9 +20,9 @@ def drawn_scene(rng):
     drive = tb.Motion(
         side * np.array([-1.2, 1.2]), rng.uniform(-0.5, -0.1, 2), 0.5 * np.pi + side * rng.uniform(-1.3, 1.3, 2)
     )
-    drive, step = [(None, np.radians(3.0)), (drive, None)][rng.integers(2)]
+    drive = [tb.Rotation(drive_step=np.radians(3.0)), drive][rng.integers(2)]
     record = tb.scan(
-        tb.contours.Parabola(*numbers), drive=drive, rig=Rig(rod=rod, unknown={"friction": friction}), drive_step=step
+        tb.contours.Parabola(*numbers), drive=drive, rig=Rig(rod=rod, unknown={"friction": friction})
     ).record
     return record, friction, tb.contours.Parabola(*(np.array([number]) for number in numbers))
 

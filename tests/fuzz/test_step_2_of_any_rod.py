@@ -18,14 +18,13 @@ def drawn_record(rng):
     contour = tb.contours.Parabola(np.exp(rng.uniform(-2, 2)), rng.uniform(0.05, 0.9), rng.uniform(-0.5, 0.5))
     side = float(rng.choice([-1.0, 1.0]))
     drive = tb.Motion(
-        side * np.array([-1.2, 1.2]), rng.uniform(-0.5, 0.2, 2), 0.5 * np.pi + side * rng.uniform(-1.3, 1.3, 2)
+        side * np.array([-1.2, 1.2]), rng.uniform(-0.5, 0.2, 2), 0.5 * np.pi + side * rng.uniform(-1.3, 1.3, 2), 0.08
     )
     try:
         record = tb.scan(
             contour,
-            drive=[None, drive][rng.integers(2)],
+            drive=[tb.Rotation(drive_step=0.08), drive][rng.integers(2)],
             rig=Rig(rod=rod, unknown={"friction": friction}),
-            drive_step=0.08,
         ).record
     except (tb.errors.ReachError, tb.errors.ContourError):
         return None

@@ -16,6 +16,7 @@ from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, swept
 from tactile_bayes.diagnostics.inspection import Inspection
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.mechanics import elastica
+from tactile_bayes.planning.bands import Bands
 from tactile_bayes.rig import FileFormat, Rig
 
 PARABOLA = tb.contours.Parabola(0.5, 0.5)
@@ -114,28 +115,30 @@ def gap() -> xr.Dataset:
 
 @functools.cache
 def plan() -> tb.planning.Plan:
-    return tb.planning.Plan(PARABOLA, rig=STATED, drive_step=0.1)
+    return tb.planning.Plan(PARABOLA, rig=STATED, drive=tb.Rotation(drive_step=0.1))
 
 
 @functools.cache
 def plan_si() -> tb.planning.Plan:
     contour = tb.contours.Parabola(5.0, 0.05)
-    return tb.planning.Plan(contour, rig=Rig(rod=ROD, load_cell=SI_CELL, unknown="nothing"), drive_step=0.1)
+    return tb.planning.Plan(
+        contour, rig=Rig(rod=ROD, load_cell=SI_CELL, unknown="nothing"), drive=tb.Rotation(drive_step=0.1)
+    )
 
 
 @functools.cache
 def sensitivity() -> xr.DataTree:
-    return tb.sensitivity(PARABOLA, rng=1, rig=STATED, drive_step=0.1, samples=8)
+    return tb.sensitivity(PARABOLA, rng=1, rig=STATED, drive=tb.Rotation(drive_step=0.1), samples=8)
 
 
 @functools.cache
 def designed() -> xr.Dataset:
-    return tb.design(posterior(), bases=[(0.0, 0.0), (0.0, -0.1)], drive_steps=[0.1], draws=2, rng=1)
+    return tb.design(posterior(), drives=[tb.Rotation((0.0, y), drive_step=0.1) for y in (0.0, -0.1)], draws=2, rng=1)
 
 
 @functools.cache
 def mapped() -> xr.Dataset:
-    options = {"noise_factors": [0.1, 1.0], "replicates": 1, "drive_step": 0.1}
+    options = {"over": {"noise_factor": [0.1, 1.0]}, "replicates": 1, "drive": tb.Rotation(drive_step=0.1)}
     return tb.planning.error_map(["II"], rig=STATED, rng=1, workers=1, **options)
 
 
@@ -327,11 +330,14 @@ def _rod_and_sweep_calls() -> dict[str, Call]:
             tb.Rod.from_shape, {"x": x, "y": x**2, "flexural_rigidity": 1e-5, "scatter": 1e-5, **shape}
         ),
         "Rod.mirrored": Call(tb.Rod().mirrored, {"side": [1.0, -1.0]}),
-        "Rotation": Call(tb.Rotation, {"base": (0.0, 0.0)}),
+        "Rotation": Call(
+            tb.Rotation,
+            {"base": (0.0, 0.0), "direction": "both", "drive_step": 0.1, "drive_angles": None},
+        ),
         "Translation": Call(tb.Translation, dict(vars(CARRIED))),
         "Translation.at": Call(CARRIED.at, {"travels": [0.0, 0.5]}),
         "Translation.side": Call(CARRIED.side, {"length": 1.0}),
-        "Motion": Call(tb.Motion, {"x": [0.8, -0.7], "y": 0.0, "drive_angle": [0.8, 1.6]}),
+        "Motion": Call(tb.Motion, {"x": [0.8, -0.7], "y": 0.0, "drive_angle": [0.8, 1.6], "drive_step": 0.1}),
         "Motion.at": Call(motion.at, {"travels": [0.0, 0.5]}),
         "scan": Call(tb.scan, {**scan, "drive": None, "direction": "both", "drive_step": 0.1, "drive_angles": None}),
         "scan_many": Call(
@@ -412,7 +418,7 @@ def _record_calls(folder: Path) -> dict[str, Call]:
         "datasets.contour_of": Call(tb.datasets.contour_of, {"record": tb.datasets.record(SPECIFICATION, 0)}),
         "datasets.generate": Call(
             tb.datasets.generate,
-            {"spec": SPECIFICATION, "out": folder / "set", "workers": 1, "scheduler": None, "progress": None},
+            {"spec": SPECIFICATION, "out": folder / "set", "workers": 1},
         ),
         "datasets.open": Call(tb.datasets.open, {"path": _data_set(folder)}),
         "datasets.read_specification": Call(tb.datasets.read_specification, {"source": SPECIFICATION}),
@@ -451,7 +457,8 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
             tb.infer_contours,
             {
                 **rig,
-                **sampled,
+                "rng": 1,
+                "settings": BRIEF,
                 "records": [broken],
                 "out": folder / "many",
                 "family": "parabola",
@@ -573,30 +580,24 @@ def _summary_calls() -> dict[str, Call]:
                 "rng": 1,
                 "out": None,
                 "workers": 1,
-                "scheduler": None,
-                "progress": None,
             },
         ),
     }
 
 
 def _planning_calls() -> dict[str, Call]:
-    rig = {"rig": STATED, "family": None}
-    sweep = {"drive": None, "base": (0.0, 0.0), "direction": "both", "drive_step": 0.1, "drive_angles": None}
-    tasks = {"out": None, "workers": 1, "scheduler": None, "progress": None}
+    sweep = {"rig": STATED, "family": None, "drive": tb.Rotation(drive_step=0.1)}
+    tasks = {"out": None, "workers": 1}
     made = updated().posterior()
-    sampled = {"rng": 1, "family": "parabola", "settings": None, "probability": 0.9}
-    driven = {"drive": None, "base": (0.0, 0.0), "direction": "both", "drive_angles": None}
-    calibration = {"rig": STATED, **sampled, **driven, "truth": None, "misspecification": None}
+    calibration = {"rig": STATED, "rng": 1, "family": "parabola", "settings": None, "drive": None, "truth": None}
     return {
-        "Plan": Call(tb.planning.Plan, {**rig, **sweep, "contour": PARABOLA}),
+        "Plan": Call(tb.planning.Plan, {**sweep, "contour": PARABOLA}),
         "Plan.reconstruct": Call(plan().reconstruct, {"record": measured(), "method": "raw"}),
         "Plan.with_noise": Call(plan().with_noise, {"factor": 2.0}),
         "Plan.certain": Call(plan().certain, {"record": ideal()}),
         "sensitivity": Call(
             tb.sensitivity,
             {
-                **rig,
                 **sweep,
                 "contour": PARABOLA,
                 "rng": 1,
@@ -604,7 +605,6 @@ def _planning_calls() -> dict[str, Call]:
                 "probability": 0.9,
                 "samples": 8,
                 "parts": ["information", "required_noise"],
-                "progress": None,
             },
         ),
         "design": Call(
@@ -613,31 +613,28 @@ def _planning_calls() -> dict[str, Call]:
                 **tasks,
                 "known": posterior(),
                 "rng": 1,
-                "bases": [(0.0, 0.0)],
-                "drives": None,
-                "drive_steps": [0.2],
+                "drives": [tb.Rotation(drive_step=0.2)],
                 "criterion": "band",
+                "nested": False,
                 "draws": 2,
-                "span": None,
-                "probability": 0.9,
                 "rig": None,
             },
         ),
+        "Bands": Call(Bands, {"probability": 0.9, "family": None, "posterior_cells": 0, "posterior_replicates": 1}),
+        "Criterion": Call(tb.planning.Criterion, {"name": "band", "span": None, "probability": 0.9}),
+        "usual_drives": Call(tb.planning.usual_drives, {"known": posterior(), "rig": None, "drive_step": 0.1}),
+        "Workers": Call(tb.tasks.Workers, {"where": 1, "progress": None}),
         "error_map": Call(
             tb.planning.error_map,
             {
-                **rig,
                 **tasks,
                 "contours": ["II"],
+                "rig": STATED,
                 "rng": 1,
-                "distances": [0.5],
-                "noise_factors": [1.0],
-                "base_x": 0.0,
-                "drive_step": 0.2,
+                "over": {"distance": [0.5], "noise_factor": [1.0]},
+                "drive": tb.Rotation(drive_step=0.2),
                 "replicates": 1,
-                "posterior_cells": 0,
-                "posterior_replicates": 1,
-                "probability": 0.9,
+                "bands": Bands(),
             },
         ),
         "required_noise": Call(
@@ -670,7 +667,8 @@ def _planning_calls() -> dict[str, Call]:
         "calibrate": Call(tb.calibrate, {**calibration, **tasks, "replicates": 1}),
         "calibration_replicate": Call(tb.calibration.calibration_replicate, {**calibration, "number": 0, "out": None}),
         "Misspecification": Call(
-            tb.calibration.Misspecification, {"base_shift": (0.0, 0.0), "flat_spot": (0.1, 2.0), "family": "circle"}
+            tb.calibration.Misspecification,
+            {"rig": STATED, "base_shift": (0.0, 0.0), "flat_spot": (0.1, 2.0), "family": "circle"},
         ),
     }
 

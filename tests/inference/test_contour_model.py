@@ -21,10 +21,10 @@ RUBBING = Rig(load_cell=CELL, unknown={**NOTHING, "friction": "default"})
 def upright():
     """A rod that is carried upright against a circle, in both directions: its tip would stick."""
     drives = [
-        Translation(base=(side * -0.5, 0.0), heading=0.0 if side > 0 else np.pi, drive_angle=0.5 * np.pi, travel=1.0)
+        Translation((side * -0.5, 0.0), 0.0 if side > 0 else np.pi, 0.5 * np.pi, travel=1.0, drive_step=0.05)
         for side in (1, -1)
     ]
-    return CELL.measure(scan(Circle(0.3, q=0.8), drive=drives, drive_step=0.05).record, rng=1)
+    return CELL.measure(scan(Circle(0.3, q=0.8), drive=drives).record, rng=1)
 
 
 def test_friction_that_excludes_every_path_is_named_with_the_way_out(upright, monkeypatch):

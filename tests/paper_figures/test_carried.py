@@ -17,10 +17,10 @@ from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import Motion, Rotation, Translation, scan
 
 STEP = 0.05
-AHEAD = Translation(base=(1.4, 0.0), heading=np.pi, drive_angle=0.5 * np.pi, travel=2.8)
-BACK = Translation(base=(-1.4, 0.0), heading=0.0, drive_angle=0.5 * np.pi, travel=2.8)
-RETURN = Motion([1.0, 0.3, 1.0], [-0.5, -0.2, -0.5], 1.5)
-TURNED = Motion([1.4, 0.2, -1.4], [0.0, -0.05, 0.0], np.radians([70.0, 90.0, 110.0]))
+AHEAD = Translation(base=(1.4, 0.0), heading=np.pi, drive_angle=0.5 * np.pi, travel=2.8, drive_step=STEP)
+BACK = Translation(base=(-1.4, 0.0), heading=0.0, drive_angle=0.5 * np.pi, travel=2.8, drive_step=STEP)
+RETURN = Motion([1.0, 0.3, 1.0], [-0.5, -0.2, -0.5], 1.5, STEP)
+TURNED = Motion([1.4, 0.2, -1.4], [0.0, -0.05, 0.0], np.radians([70.0, 90.0, 110.0]), STEP)
 WORDS = "base carried from (1.4, 0) to (-1.4, 0) L, drive angle 90°"
 
 pytestmark = pytest.mark.usefixtures("settings_left_alone")
@@ -28,11 +28,11 @@ pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 def made(number, drive=AHEAD, **options):
     with style("print"):
-        return figure(number, **{"drive": drive, "drive_step": STEP, "rods": 5} | options)
+        return figure(number, **{"drive": drive, "rods": 5} | options)
 
 
 def swept(profile, q, drive=AHEAD):
-    return scan(paper_profile(profile, q=q), drive=drive, drive_step=STEP)
+    return scan(paper_profile(profile, q=q), drive=drive)
 
 
 @pytest.fixture(scope="module")
@@ -250,7 +250,7 @@ def test_captions_say_what_carries_the_base():
 
 @pytest.mark.parametrize(("drive", "name"), [(AHEAD, "translation"), (TURNED, "motion")])
 def test_files_are_named_by_the_drive_too(tmp_path, drive, name):
-    options = {"distances": [0.5], "drive_step": STEP}
+    options = {"distances": [0.5]}
     draw_all(tmp_path, only=[3], formats=["svg"], **options)
     files = draw_all(tmp_path, only=[3], formats=["svg"], drive=drive, **options)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["figure_03.svg", f"figure_03_{name}.svg"]
@@ -262,7 +262,7 @@ def test_files_are_named_by_the_drive_too(tmp_path, drive, name):
     [
         ({"drive": Rotation()}, ParameterError, ["drive", "Translation", "Motion"]),
         ({"drive": Motion(0.5, 0.0, [0.8, 1.6])}, ParameterError, ["drive", "does not move"]),
-        ({"drive": AHEAD, "drive_step": -0.1}, ParameterError, ["drive_step", -0.1]),
+        ({"drive": AHEAD, "drive_step": 0.1}, ParameterError, ["drive_step", "Translation"]),
         ({"drive": AHEAD, "distances": [0.5, 1.2]}, ReachError, ["profile I", "q = 1.2", "does not touch"]),
         ({"drive": Translation((0.6, 0.0), np.pi, 1.6, 1.0)}, ContourError, ["profile I", "q = 0.3", "beginning"]),
     ],

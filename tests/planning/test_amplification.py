@@ -46,7 +46,7 @@ PLANS = {
         ),
     ),
     "friction": Plan(PROFILE, Rig(load_cell=replace(QUIET, drive_angle_noise=2e-6), unknown={"friction": 0.3})),
-    "another pivot": Plan(paper_profile("III", q=0.4), Rig(load_cell=QUIET), base=(0.2, -0.1)),
+    "another pivot": Plan(paper_profile("III", q=0.4), Rig(load_cell=QUIET), drive=tb.Rotation((0.2, -0.1))),
 }
 
 
@@ -60,7 +60,7 @@ def in_the_middle(name):
         every = first + (snap - first) * np.linspace(0.05, 0.95, 10)
         changes = np.array([change.drive_angle for change in sweep.transitions])
         angles.append(every[np.all(np.abs(every[:, None] - changes) > 0.02, axis=1)])
-    plan = replace(plan, drive_angles=np.unique(np.concatenate(angles)))
+    plan = plan.at_angles(np.concatenate(angles))
     return plan, amplification(plan)
 
 
@@ -193,9 +193,13 @@ def test_both_directions_are_mirror_images():
 def test_a_rod_in_si_is_a_scaled_one():
     """Gains in m/(N m), m/N and m/rad."""
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
-    angles = in_the_middle("plain")[0].drive_angles
+    angles = in_the_middle("plain")[0].drives[0].drive_angles
     si = amplification(
-        Plan(enlarged(PROFILE, 0.2), Rig(load_cell=in_units_of(QUIET, rod), rod=rod), drive_angles=angles)
+        Plan(
+            enlarged(PROFILE, 0.2),
+            Rig(load_cell=in_units_of(QUIET, rod), rod=rod),
+            drive=tb.Rotation(drive_angles=angles),
+        )
     )
     plain = in_the_middle("plain")[1]
     per = rod.length / np.array([*rod.load_units, 1.0])
@@ -225,9 +229,9 @@ def test_the_drive_angle_alone_does_not_move_raw_contacts_along_the_contour():
 
 
 def test_growth_is_what_single_samples_show():
-    plan = Plan(PROFILE, direction="forward")
+    plan = Plan(PROFILE, drive=tb.Rotation(direction="forward"))
     first = plan.scan.sweeps[0].first_contact.drive_angle
-    near = amplification(replace(plan, drive_angles=first + np.array([1e-4, 2e-4, 0.5])))
+    near = amplification(plan.at_angles(first + np.array([1e-4, 2e-4, 0.5])))
     raw = near.sel(reconstruction="raw")
     np.testing.assert_allclose(raw.after_first_contact.values, [1e-4, 2e-4, 0.5], rtol=1e-9)
     for sd in (raw.sd_along.values, raw.sd_across.values):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -10,7 +12,7 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import amplification
-from tactile_bayes.planning.candidate import Candidate
+from tactile_bayes.planning.criterion import Criterion
 from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import Rig
@@ -43,7 +45,7 @@ def test_amplification_is_the_change_of_a_contact_by_a_reading():
 
 
 def test_distances_are_along_the_drive():
-    plan = Plan(CIRCLE, Rig(load_cell=CELL), drive=SHIFTS[0], drive_step=0.05)
+    plan = Plan(CIRCLE, Rig(load_cell=CELL), drive=replace(SHIFTS[0], drive_step=0.05))
     found, (sweep,) = amplification(plan), plan.scan.sweeps
     travel = 0.8 - found.base_x.values
     np.testing.assert_allclose(found.after_first_contact, travel - sweep.first_contact.travel, atol=1e-12)
@@ -71,12 +73,12 @@ def test_sensitivity_tells_what_a_band_would_be(drive):
 def test_drives_are_candidates_of_a_design():
     """Two translations tell more than one of them, and a pivot among drives is what it is among pivots."""
     known = tb.Family("circle", r=stats.uniform(0.25, 0.1), q=stats.uniform(0.75, 0.1), x_c=stats.norm(0.0, 0.02))
-    options = {"draws": 4, "rng": 1, "span": (-0.2, 0.2)}
+    options = {"draws": 4, "rng": 1, "criterion": Criterion(span=(-0.2, 0.2))}
     found = tb.design(known, drives=[SHIFTS[0], SHIFTS, tb.Rotation()], **options)
     assert found.drive.values[0] == "carried from (0.8, 0) to (-0.8, 0) at 63°"
     assert found.width[1] < found.width[0]
     assert np.all(found.reached > 0.0)
-    pivot = tb.design(known, bases=[(0.0, 0.0)], **options)
+    pivot = tb.design(known, drives=[tb.Rotation()], **options)
     assert float(pivot.width[0]) == pytest.approx(float(found.width[2]), rel=1e-12)
     with refused(ParameterError, "drive"):
         tb.design(known, drives=["left"], **options)
@@ -85,12 +87,12 @@ def test_drives_are_candidates_of_a_design():
 @pytest.mark.slow
 def test_a_posterior_of_a_carried_rod_is_what_is_known():
     """Its drive is none of the pivots so far, and what it touched leaves no gap."""
-    measured = CELL.measure(tb.scan(CIRCLE, drive=SHIFTS[0], drive_step=0.04).record, rng=1)
+    measured = CELL.measure(tb.scan(CIRCLE, drive=replace(SHIFTS[0], drive_step=0.04)).record, rng=1)
     settings = tb.SamplerSettings(walkers=32, ensembles=2)
     posterior = tb.infer_contour(
         measured, family="circle", rig=Rig(load_cell=CELL, unknown="nothing"), rng=1, settings=settings
     )
-    found = tb.design(posterior, drives=[SHIFTS[1]], bases=[(0.0, 0.0)], draws=4, rng=1)
+    found = tb.design(posterior, drives=[tb.Rotation(), SHIFTS[1]], draws=4, rng=1)
     assert found.sizes["pivot"] == 0
     assert np.all(found.width < found.present_width)
     assert np.all(found.gap == 0.0)
@@ -98,5 +100,5 @@ def test_a_posterior_of_a_carried_rod_is_what_is_known():
 
 def test_candidates_that_begin_alike_are_told_apart():
     turns = [tb.Rotation(), tb.Rotation((0.1, 0.0))], [tb.Rotation(), tb.Rotation((0.2, 0.0))]
-    one, other = (Candidate(tuple(drives), 0.05).described for drives in turns)
+    one, other = ([drive.description for drive in drives] for drives in turns)
     assert one != other

@@ -16,23 +16,30 @@ from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.candidate import Candidate, Question, _band_widths, expected_of
-from tactile_bayes.planning.design import design
+from tactile_bayes.planning.criterion import Criterion
+from tactile_bayes.planning.design import design, usual_drives
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.knowledge import known_from_posterior, known_from_prior
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.rig_prior import RigPrior
-from tactile_bayes.sweep import Rotation, scan
+from tactile_bayes.sweep import Rotation, Translation, scan
+from tactile_bayes.tasks import Workers
 
 FAMILY = Family("parabola", a=stats.lognorm(0.3, scale=0.6), q=stats.uniform(0.4, 0.2), x_c=stats.norm(0.0, 0.05))
 AS_STATED = Rig(unknown="nothing")
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 QUICK = SamplerSettings(ensembles=2, walkers=26, max_r_hat=1.05, min_ess=200.0, max_steps=400)
 STEP = float(np.radians(4.0))
+TRANSLATION = Translation((0.8, 0.0), np.pi, 1.2, 1.5)
+
+
+def pivots(*bases, step=2.5 * STEP):
+    return [Rotation(base, drive_step=step) for base in bases]
 
 
 def designed(known=FAMILY, **options):
-    asked = {"bases": [(0.0, 0.0), (0.2, 0.0)], "drive_steps": [2.5 * STEP], "draws": 3, "rng": 1}
+    asked = {"drives": pivots((0.0, 0.0), (0.2, 0.0)), "draws": 3, "rng": 1}
     own = {} if isinstance(known, xr.DataTree) else {"rig": AS_STATED}
     return design(known, **(asked | own | options))
 
@@ -57,10 +64,12 @@ def test_with_one_truth_it_is_the_information_of_its_record():
     point = np.array([0.5, 0.5, 0.0, 1.0])
     one = replace(told, points=point[None], precision=1e-9 * np.eye(4))
     x = np.linspace(-0.5, 0.5, 11)
-    found = expected_of((Question(one, (Candidate((Rotation(),), STEP),), x, 0.95, 0, 1), 0))
+    found = expected_of((Question(one, (Candidate((Rotation(drive_step=STEP),)),), x, 0.95, 0, 1), 0))
     angles = np.arange(np.radians(-30.0), np.radians(210.0), STEP)
     plan = Plan(
-        Parabola(0.5, q=0.5), Rig(load_cell=told.experiment.rig.load_cell, unknown="nothing"), drive_angles=angles
+        Parabola(0.5, q=0.5),
+        Rig(load_cell=told.experiment.rig.load_cell, unknown="nothing"),
+        drive=Rotation(drive_angles=angles),
     )
     bounds = information(plan)
     slopes = np.stack([x**2, np.ones_like(x), -x * 2.0 * 0.5], axis=1)  # of a (x − x_c)² + q
@@ -80,7 +89,7 @@ def test_a_noisier_load_cell_than_stated_leaves_a_wider_band():
     for scale in (1.0, 2.0):
         points = np.array([[0.5, 0.5, 0.0, scale]])
         one = replace(told, points=points, precision=1e-9 * np.eye(4))
-        question = Question(one, (Candidate((Rotation(),), STEP),), np.linspace(-0.5, 0.5, 5), 0.9, 0, 1)
+        question = Question(one, (Candidate((Rotation(drive_step=STEP),)),), np.linspace(-0.5, 0.5, 5), 0.9, 0, 1)
         widths.append(expected_of((question, 0)))
     assert widths[1].width[0] == pytest.approx(2.0 * widths[0].width[0], rel=1e-6)
 
@@ -99,7 +108,7 @@ def test_laplace_and_nested_monte_carlo_agree(posterior):
 
 @pytest.mark.slow
 def test_a_record_more_makes_the_band_narrower_and_finer_steps_narrower_still(posterior):
-    found = designed(posterior, bases=[(0.0, 0.0)], drive_steps=[STEP, 0.25 * STEP])
+    found = designed(posterior, drives=[Rotation(drive_step=STEP), Rotation(drive_step=0.25 * STEP)])
     coarse, fine = found.width.values
     present = float(found.present_width)
     # A record like the first halves the variance; four times as many samples leave a fifth of it.
@@ -110,7 +119,7 @@ def test_a_record_more_makes_the_band_narrower_and_finer_steps_narrower_still(po
 
 @pytest.mark.slow
 def test_from_the_same_pivot_the_gap_stays_and_from_beside_it_closes(posterior):
-    found = designed(posterior, bases=[(0.0, 0.0), (0.3, 0.0)])
+    found = designed(posterior, drives=pivots((0.0, 0.0), (0.3, 0.0)))
     sweeps = scan(Parabola(0.5, q=0.5)).events
     width = sweeps["forward"].snap_off.contact_x - sweeps["backward"].snap_off.contact_x
     assert found.gap.values[0] == pytest.approx(width, abs=0.02)
@@ -119,7 +128,7 @@ def test_from_the_same_pivot_the_gap_stays_and_from_beside_it_closes(posterior):
 
 def test_mirrored_candidates_are_as_good(posterior):
     """Of an object that is nearly symmetric."""
-    found = designed(posterior, bases=[(-0.2, 0.0), (0.2, 0.0)], draws=6)
+    found = designed(posterior, drives=pivots((-0.2, 0.0), (0.2, 0.0)), draws=6)
     left, right = found.width.values
     assert left == pytest.approx(right, rel=0.1)
 
@@ -129,13 +138,13 @@ def test_mirrored_candidates_are_as_good(posterior):
     [("band", "width", np.argmin), ("gap", "gap", np.argmin), ("information", "information", np.argmax)],
 )
 def test_the_best_is_the_best(posterior, criterion, name, best):
-    found = designed(posterior, bases=[(0.0, 0.0), (0.1, 0.0), (0.3, 0.0)], criterion=criterion)
+    found = designed(posterior, drives=pivots((0.0, 0.0), (0.1, 0.0), (0.3, 0.0)), criterion=criterion)
     assert int(found.best) == best(found[name].values)
 
 
 def test_what_cannot_be_reached_tells_nothing(posterior):
     """The band stays as it is."""
-    found = designed(posterior, bases=[(0.0, 0.0), (0.0, -2.0)])
+    found = designed(posterior, drives=pivots((0.0, 0.0), (0.0, -2.0)))
     assert found.reached.values.tolist() == [1.0, 0.0]
     assert found.width.values[1] == pytest.approx(float(found.present_width), rel=1e-9)
     assert found.information.values[1] == pytest.approx(0.0, abs=1e-9)
@@ -143,7 +152,7 @@ def test_what_cannot_be_reached_tells_nothing(posterior):
 
 def test_candidates_that_are_all_out_of_reach_are_refused(posterior):
     with refused(ReachError, "x = 0", "y from -3 to -2", "1 L"):
-        designed(posterior, bases=[(0.0, -2.0), (0.0, -3.0)])
+        designed(posterior, drives=pivots((0.0, -2.0), (0.0, -3.0)))
 
 
 @pytest.mark.slow
@@ -159,24 +168,24 @@ def test_it_goes_on_where_it_was_stopped(tmp_path):
     def stop(progress):
         raise StoppedError
 
-    asked = {"bases": [(0.0, 0.0), (0.0, -2.0)], "draws": 2}
+    asked = {"drives": pivots((0.0, 0.0), (0.0, -2.0)), "draws": 2}
     with pytest.raises(StoppedError):
-        designed(out=tmp_path, progress=stop, **asked)
+        designed(out=tmp_path, workers=Workers(1, stop), **asked)
     steps = []
-    found = designed(out=tmp_path, progress=steps.append, **asked)
+    found = designed(out=tmp_path, workers=Workers(1, steps.append), **asked)
     assert [(step.done, step.made) for step in steps] == [(2, 1)]
     assert found.identical(designed(**asked))
     by_gap = designed(out=tmp_path, criterion="gap", **asked)  # of the same numbers
     assert by_gap.width.identical(found.width)
     with refused(StudyError, "another experiment", "seed is 1 there and 2 here"):
-        designed(out=tmp_path, **asked, seed=2)
+        designed(out=tmp_path, **asked, rng=2)
 
 
 @pytest.mark.slow
 def test_the_seed_decides():
-    one = designed(draws=2, bases=[(0.0, 0.0)])
-    assert one.identical(designed(draws=2, bases=[(0.0, 0.0)]))
-    assert not one.width.identical(designed(draws=2, bases=[(0.0, 0.0)], seed=2).width)
+    one = designed(draws=2, drives=pivots((0.0, 0.0)))
+    assert one.identical(designed(draws=2, drives=pivots((0.0, 0.0))))
+    assert not one.width.identical(designed(draws=2, drives=pivots((0.0, 0.0)), rng=2).width)
 
 
 @pytest.mark.slow
@@ -189,7 +198,7 @@ def test_in_metres_and_newtons_it_is_the_same():
         q=stats.uniform(0.4 * 0.2, 0.2 * 0.2),
         x_c=stats.norm(0.0, 0.05 * 0.2),
     )
-    si = designed(known, rig=Rig(rod=rod, load_cell=cell, unknown="nothing"), bases=[(0.0, 0.0), (0.04, 0.0)])
+    si = designed(known, rig=Rig(rod=rod, load_cell=cell, unknown="nothing"), drives=pivots((0.0, 0.0), (0.04, 0.0)))
     plain = designed()
     np.testing.assert_allclose(si.width.values / 0.2, plain.width.values, rtol=1e-3)
     np.testing.assert_allclose(si.information.values, plain.information.values, rtol=1e-3)
@@ -222,8 +231,8 @@ def test_what_a_posterior_knows_of_rig_and_contour_is_known(measured):
 def test_shifts_of_pivots_are_left_out():
     """Of a rig as of a posterior, for candidates of two pivots, too."""
     rig = AS_STATED.with_unknown(base="default")
-    drives = [[Rotation(), Rotation((0.2, 0.0))]]
-    found, right = (designed(rig=each, bases=None, drives=drives) for each in (rig, AS_STATED))
+    drives = [pivots((0.0, 0.0), (0.2, 0.0))]
+    found, right = (designed(rig=each, drives=drives) for each in (rig, AS_STATED))
     np.testing.assert_array_equal(found.width, right.width)
 
 
@@ -253,18 +262,38 @@ def test_weighted_bands():
         {"criterion": "best"},
         {"draws": 1},
         {"rng": -1},
-        {"probability": 1.0},
-        {"drive_steps": [0.0]},
-        {"drive_steps": []},
-        {"bases": [(0.0, 0.0), (0.0, 0.0)]},
-        {"bases": [0.0, 1.0]},
-        {"span": (1.0, 0.0)},
+        {"drives": []},
+        {"drives": pivots((0.0, 0.0), (0.0, 0.0))},
+        {"drives": Rotation()},
     ],
     ids=str,
 )
 def test_what_is_impossible_is_refused(wrong):
     with refused(ParameterError, **wrong):
         designed(**wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"probability": 1.0}, {"span": (1.0, 0.0)}, {"span": 0.5}], ids=str)
+def test_criteria_that_are_none_are_refused(wrong):
+    with refused(ParameterError, **wrong):
+        Criterion("gap", **wrong)
+
+
+def test_candidates_say_what_they_are(posterior):
+    drives = [Rotation(direction="forward", drive_step=0.2), [Rotation(drive_angles=[0.5, 1.0, 1.5]), TRANSLATION]]
+    found = designed(posterior, drives=[*drives, replace(TRANSLATION, drive_step=0.25)], draws=2)
+    words = ["turned about (0, 0), forward alone", f"turned about (0, 0) and {found.drive.values[2]}"]
+    assert found.drive.values[:2].tolist() == words
+    assert found.drive.values[2].startswith("carried from (0.8, 0) to (-0.7, 0)")
+    assert found.samples.values.tolist() == [21, 2 * 3 + 121, 7]
+    np.testing.assert_allclose(found.drive_step, [0.2, 0.5, np.radians(40.0)])
+
+
+def test_the_usual_drives_are_about_the_pivot_so_far_in_lengths_of_the_rod(posterior):
+    of_prior, so_far = (usual_drives(FAMILY, Rig(rod=Rod(0.2, 1.0))), usual_drives(posterior, drive_step=0.1))
+    assert len(of_prior) == len(set(of_prior)) == 33
+    np.testing.assert_allclose([d.base for d in of_prior], 0.2 * np.array([d.base for d in so_far]), atol=1e-15)
+    assert {drive.drive_step for drive in so_far} == {0.1}
 
 
 def test_what_is_no_knowledge_is_refused(posterior):

@@ -13,20 +13,20 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, StudyError
 from tactile_bayes.planning.amplification import amplification
+from tactile_bayes.planning.bands import Bands
 from tactile_bayes.planning.error_cell import CellOutcome
 from tactile_bayes.planning.error_map import CELLS, _identity, error_map
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.tasks import open_results_store
+from tactile_bayes.tasks import Workers, open_results_store
 
 SMALL = {
     "contours": ["II"],
-    "noise_factors": [1.0],
-    "distances": [0.4, 0.5],
+    "over": {"noise_factor": [1.0], "distance": [0.4, 0.5]},
     "replicates": 2,
     "rng": 3,
-    "drive_step": 0.1,
+    "drive": tb.Rotation(drive_step=0.1),
     "rig": Rig(unknown="nothing"),
     "workers": 1,
 }
@@ -43,7 +43,8 @@ def test_cells_are_the_same_for_any_number_of_workers():
 
 
 def test_another_seed_draws_other_noise_and_expects_the_same():
-    other, nearer = error_map(**{**SMALL, "rng": 4, "distances": [0.4]}), small().sel(distance=[0.4])
+    over = {"noise_factor": [1.0], "distance": [0.4]}
+    other, nearer = error_map(**{**SMALL, "rng": 4, "over": over}), small().sel(distance=[0.4])
     drawn = "rms_along"
     assert np.all(other[drawn].values != nearer[drawn].values)
     np.testing.assert_array_equal(other.expected_gap_width.values, nearer.expected_gap_width.values)
@@ -62,7 +63,7 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
             raise KilledError
 
     with pytest.raises(KilledError):
-        error_map(**SMALL, out=tmp_path, progress=kill)
+        error_map(**{**SMALL, "workers": Workers(1, kill)}, out=tmp_path)
     rows = json.loads((tmp_path / "cells.json").read_text(encoding="utf-8"))["cells"]
     assert [row["number"] for row in rows] == [0]
     made, seen, original = [], [], error_map.__globals__["error_cell"]
@@ -72,7 +73,7 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         return original(task)
 
     monkeypatch.setitem(error_map.__globals__, "error_cell", counted)
-    found = error_map(**SMALL, out=tmp_path, progress=seen.append)
+    found = error_map(**{**SMALL, "workers": Workers(1, seen.append)}, out=tmp_path)
     assert made == [1]
     assert [(p.done, p.wanted, p.made) for p in seen] == [(2, 2, 1)]
     xr.testing.assert_identical(found, small())
@@ -86,12 +87,13 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     [
         {"rng": 4},
         {"replicates": 3},
-        {"noise_factors": [2.0]},
+        {"over": {**SMALL["over"], "noise_factor": [2.0]}},
         {"contours": {"II": Parabola(0.6, 0.5)}},
         {"rig": Rig(load_cell=tb.LoadCell(force_noise=0.1, moment_noise=0.02), unknown="nothing")},
         {"rig": Rig(unknown={**NOTHING, "friction": 0.1})},
-        {"family": tb.Family("parabola", a=stats.norm(0.5, 0.1))},
-        {"base_x": 0.1},
+        {"bands": Bands(family=tb.Family("parabola", a=stats.norm(0.5, 0.1)))},
+        {"drive": tb.Rotation((0.1, 0.0), drive_step=0.1)},
+        {"drive": tb.Rotation(direction="forward", drive_step=0.1)},
     ],
     ids=str,
 )
@@ -141,16 +143,16 @@ def test_first_order_is_what_small_noise_gives():
     replicates, step = 24, np.radians(6.0)
     found = error_map(
         ["II"],
-        noise_factors=[0.01],
+        over={"noise_factor": [0.01]},
         replicates=replicates,
-        drive_step=step,
+        drive=tb.Rotation(drive_step=step),
         rng=1,
         workers=1,
         rig=Rig(unknown="nothing"),
     ).squeeze()
-    plan = Plan(paper_profile("II", q=0.5), drive_step=step).with_noise(0.01)
+    plan = Plan(paper_profile("II", q=0.5), drive=tb.Rotation(drive_step=step)).with_noise(0.01)
     angles = np.unique(plan.scan.record.drive_angle.values)
-    grown = amplification(Plan(plan.contour, Rig(load_cell=plan.cell), drive_angles=angles))
+    grown = amplification(Plan(plan.contour, Rig(load_cell=plan.cell), drive=tb.Rotation(drive_angles=angles)))
     for method in ("raw", "constrained"):
         of = grown.sel(reconstruction=method)
         ok = of.holds.values
@@ -166,7 +168,13 @@ def test_first_order_is_what_small_noise_gives():
 
 def test_first_order_is_not_what_large_noise_gives():
     found = error_map(
-        ["II"], noise_factors=[0.01, 100.0], replicates=3, drive_step=0.1, rng=1, workers=1, rig=Rig(unknown="nothing")
+        ["II"],
+        over={"noise_factor": [0.01, 100.0]},
+        replicates=3,
+        drive=tb.Rotation(drive_step=0.1),
+        rng=1,
+        workers=1,
+        rig=Rig(unknown="nothing"),
     ).squeeze()
     quiet, loud = found.isel(noise_factor=0), found.isel(noise_factor=1)
     growth = (loud.median_error / quiet.median_error).sel(reconstruction="constrained")
@@ -176,7 +184,7 @@ def test_first_order_is_not_what_large_noise_gives():
 
 
 def test_expected_widths_are_those_of_information():
-    plan = Plan(paper_profile("II", q=0.5), Rig(unknown="nothing"), base=(0.0, 0.1), drive_step=0.1)
+    plan = Plan(paper_profile("II", q=0.5), Rig(unknown="nothing"), drive=tb.Rotation((0.0, 0.1), drive_step=0.1))
     right = information(plan)
     of = small().sel(distance=0.4, noise_factor=1.0, contour="II")
     for kind in ("touched", "gap"):
@@ -205,7 +213,7 @@ def test_shares_are_shares():
 
 @pytest.mark.parametrize("distance", [1.2, 0.005])
 def test_a_rod_that_does_not_reach_leaves_a_message(distance):
-    found = error_map(**{**SMALL, "distances": [distance, 0.5], "noise_factors": [1.0], "replicates": 1})
+    found = error_map(**{**SMALL, "over": {"distance": [distance, 0.5], "noise_factor": [1.0]}, "replicates": 1})
     lost, made = found.isel(distance=0), found.isel(distance=1)
     assert made.message.item() == "ok"
     assert lost.message.item().split(":")[0] in ("ReachError", "ContourError")
@@ -216,8 +224,8 @@ def test_a_rod_that_does_not_reach_leaves_a_message(distance):
 @pytest.mark.slow
 def test_posteriors_are_inferred_in_some_cells():
     """Within a fifth of the widths that are to be expected; a record's own noise makes them differ by a tenth."""
-    options = {**SMALL, "noise_factors": [0.5, 1.0]}
-    found = error_map(**{**options, "posterior_cells": 2, "posterior_replicates": 2})
+    options = {**SMALL, "over": {**SMALL["over"], "noise_factor": [0.5, 1.0]}}
+    found = error_map(**{**options, "bands": Bands(posterior_cells=2, posterior_replicates=2)})
     inferred = np.isfinite(found.posterior_gap_width.values).ravel()
     assert inferred.tolist() == [True, False, False, True]
     for kind in ("touched", "gap"):
@@ -231,33 +239,40 @@ def test_posteriors_are_inferred_in_some_cells():
 # ---- what is refused
 
 
+@pytest.mark.parametrize("axis", ["distance", "noise_factor"])
+@pytest.mark.parametrize(
+    "numbers", [[], 0.5, ["near"], [[0.5]], [0.5, -0.1], [0.0], [np.inf], [1.0, 2.0, 1.0]], ids=str
+)
+def test_bad_axes_are_refused(axis, numbers):
+    with refused(ParameterError, **{axis: numbers}):
+        error_map(**{**SMALL, "over": {axis: numbers}})
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"distances": []},
-        {"distances": 0.5},
-        {"distances": ["near"]},
-        {"distances": [[0.5]]},
-        {"distances": [0.5, -0.1]},
-        {"noise_factors": [0.0]},
-        {"noise_factors": [np.inf]},
-        {"noise_factors": [1.0, 2.0, 1.0]},
+        {"over": [0.5]},
         {"contours": "II"},
         {"contours": []},
         {"replicates": 0},
         {"replicates": 2.0},
-        {"posterior_cells": -1},
-        {"posterior_replicates": 0},
         {"rng": -1},
-        {"probability": 1.0},
         {"rig": "bias"},
-        {"family": "parabola"},
+        {"drive": None},
+        {"drive": tb.Rotation((0.0, 0.1))},
+        {"bands": 0.9},
     ],
     ids=str,
 )
-def test_bad_grids_are_refused(wrong):
+def test_bad_arguments_are_refused(wrong):
     with refused(ParameterError, **wrong):
         error_map(**{**SMALL, **wrong})
+
+
+@pytest.mark.parametrize("wrong", [{"posterior_cells": -1}, {"posterior_replicates": 0}, {"probability": 1.0}], ids=str)
+def test_bad_bands_are_refused(wrong):
+    with refused(ParameterError, **wrong):
+        Bands(**wrong)
 
 
 @pytest.mark.parametrize(
@@ -266,7 +281,9 @@ def test_bad_grids_are_refused(wrong):
         ({"contours": {"x": 5}}, "5"),
         ({"contours": {"x": tb.contours.from_points(np.arange(-3.0, 4.0), np.arange(-3.0, 4.0) ** 2)}}, "family"),
         ({"rig": Rig(load_cell=tb.LoadCell(force_noise=0.1))}, "holding_moment"),
-        ({"contours": ["II", "III"], "family": tb.Family("parabola")}, "circle"),
+        ({"contours": ["II", "III"], "bands": Bands(family=tb.Family("parabola"))}, "circle"),
+        ({"bands": Bands(family="parabola")}, "family"),
+        ({"over": {"nearness": [0.5]}}, "nearness"),
     ],
 )
 def test_what_cannot_be_studied_is_refused(wrong, named):

@@ -22,7 +22,7 @@ from tactile_bayes.rig.unknown import expanded
 
 PROFILE = paper_profile("II", q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-DOUBLE = Plan(PROFILE, Rig(load_cell=CELL), drive_step=np.radians(2.0))
+DOUBLE = Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(drive_step=np.radians(2.0)))
 
 BETWEEN = np.concatenate([np.linspace(0.9, 2.2, 14), np.linspace(2.5, 3.05, 5), [3.3]])
 """Drive angles clear of first contacts and snap-offs of both sweeps, the last one unloaded."""
@@ -49,7 +49,7 @@ def only(*names, cell=CELL):
 
 def between(*unknown, cell=CELL, **options):
     rig = only(*(unknown or ("rigidity_scale", "drive_angle_offset")), cell=cell)
-    return Plan(PROFILE, rig, drive_angles=BETWEEN, **options)
+    return Plan(PROFILE, rig, drive=tb.Rotation(drive_angles=BETWEEN), **options)
 
 
 def located(plan):
@@ -66,7 +66,9 @@ def swept(a, q, x_c, less, direction):
 def readings(plan, values, by_angle=0.0):
     """What the plan's cell would read, by `scan`: shape (samples, 3)."""
     of = dict(zip(plan.model.forward_parameters, map(float, values), strict=True))
-    loads, angles = swept(of["a"], of["q"], of["x_c"], of.get("drive_angle_offset", 0.0) - by_angle, plan.direction)
+    loads, angles = swept(
+        of["a"], of["q"], of["x_c"], of.get("drive_angle_offset", 0.0) - by_angle, plan.drive.direction
+    )
     if plan.cell.frame == "turning":
         cos, sin = np.cos(angles), np.sin(angles)
         moment, x, y = loads.T
@@ -269,7 +271,9 @@ def test_a_calibrated_rig_knows_its_parameters_together():
     priors = {"rigidity_scale": stats.lognorm(s=sds[0]), "drive_angle_offset": stats.norm(0.0, sds[1])}
     joint = RigPrior(priors, np.array([[1.0, correlation], [correlation, 1.0]]), 0.0, "0")
     unknown = {name: value for name, value in expanded(NOTHING).items() if name not in priors}
-    plan = Plan(PROFILE, Rig(load_cell=CELL, unknown=unknown, calibration=joint), drive_angles=BETWEEN)
+    plan = Plan(
+        PROFILE, Rig(load_cell=CELL, unknown=unknown, calibration=joint), drive=tb.Rotation(drive_angles=BETWEEN)
+    )
     names = [plan.model.names.index(name) for name in priors]
     found = np.linalg.inv(prior_precision(plan.model)[np.ix_(names, names)])
     right = [float(plan.model.priors[name].std()) for name in priors]
@@ -311,7 +315,7 @@ def test_bounds_are_in_proportion_to_noise():
 
 def test_what_a_record_does_not_tell_has_no_bound_but_with_priors():
     """One sweep of one sample has three numbers, for seven parameters."""
-    plan = Plan(PROFILE, Rig(load_cell=CELL), direction="forward", drive_angles=[1.5, 1.6])
+    plan = Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(direction="forward", drive_angles=[1.5, 1.6]))
     found = information(plan)
     assert np.isinf(found.bound.sel(parameter=["a", "q", "x_c"]).values).all()
     assert np.all(np.isfinite(found.bound_with_priors.values))
@@ -321,8 +325,8 @@ def test_what_a_record_does_not_tell_has_no_bound_but_with_priors():
 def test_a_rod_in_si_tells_the_same():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     cell = tb.LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
-    plan = Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod), drive_angles=BETWEEN)
-    si, plain = information(plan), told(Plan(PROFILE, Rig(load_cell=CELL), drive_angles=BETWEEN))
+    plan = Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod), drive=tb.Rotation(drive_angles=BETWEEN))
+    si, plain = information(plan), told(Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(drive_angles=BETWEEN)))
     zeros, levers = [rod.moment_unit, rod.force_unit, rod.force_unit], [0.2, 0.2]
     units = np.array([5.0, 0.2, 0.2, 1.0, 1.0, *zeros, *levers, 1.0, 1.0, 1.0])
     assert list(si.parameter.values) == list(plain.parameter.values)
@@ -385,10 +389,11 @@ def test_leverage_sums_to_what_is_told():
 
 def test_leverage_on_a_parameter_is_what_is_lost_without_the_sample():
     """Of a forward sweep, by a plan without that drive angle."""
-    plan = replace(between("rigidity_scale"), direction="forward")
+    forward = tb.Rotation(direction="forward", drive_angles=BETWEEN)
+    plan = replace(between("rigidity_scale"), drive=forward)
     found = told(plan)
-    angles = np.delete(np.asarray(plan.drive_angles), 7)
-    without = information(replace(plan, drive_angles=angles)).bound_with_priors.values
+    angles = np.delete(BETWEEN, 7)
+    without = information(plan.at_angles(angles)).bound_with_priors.values
     right = 1.0 - (found.bound_with_priors.values / without) ** 2
     np.testing.assert_allclose(found.leverage_on.values[7, :-1], right[:-1], rtol=0.0, atol=2e-5)
     np.testing.assert_allclose(found.leverage_on.values[-1, :3], 0.0, atol=1e-12)  # unloaded
@@ -423,7 +428,7 @@ def test_stretches_are_between_the_events():
     assert gap.max() < ends[1]
     touched = found.x.values[found.stretch.values == "touched"]
     assert np.all((touched <= ends[0] + 1e-12) | (touched >= ends[1] - 1e-12))
-    one = told(replace(DOUBLE, direction="forward"))
+    one = told(replace(DOUBLE, drive=replace(DOUBLE.drive, direction="forward")))
     assert np.isnan(float(one.gap_width))
     assert set(one.stretch.values) == {"touched"}
 

@@ -66,7 +66,7 @@ def test_indices_of_normal_and_outlying_numbers():
 def test_shares_at_small_noise_are_those_of_first_order():
     """Of a linear function with the gains for slopes, by the same random numbers: bends are of the order of 1e-5."""
     found = noise_shares(QUIET, rng=1, samples=64, states=3)
-    grown = amplification(replace(QUIET, drive_angles=np.unique(found.drive_angle.values)))
+    grown = amplification(QUIET.at_angles(found.drive_angle.values))
     keys = list(zip(grown.sweep.values, grown.drive_angle.values, strict=True))
     where = [keys.index(key) for key in zip(found.sweep.values, found.drive_angle.values, strict=True)]
     sizes = np.array([*QUIET.cell.standard_deviations.values(), QUIET.cell.drive_angle_noise])

@@ -73,7 +73,7 @@ def test_what_has_no_parameters_is_refused_with_the_correction(contour, named):
 
 
 def test_a_plan_has_the_record_of_its_scan():
-    plan = Plan(PROFILE, Rig(load_cell=CELL), drive_step=0.05)
+    plan = Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(drive_step=0.05))
     scanned = tb.scan(PROFILE, drive_step=0.05).record
     for name in (*CHANNELS, "drive_angle"):
         np.testing.assert_array_equal(plan.record[name].values, scanned[name].values)
@@ -89,7 +89,7 @@ def test_the_record_has_errors_that_are_known_and_none_that_are_drawn():
         "drive_angle_backlash": 0.02,
     }
     cell = replace(CELL, **known, drive_angle_noise=0.01, bias_uncertainty=(1.0, 1.0, 1.0))
-    plan = Plan(PROFILE, Rig(load_cell=cell), drive_step=0.05)
+    plan = Plan(PROFILE, Rig(load_cell=cell), drive=tb.Rotation(drive_step=0.05))
     scanned = tb.scan(PROFILE, drive_step=0.05).record
     loads, read = (np.stack([r[name].values for name in CHANNELS]) for r in (scanned, plan.record))
     loads[0] += 0.02 * loads[1] - 0.01 * loads[2]
@@ -102,7 +102,9 @@ def test_the_model_shows_the_record_at_the_point():
     """Contour as it is, rig as stated."""
     several = ("gain", "friction", "suspension_compliance", "length", "taper", "rest_curvature", "moment_curve")
     for unknown in ({}, {**NOTHING, **dict.fromkeys(several, "default")}):
-        plan = Plan(PROFILE, Rig(load_cell=replace(CELL, frame="turning"), unknown=unknown), drive_step=0.05)
+        plan = Plan(
+            PROFILE, Rig(load_cell=replace(CELL, frame="turning"), unknown=unknown), drive=tb.Rotation(drive_step=0.05)
+        )
         values = dict(zip(plan.model.names, plan.point, strict=True))
         assert (values["a"], values["q"], values["x_c"], values["noise_scale"]) == (0.5, 0.5, 0.0, 1.0)
         loads = plan.model.loads(plan.point[None])[0]
@@ -112,7 +114,7 @@ def test_the_model_shows_the_record_at_the_point():
 
 @pytest.mark.parametrize("name", [n for n in CONTOURS if n != "circle/ellipse"])
 def test_every_family_has_a_model(name):
-    plan = Plan(CONTOURS[name], Rig(load_cell=CELL, unknown="nothing"), drive_step=0.1)
+    plan = Plan(CONTOURS[name], Rig(load_cell=CELL, unknown="nothing"), drive=tb.Rotation(drive_step=0.1))
     assert plan.experiment.own_family == tb.Family(name)
     np.testing.assert_array_equal(plan.point[:-1], list(family_parameters(CONTOURS[name])[1].values()))
 
@@ -179,7 +181,7 @@ def test_the_family_of_another_contour_is_refused(family, words):
 
 
 def test_what_is_known_of_the_contour_is_none_of_the_parameters():
-    plan = Plan(PROFILE, Rig(unknown="nothing"), drive_step=0.1, family=Family("parabola", q=0.5))
+    plan = Plan(PROFILE, Rig(unknown="nothing"), drive=tb.Rotation(drive_step=0.1), family=Family("parabola", q=0.5))
     assert plan.model.names == ("a", "x_c", "noise_scale")
     np.testing.assert_array_equal(plan.point, [0.5, 0.0, 1.0])
 

@@ -19,7 +19,7 @@ from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-PLAN = Plan(PROFILE, Rig(load_cell=CELL), drive_step=np.radians(9.0))
+PLAN = Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(drive_step=np.radians(9.0)))
 
 CELLS = {
     "white": CELL,
@@ -70,7 +70,10 @@ def test_noise_is_in_proportion_to_the_band_where_priors_say_little():
 def test_a_rod_in_si_needs_the_same():
     rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
     cell = tb.LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
-    si = required_noise(Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod), drive_step=PLAN.drive_step), 0.2 * 0.003)
+    si = required_noise(
+        Plan(Parabola(2.5, 0.1), Rig(load_cell=cell, rod=rod), drive=PLAN.drive),
+        0.2 * 0.003,
+    )
     plain = required_noise(PLAN, 0.003)
     np.testing.assert_allclose(si.noise_factor, plain.noise_factor, rtol=1e-5)
     np.testing.assert_allclose(si.force_noise, plain.force_noise * rod.force_unit, rtol=1e-5)
@@ -105,7 +108,7 @@ def test_widths_that_are_none_are_refused(width):
 
 def test_a_gap_is_asked_for_where_there_is_one():
     with refused(ParameterError, "gap"):
-        required_noise(replace(PLAN, direction="forward"), 0.01, where="gap")
+        required_noise(replace(PLAN, drive=replace(PLAN.drive, direction="forward")), 0.01, where="gap")
     with refused(ParameterError, where="nowhere"):
         required_noise(PLAN, 0.01, where="nowhere")
 
@@ -116,7 +119,7 @@ ROD = tb.Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
 METAL = Plan(
     Parabola(2.5, 0.1),
     Rig(load_cell=tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3), rod=ROD),
-    drive_step=np.radians(9.0),
+    drive=tb.Rotation(drive_step=np.radians(9.0)),
 )
 LENGTHS, DIAMETERS = [0.09, 0.17, 0.2], [0.3e-3, 0.7e-3, 3e-3]
 

@@ -26,12 +26,12 @@ STEP = 0.1
 
 @cache
 def plain():
-    return tb.sensitivity(rng=1, samples=4, drive_step=STEP)
+    return tb.sensitivity(rng=1, samples=4, drive=tb.Rotation(drive_step=STEP))
 
 
 @cache
 def in_si():
-    return tb.sensitivity(rng=1, samples=4, drive_step=STEP, rig=Rig(rod=ROD))
+    return tb.sensitivity(rng=1, samples=4, drive=tb.Rotation(drive_step=STEP), rig=Rig(rod=ROD))
 
 
 def words(tree):
@@ -40,7 +40,7 @@ def words(tree):
 
 @pytest.mark.slow
 def test_the_groups_are_those_of_single_analyses():
-    tree, plan = plain(), Plan(PROFILE, drive_step=STEP)
+    tree, plan = plain(), Plan(PROFILE, drive=tb.Rotation(drive_step=STEP))
     assert set(tree.children) == set(PARTS)
     singly = {
         "amplification": amplification(plan),
@@ -151,12 +151,6 @@ def test_a_contour_out_of_reach_is_refused():
 
 
 def test_one_sweep_has_no_gap_to_speak_of():
-    tree = sensitivity(PROFILE, rng=1, drive_step=STEP, parts=["information"], direction="backward")
+    tree = sensitivity(PROFILE, rng=1, drive=tb.Rotation(direction="backward", drive_step=STEP), parts=["information"])
     (line,) = [line for line in words(tree) if "expected width" in line]
     assert "gap" not in line
-
-
-def test_progress_is_told_after_each_part():
-    told = []
-    sensitivity(rng=1, drive_step=0.2, parts=["information", "required_noise"], progress=told.append)
-    assert [(step.done, step.wanted) for step in told] == [(1, 2), (2, 2)]

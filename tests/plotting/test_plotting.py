@@ -693,8 +693,8 @@ def test_the_way_of_a_base_that_is_carried_is_drawn_to_the_end_of_contact():
 
 
 def test_a_rod_that_is_carried_back_is_released_and_does_not_snap_off():
-    there_and_back = Motion([1.0, 0.3, 1.0], [-0.5, -0.2, -0.5], 1.5)
-    carried = scan(paper_profile("II", q=0.5), drive=there_and_back, drive_step=0.05)
+    there_and_back = Motion([1.0, 0.3, 1.0], [-0.5, -0.2, -0.5], 1.5, 0.05)
+    carried = scan(paper_profile("II", q=0.5), drive=there_and_back)
     (ax, *_) = plotting.observables(carried.record, events=carried.events)
     assert "release" in labels(ax)
     assert "snap-off" not in labels(ax)

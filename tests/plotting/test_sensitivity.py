@@ -12,13 +12,14 @@ from tactile_bayes import LoadCell, Rig, Rod, plotting, sensitivity
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning import error_map
 from tactile_bayes.plotting.sweep_plans import METHOD_COLOURS, READING_COLOURS
+from tactile_bayes.sweep import Rotation
 
 ROD = Rod(0.1, 1e-5)
 
 
 @pytest.fixture(scope="module")
 def found():
-    return sensitivity(rng=1, drive_step=0.1, samples=8)
+    return sensitivity(rng=1, drive=Rotation(drive_step=0.1), samples=8)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,7 @@ def in_si():
     return sensitivity(
         rng=1,
         rig=Rig(rod=ROD, load_cell=cell, unknown="nothing"),
-        drive_step=0.2,
+        drive=Rotation(drive_step=0.2),
         parts=["information", "required_noise"],
     )
 
@@ -35,8 +36,9 @@ def in_si():
 @pytest.fixture(scope="module")
 def study():
     """Profile II at three distances, of which the last is out of reach."""
-    options = {"noise_factors": [1.0, 0.1], "replicates": 1, "rng": 1, "workers": 1, "drive_step": 0.2}
-    return error_map(["II"], distances=[0.4, 0.8, 1.5], rig=Rig(unknown="nothing"), **options)
+    options = {"replicates": 1, "rng": 1, "workers": 1, "drive": Rotation(drive_step=0.2)}
+    over = {"noise_factor": [1.0, 0.1], "distance": [0.4, 0.8, 1.5]}
+    return error_map(["II"], over=over, rig=Rig(unknown="nothing"), **options)
 
 
 def rods(status, width):

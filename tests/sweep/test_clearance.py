@@ -81,10 +81,10 @@ def test_a_rod_at_rest_beyond_an_edge_is_not_clear():
 
 
 def test_a_rod_that_is_brought_back_touches_again():
-    there_and_back = tb.Motion(0.0, 0.0, [0.4, 3.6, 0.4])
+    there_and_back = tb.Motion(0.0, 0.0, [0.4, 3.6, 0.4], 0.01)
     backward = tb.scan(PARABOLA).events["backward"]
     with pytest.warns(ClearanceWarning, match="again"):
-        scan = tb.scan(PARABOLA, drive=there_and_back, drive_step=0.01)
+        scan = tb.scan(PARABOLA, drive=there_and_back)
     (sweep,) = scan.sweeps
     assert sweep.clear
     assert 7.2 - 0.4 - sweep.touches_again == pytest.approx(backward.first_contact.drive_angle, abs=1e-5)
@@ -92,8 +92,8 @@ def test_a_rod_that_is_brought_back_touches_again():
 
 
 def test_without_another_contact_nothing_is_left_out():
-    there_and_back = tb.Motion(0.0, 0.0, [0.4, 2.2, 0.4])
-    scan = tb.scan(PARABOLA, drive=there_and_back, drive_step=0.01)
+    there_and_back = tb.Motion(0.0, 0.0, [0.4, 2.2, 0.4], 0.01)
+    scan = tb.scan(PARABOLA, drive=there_and_back)
     assert np.isnan(scan.sweeps[0].touches_again)
     assert scan.record.sizes["sample"] == 361
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,14 @@ def test_poses_lie_on_straight_lines():
         (lambda: tb.Motion(0.0, 0.0, 1.0), ["two poses"]),
         (lambda: tb.Motion([0.0, 0.0], 0.0, 1.0), ["0 and 1"]),
         (lambda: tb.Motion([0.0, 1.0], 0.0, 90.0), ["90"]),
+        (lambda: tb.Motion([0.0, 1.0], 0.0, 1.0, drive_step=-0.1), ["drive_step", "-0.1"]),
+        (lambda: replace(THERE, drive_step=0.0), ["drive_step", "0"]),
+        (lambda: replace(THERE, drive_step=1e-9), ["drive_step", "1.6e-06"]),
+        (lambda: tb.Rotation(drive_step=2.0), ["drive_step", "2", "0.5"]),
+        (lambda: tb.Rotation(direction="left"), ["direction", "left"]),
+        (lambda: tb.Rotation(drive_angles=[]), ["drive_angles"]),
+        (lambda: tb.Rotation(drive_angles=[90.0]), ["drive_angles"]),
+        (lambda: tb.Rotation(drive_step=0.1, drive_angles=[1.0]), ["drive_step", "drive_angles"]),
     ],
 )
 def test_drives_that_are_none_are_refused(make, values):
@@ -44,8 +54,12 @@ def test_drives_that_are_none_are_refused(make, values):
         make()
 
 
-def test_a_rotation_is_what_the_base_is_short_for():
-    by_base, by_drive = tb.scan(CIRCLE, base=(0.1, 0.0)), tb.scan(CIRCLE, drive=tb.Rotation((0.1, 0.0)))
+@pytest.mark.parametrize(
+    "more", [{}, {"direction": "forward", "drive_step": 0.1}, {"drive_angles": [2.0, 1.0, 1.5, 2.0]}], ids=str
+)
+def test_a_rotation_is_what_the_short_forms_are_short_for(more):
+    by_base = tb.scan(CIRCLE, base=(0.1, 0.0), **more)
+    by_drive = tb.scan(CIRCLE, drive=tb.Rotation((0.1, 0.0), **more))
     assert by_base.record.identical(by_drive.record)
     assert by_base.sweeps == by_drive.sweeps
     assert by_drive.events["forward"].snap_off.travel == by_drive.events["forward"].snap_off.drive_angle
@@ -53,7 +67,7 @@ def test_a_rotation_is_what_the_base_is_short_for():
 
 @pytest.mark.parametrize("drive", [THERE, COMBINED])
 def test_a_scan_records_where_the_base_is(drive):
-    scan = tb.scan(CIRCLE, drive=drive, drive_step=0.01)
+    scan = tb.scan(CIRCLE, drive=replace(drive, drive_step=0.01))
     record, events = scan.record, scan.events["forward"]
     travels = 0.01 * np.arange(161)
     np.testing.assert_allclose(
@@ -70,6 +84,17 @@ def test_a_scan_records_where_the_base_is(drive):
     )
     assert events.first_contact.holding_moment == 0.0
     assert carried_sweeps(record) == (0,)
+
+
+def test_drives_of_one_record_have_grids_of_their_own():
+    drives = [tb.Rotation(direction="backward", drive_step=0.1), tb.Rotation(drive_angles=[1.0, 1.2, 1.4]), THERE]
+    found = tb.scan(CIRCLE, drive=[*drives, replace(THERE, drive_step=0.4)])
+    record = found.record
+    parts = [record.isel(sample=record.sweep.values == number) for number in range(5)]
+    assert [sweep.direction for sweep in found.sweeps] == ["backward", "forward", "backward", "forward", "forward"]
+    np.testing.assert_allclose(np.diff(parts[0].drive_angle), -0.1)
+    np.testing.assert_array_equal(parts[1].drive_angle, parts[2].drive_angle[::-1])
+    assert [part.sizes["sample"] for part in parts[1:]] == [3, 3, 161, 5]
 
 
 def test_the_other_side_is_a_backward_sweep():
@@ -140,7 +165,7 @@ def test_a_drive_that_ends_in_contact_says_so():
         (ParameterError, {"drive": THERE, "drive_angles": [0.1, 0.2]}, ["drive_angles"]),
         (ParameterError, {"drive": THERE, "base": (0.1, 0.0)}, ["base"]),
         (ParameterError, {"drive": [THERE, tb.Rotation()], "drive_step": 0.1}, ["drive_step"]),
-        (ParameterError, {"drive": THERE, "drive_step": 0.0}, ["drive_step"]),
+        (ParameterError, {"drive": tb.Rotation(), "drive_angles": [1.0, 1.5]}, ["drive_angles"]),
         (ParameterError, {"drive": "left"}, ["drive", "left"]),
         (ParameterError, {"drive": []}, ["drive"]),
     ],
@@ -171,10 +196,8 @@ def test_two_pivots_in_one_sweep_are_still_refused():
 @pytest.mark.parametrize("k", range(8))
 def test_a_released_rod_is_clear_however_its_last_touch_is_rounded(k):
     contour = tb.contours.Circle(*(np.array([1.01660456, 0.38756071, -0.80086393]) * (1.0 + 1e-9 * k)))
-    carried = tb.Translation((-0.9, 0.0), 0.0, np.pi - 1.0, 1.8)
-    found = tb.scan(
-        contour, drive=carried, drive_step=0.01, rig=Rig(rod=tb.Rod(rest_curvature=0.4), unknown={"friction": 0.0177})
-    )
+    carried = tb.Translation((-0.9, 0.0), 0.0, np.pi - 1.0, 1.8, 0.01)
+    found = tb.scan(contour, drive=carried, rig=Rig(rod=tb.Rod(rest_curvature=0.4), unknown={"friction": 0.0177}))
     assert found.events["backward"].snap_off.kind == "release"
     assert found.record.sizes["sample"] == 181
 

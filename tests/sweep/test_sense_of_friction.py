@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -28,18 +30,18 @@ TURNED_BACK = {
 def test_a_drive_that_turns_back_in_contact_needs_no_friction(drive):
     with refused(ReachError, "friction", "friction = 0", "split"):
         tb.scan(PARABOLA, drive=drive, rig=Rig(unknown={"friction": 0.3}))
-    scan = tb.scan(PARABOLA, drive=drive, drive_step=0.02)
+    scan = tb.scan(PARABOLA, drive=replace(drive, drive_step=0.02))
     assert violations(scan, tb.Rod(), 0.0) == {}
 
 
 def test_without_friction_the_way_back_repeats_the_way_forth():
-    record = tb.scan(PARABOLA, drive=TURNED_BACK["turned"], drive_step=0.01).record
+    record = tb.scan(PARABOLA, drive=replace(TURNED_BACK["turned"], drive_step=0.01)).record
     for name in ("holding_moment", "force_x", "force_y"):
         np.testing.assert_allclose(record[name].values, record[name].values[::-1], atol=1e-8)
 
 
 def test_parts_of_a_drive_that_go_one_way_have_friction():
-    scan = tb.scan(PARABOLA, drive=tb.Motion(0.0, 0.0, [0.4, 2.2]), rig=Rig(unknown={"friction": 0.3}), drive_step=0.02)
+    scan = tb.scan(PARABOLA, drive=tb.Motion(0.0, 0.0, [0.4, 2.2], drive_step=0.02), rig=Rig(unknown={"friction": 0.3}))
     assert scan.sweeps[0].snap_off.kind == "never"
     assert violations(scan, tb.Rod(), 0.3) == {}
 

@@ -133,7 +133,7 @@ def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address, monkeypat
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(distributed, "Client", None)
     with refused(ParameterError, f"'{address}'", "tcp:"):
-        list(run_tasks(double, [1, 2], scheduler=address))
+        list(run_tasks(double, [1, 2], workers=address))
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "127.0.0.1:1"])
@@ -142,7 +142,7 @@ def test_a_scheduler_that_does_not_answer_is_waited_for_no_longer_than_it_takes(
     assert tasks._PATIENCE == "10s"
     monkeypatch.setattr(tasks, "_PATIENCE", "0.2s")
     with refused(ParameterError, f"'{address}'"):
-        list(run_tasks(double, [1, 2], scheduler=address))
+        list(run_tasks(double, [1, 2], workers=address))
 
 
 def test_a_script_without_guard_is_told_so(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any, NamedTuple
@@ -25,7 +25,7 @@ from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import STANDARD
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.rig.unknown import DEFAULT
-from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 __all__ = ["Alternative", "alternatives_of", "band_by_assumption"]
@@ -89,9 +89,7 @@ def band_by_assumption(
     *,
     seed: Seed,
     out: str | os.PathLike[str] | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Callable[[TaskProgress], object] | None = None,
+    workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
     """Infer a record again under every other assumption, and compare the bands.
 
@@ -105,7 +103,7 @@ def band_by_assumption(
         Grid points of the bands [length].
     probability : float
         Probability of the bands, in (0, 1).
-    seed, out, workers, scheduler, progress
+    seed, out, workers
         As in `calibrate`.
 
     Returns
@@ -127,7 +125,7 @@ def band_by_assumption(
     study = _Study(tuple(alternatives_of(experiment)), x, probability, seed)
     count = len(study.alternatives)
     with open_results_store(study.identity, out, _ALTERNATIVES) as store:
-        kept = keep_outcomes(store, _inferred, study, count, workers=workers, scheduler=scheduler, progress=progress)
+        kept = keep_outcomes(store, _inferred, study, count, workers=workers)
     outcomes = [kept[number] for number in range(count)]
     bands = np.full((count, len(_EDGES), x.size), np.nan)
     for k, outcome in enumerate(outcomes):

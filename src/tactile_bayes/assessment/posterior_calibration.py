@@ -6,7 +6,7 @@ import hashlib
 import os
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from importlib.metadata import version
@@ -41,7 +41,7 @@ from tactile_bayes.inference.stored_experiment import points_of, predicted_point
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words, words
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.tasks import TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.tasks import Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band
 
 __all__ = ["JointModel", "PosteriorExperiment", "posterior_calibration"]
@@ -141,9 +141,7 @@ def posterior_calibration(
     replicates: int = 100,
     probability: float = 0.95,
     out: str | os.PathLike[str] | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Callable[[TaskProgress], object] | None = None,
+    workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
     """Test whether the intervals of a posterior hold here: for truths drawn from it, and records predicted from them.
 
@@ -164,7 +162,7 @@ def posterior_calibration(
         Number of truths.
     probability : float
         Probability of the intervals that are tested, in (0, 1).
-    out, workers, scheduler, progress
+    out, workers
         As in `calibrate`.
 
     Returns
@@ -184,9 +182,7 @@ def posterior_calibration(
     """
     task = _task(posterior, experiment, replicates, probability, seed)
     with open_results_store(task.identity, out, REPLICATES) as store:
-        kept = keep_outcomes(
-            store, _replicate, task, replicates, workers=workers, scheduler=scheduler, progress=progress
-        )
+        kept = keep_outcomes(store, _replicate, task, replicates, workers=workers)
     return _summary(task, kept)
 
 

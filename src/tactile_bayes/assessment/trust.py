@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
@@ -18,7 +18,6 @@ from tactile_bayes.assessment.sampling_error import sampling_error
 from tactile_bayes.assessment.split_prediction import split_prediction
 from tactile_bayes.assessment.wording import conclusion, sentences
 from tactile_bayes.checks import (
-    check_function,
     check_path,
     check_probability,
     check_switch,
@@ -31,8 +30,7 @@ from tactile_bayes.inference.result import contour_draws, read_result
 from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.rig.rig import Rig
-from tactile_bayes.tasks import TaskProgress
-from tactile_bayes.tasks.workers import check_pool
+from tactile_bayes.tasks import TaskProgress, Workers, workers_of
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.summary import gap_if_any, reach
 
@@ -62,9 +60,7 @@ def trust(
     rig: Rig | None = None,
     rng: Rng,
     out: str | os.PathLike[str] | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Callable[[TaskProgress], object] | None = None,
+    workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
     """Judge whether the band of a posterior holds for this record, and what it rests on.
 
@@ -94,7 +90,7 @@ def trust(
         Seed of all random numbers; the results do not depend on the number of workers.
     out : path-like, optional
         Folder of the replicates and alternatives: a run that was killed resumes.
-    workers, scheduler, progress
+    workers
         As in `calibrate`.
 
     Returns
@@ -155,8 +151,7 @@ def trust(
     check_whole_number("replicates", replicates, 0)
     check_switch("assumptions", assumptions)
     seed = seed_sequence(rng)
-    check_function("progress", progress)
-    check_pool(workers, scheduler)
+    workers = workers_of(workers)
     if out is not None:
         check_path("out", out, "give the path of a folder, or None")
     posterior = _posterior_of(run_or_posterior)
@@ -181,10 +176,12 @@ def trust(
     others = len(alternatives_of(experiment)) if assumptions else 0
     calibrated: xr.Dataset | None = None
 
-    def report(before: int) -> Callable[[TaskProgress], object] | None:
-        if progress is None:
-            return None
-        return lambda now: progress(now._replace(done=before + now.done, wanted=replicates + others))
+    def of_all(before: int) -> Workers:
+        def report(now: TaskProgress) -> None:
+            if workers.progress is not None:
+                workers.progress(now._replace(done=before + now.done, wanted=replicates + others))
+
+        return Workers(workers.where, report)
 
     if replicates:
         calibrated = posterior_calibration(
@@ -194,9 +191,7 @@ def trust(
             replicates=replicates,
             probability=chance,
             out=out,
-            workers=workers,
-            scheduler=scheduler,
-            progress=report(0),
+            workers=of_all(0),
         )
         of_claims = calibrated[list(_OF_CALIBRATION)].rename(quantity="ranked")
         found = found.merge(of_claims).merge(calibrated[["factor", "corrected"]])
@@ -209,9 +204,7 @@ def trust(
             chance,
             seed=seed,
             out=out,
-            workers=workers,
-            scheduler=scheduler,
-            progress=report(replicates),
+            workers=of_all(replicates),
         )
         found = found.merge(other).assign(_moved(other, regions))
     attrs = posterior.attrs

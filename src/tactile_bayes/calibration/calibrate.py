@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
 
 from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.calibration.replicate import Replicate, make_replicate, replicate
@@ -18,8 +16,6 @@ from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.checks import (
-    check_choice,
-    check_numbers,
     check_optional,
     check_path,
     check_switch,
@@ -32,8 +28,8 @@ from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.rig.rig import Rig, rig_of
-from tactile_bayes.sweep import Carried, Drive, drives_of, record_template
-from tactile_bayes.tasks import ResultsStore, TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.sweep import Drive, Rotation, drives_of, record_template
+from tactile_bayes.tasks import ResultsStore, Workers, keep_outcomes, open_results_store
 
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
 
@@ -55,22 +51,15 @@ def calibrate(
     rng: Rng,
     replicates: int = 200,
     drive: Drive | Sequence[Drive] | None = None,
-    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
-    direction: Literal["both", "forward", "backward"] = "both",
-    drive_angles: ArrayLike | None = None,
     settings: SamplerSettings | None = None,
-    probability: float = 0.9,
-    truth: Rig | None = None,
-    misspecification: Misspecification | None = None,
+    truth: Rig | Misspecification | None = None,
     out: str | os.PathLike[str] | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Callable[[TaskProgress], object] | None = None,
+    workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
     """Test whether intervals hold: simulate records of truths drawn from the prior, infer, and compare.
 
     If a posterior is right, the rank of the truth among its draws is uniform, for every quantity (simulation-based
-    calibration: Talts et al. 2018, arXiv:1804.06788), and a statement with 90 % probability holds in nine of ten
+    calibration: Talts et al. 2018, arXiv:1804.06788), and bands, regions and intervals of 90 % hold in nine of ten
     replicates. Conversely, ranks that are not uniform prove that sampler, likelihood or prior are wrong. With a rig of
     its own for the simulation (`truth`), the ranks show the effect on intervals of what inference assumes wrongly.
 
@@ -89,37 +78,25 @@ def calibrate(
     replicates : int
         Number of replicates; each takes some two seconds on one core.
     drive : Rotation, Translation or Motion, or a sequence of them, optional
-        As in `scan`; those that carry the base are sampled at as many places as there are drive angles.
-    base : (float, float) or sequence of them
-        Pivots of rotations if there is no `drive`, visited in turn [length].
-    direction : {"both", "forward", "backward"}
-        Directions of the sweeps of each rotation.
-    drive_angles : array_like, shape (n,), optional
-        Readings of a perfect encoder [rad], in every sweep; by default every 2° from −30° to 210°. They do not depend
-        on the contour, and so carry no information about it.
+        As in `scan`, except that drive angles do not depend on the contour, and so carry no information about it: by
+        default every 2° from −30° to 210°, and as many samples where the base is carried.
     settings : SamplerSettings, optional
         By default 2 ensembles of 20 walkers, or two more than twice the parameters if that is larger, until R̂ is
         below 1.05 and the effective draws number 200, five for every walker, in 500 steps at most; if they do not
         converge, a second run with as many walkers as `infer_contour` has, in 6000 steps at most. Runs that end
         unconverged are counted.
-    probability : float
-        Stated probability of the bands, regions and intervals, in (0, 1).
-    truth : Rig, optional
+    truth : Rig or Misspecification, optional
         The rig from which records are simulated, if it is another than inference assumes: it has the numbers of its
         `unknown`, the distributions are drawn, and what is not named has the default distribution of a real rig. Its
         rod and load cell, where it states them, take the place of those of `rig`. The true value of an inferred
-        parameter is that of the simulated rig relative to what `rig` states.
-    misspecification : Misspecification, optional
-        Further differences, which no rig can state.
+        parameter is that of the simulated rig relative to what `rig` states. A `Misspecification` has differences that
+        no rig can state, and a rig if it differs too.
     out : path-like, optional
         Folder of the results store replicates.json: a run that was killed resumes, and one with more replicates
         begins with those that are stored.
-    workers : int, optional
-        Number of processes on this machine; by default one for each core.
-    scheduler : str, optional
-        Address of a Dask scheduler, in place of `workers`.
-    progress : callable, optional
-        Called with a `TaskProgress` after each replicate.
+    workers : int, str or Workers, optional
+        Number of processes on this machine, by default one for each core; or the address of a Dask scheduler, such as
+        "tcp://10.0.0.1:8786". `Workers` also names a function that is called with the progress after each task.
 
     Returns
     -------
@@ -141,8 +118,7 @@ def calibrate(
         pointwise_in_gap and so on, width_, bias_ and off_ (mean width of the band, mean and largest distance of its
         median from the truth [length], in_gap and beside), check_passed, misfit_probability, axial_score, converged,
         effective_draws, evaluations, seconds, message, traceback (replicate)
-            Results of each replicate; misfit_probability and axial_score, of single samples, only with a `truth` or a
-            `misspecification`. The
+            Results of each replicate; misfit_probability and axial_score, of single samples, only with a `truth`. The
             message of a replicate that is lost is its error, and only it has a traceback.
 
         Attributes: verdict, a text; conclusion, "calibrated", "not calibrated", "undecided" (more than 1 % of the
@@ -172,23 +148,9 @@ def calibrate(
     'Too few replicates to judge'
     """
     check_whole_number("replicates", replicates, 1)
-    experiment = experiment_of(
-        family,
-        rig,
-        rng=rng,
-        drive=drive,
-        base=base,
-        direction=direction,
-        drive_angles=drive_angles,
-        settings=settings,
-        probability=probability,
-        truth=truth,
-        misspecification=misspecification,
-    )
+    experiment = experiment_of(family, rig, rng=rng, drive=drive, settings=settings, truth=truth)
     with open_results_store(experiment.identity, out, REPLICATES) as store:
-        kept = keep_outcomes(
-            store, replicate, experiment, int(replicates), workers=workers, scheduler=scheduler, progress=progress
-        )
+        kept = keep_outcomes(store, replicate, experiment, int(replicates), workers=workers)
     return summary(experiment, kept)
 
 
@@ -214,8 +176,7 @@ def calibration_replicate(
     throw : bool
         Whether the error of a replicate that is lost is raised; otherwise it is in the outcome.
     options
-        Options of the calibration, as they were given to `calibrate`, except `replicates`, `workers`, `scheduler` and
-        `progress`.
+        Options of the calibration, as they were given to `calibrate`, except `replicates` and `workers`.
 
     Returns
     -------
@@ -251,41 +212,27 @@ def experiment_of(
     *,
     rng: Rng,
     drive: Drive | Sequence[Drive] | None = None,
-    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
-    direction: str = "both",
-    drive_angles: ArrayLike | None = None,
     settings: SamplerSettings | None = None,
-    probability: float = 0.9,
-    truth: Rig | None = None,
-    misspecification: Misspecification | None = None,
+    truth: Rig | Misspecification | None = None,
 ) -> SimulatedExperiment:
     """Return the experiment that `calibrate` repeats, from the same arguments and defaults."""
     check_optional("settings", settings, SamplerSettings)
-    check_optional("truth", truth, Rig)
-    check_optional("misspecification", misspecification, Misspecification)
-    directions = {"both": ("forward", "backward"), "forward": ("forward",), "backward": ("backward",)}
-    check_choice("direction", direction, directions)
-    correction = "give a list of at least 3 different finite numbers [rad]"
-    given = np.radians(_ANGLES) if drive_angles is None else drive_angles
-    angles = np.unique(check_numbers("drive_angles", given, correction, shape=(None,)))
-    if angles.size < 3:
-        raise refused("drive_angles", drive_angles, correction)
-    drives, rig = drives_of(drive, base), rig_of(rig)
+    if not isinstance(truth, Misspecification):
+        check_optional("truth", truth, Rig, "give a Rig or a Misspecification")
+        truth = Misspecification(truth)
+    drives, rig = drives_of(drive), rig_of(rig)
+    for one in drives:
+        if isinstance(one, Rotation) and one.drive_angles is not None and np.size(one.drive_angles) < 3:
+            raise refused("drive_angles", one.drive_angles, "give a list of at least 3 different finite numbers [rad]")
     rig = replace(rig, load_cell=rig.load_cell or usual_load_cell(rig.rod or Rod()))
     assert rig.load_cell is not None
-    template = record_template(drives, directions[direction], angles, rig.rod, rig.load_cell)
+    template = record_template(drives, np.radians(_ANGLES), rig.rod, rig.load_cell)
     experiment = SimulatedExperiment(
         Experiment(template, rig, family, (settings or _SETTINGS).events),
-        {
-            "drives": json.dumps([one.poses.tolist() if isinstance(one, Carried) else one.base for one in drives]),
-            "directions": json.dumps(directions[direction]),
-            "drive_angles": json.dumps(angles.tolist()),
-        },
+        drives,
         settings=settings or _SETTINGS,
-        probability=probability,
         seed=seed_sequence(rng),
         truth=truth,
-        misspecification=misspecification or Misspecification(),
     )
     default = replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS))
     return replace(experiment, settings=default, again=_AGAIN) if settings in (None, default) else experiment

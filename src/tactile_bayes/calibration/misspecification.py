@@ -1,4 +1,4 @@
-"""Misspecification: what no rig can state of the difference between a simulation and what inference assumes."""
+"""Misspecification: the difference between a simulation and what inference assumes."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tactile_bayes.checks import check_numbers
+from tactile_bayes.checks import check_numbers, check_optional
 from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
+from tactile_bayes.rig.rig import Rig
 
 __all__ = ["Misspecification"]
 
@@ -23,10 +24,12 @@ _ENDS, _KNOTS = 1.5, 121
 
 @dataclass(frozen=True)
 class Misspecification:
-    """Differences between a simulation and what inference assumes that no `Rig` can state, by default none.
+    """Differences between a simulation and what inference assumes, also those that no `Rig` can state; by default none.
 
     Parameters
     ----------
+    rig : Rig, optional
+        The rig from which records are simulated, if it is another than inference assumes.
     base_shift : (float, float)
         Shift of all pivots from their recorded positions [length]; those of single ones are `base_2_x` and so on of a
         `Rig`.
@@ -47,11 +50,13 @@ class Misspecification:
     Misspecification(base_shift=(0.01, 0.0))
     """
 
+    rig: Rig | None = None
     base_shift: tuple[float, float] = (0.0, 0.0)
     flat_spot: tuple[float, float] | None = None
     family: Family | str | None = None
 
     def __post_init__(self) -> None:
+        check_optional("rig of the misspecification", self.rig, Rig)
         for name in ("base_shift", "flat_spot"):
             if (given := getattr(self, name)) is not None or name == "base_shift":
                 numbers = check_numbers(f"{name} of the misspecification", given, "give 2 finite numbers", shape=(2,))
@@ -79,7 +84,7 @@ class Misspecification:
         flatter = np.log(radius) + np.log(factor) * np.exp(-0.5 * ((slopes - at) / _SPOT) ** 2)
         return ShapeFree(slopes, flatter[None], x=x, y=y, at=0.0)
 
-    def rig(self, drawn: RigValues, pivots: int) -> RigValues:
+    def shifted(self, drawn: RigValues, pivots: int) -> RigValues:
         """Return the rig of one contour from the drawn one, with its pivots shifted."""
         shifts = np.zeros((1, pivots, 2))
         if drawn.base_shifts is not None:

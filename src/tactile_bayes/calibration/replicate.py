@@ -300,24 +300,7 @@ def contact_coverage(
     probability: float,
     rng: np.random.Generator,
 ) -> dict[str, float]:
-    """Return the share of the chosen contacts that lie in their region.
-
-    Parameters
-    ----------
-    model : ContourModel
-        Model of the record.
-    samples : ndarray, shape (chain, draw, d)
-        Draws of its posterior.
-    simulation : Simulation
-        The truth.
-    likelihood : RecordLikelihood
-        Likelihood of the true rig, to full accuracy.
-    true_angles, angles : ndarray, shape (samples,)
-        Readings of the drive angle without and with errors of the encoder, corrected by the data sheet [rad].
-    probability : float
-        Probability of the regions.
-    rng : np.random.Generator
-    """
+    """Return the share of the chosen contacts that lie in their region."""
     true = contacts_of(likelihood, simulation.contour, simulation.rig, true_angles)
     chosen: list[int] = []
     for segment in likelihood.segments:

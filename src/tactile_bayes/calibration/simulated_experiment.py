@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from importlib.metadata import version
@@ -20,7 +20,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record import bases_of, rod_of
-from tactile_bayes.rig.rig import Rig
+from tactile_bayes.sweep import Drive
 
 __all__ = ["SimulatedExperiment"]
 
@@ -33,16 +33,14 @@ class SimulatedExperiment:
 
     assumed: Experiment
     """Assumptions of inference, on a template whose drive angles are readings of an encoder without errors."""
-    sweeps: Mapping[str, str]
-    """Sweeps of the template, as text by name."""
+    drives: Sequence[Drive]
+    """Drives of the template."""
     settings: SamplerSettings
     again: SamplerSettings | None = None
     """Settings of a second run if the first has not converged; None for no second run."""
     probability: float = 0.9
     seed: Seed = 0
-    truth: Rig | None = None
-    """Rig of the simulation, if it is another than the assumed one."""
-    misspecification: Misspecification = field(default_factory=Misspecification)
+    truth: Misspecification = field(default_factory=Misspecification)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "probability", check_probability("probability", self.probability))
@@ -63,16 +61,16 @@ class SimulatedExperiment:
     @cached_property
     def simulated(self) -> Experiment:
         """Rig and contours of the simulation, with the load cell and rod of inference unless the truth has others."""
-        assumed, truth = self.assumed, self.truth or self.assumed.rig
+        assumed, truth = self.assumed, self.truth.rig or self.assumed.rig
         rig = replace(truth, load_cell=truth.load_cell or assumed.rig.load_cell, rod=truth.rod or assumed.rig.rod)
-        return replace(assumed, rig=rig, family=self.misspecification.family or assumed.own_family)
+        return replace(assumed, rig=rig, family=self.truth.family or assumed.own_family)
 
     @cached_property
     def model(self) -> ContourModel:
         """Model from which truths are drawn, with loads to full accuracy."""
         model = self.simulated.model
         model.likelihood.exact = True
-        if self.misspecification.flat_spot:  # which may obstruct a rod that is clear without it
+        if self.truth.flat_spot:  # which may obstruct a rod that is clear without it
             model.likelihood.is_always_clear = False
         return model
 
@@ -86,7 +84,7 @@ class SimulatedExperiment:
         """Differences between the simulation and what inference assumes, as text by name."""
         assumed, simulated = self.assumed.assumptions, self.simulated.assumptions
         found = {f"truth_{name}": text for name, text in simulated.items() if text != assumed[name]}
-        beside = replace(self.misspecification, family=None)
+        beside = replace(self.truth, rig=None, family=None)
         return found if beside == Misspecification() else {**found, "misspecification": repr(beside)}
 
     @property
@@ -94,7 +92,7 @@ class SimulatedExperiment:
         """True if contours are of the family that inference assumes, with the parameters that it knows."""
         drawn, assumed = self.simulated.own_family, self.assumed.own_family
         is_known = assumed.known.items() <= drawn.known.items()
-        return drawn.name == assumed.name and is_known and self.misspecification.flat_spot is None
+        return drawn.name == assumed.name and is_known and self.truth.flat_spot is None
 
     @property
     def parameters(self) -> int:
@@ -115,7 +113,7 @@ class SimulatedExperiment:
         """Everything that determines the results, as text, for the results store."""
         entries = {
             **self.assumed.assumptions,
-            **self.sweeps,
+            "drives": json.dumps([drive.description for drive in self.drives]),
             "settings": json.dumps(asdict(self.settings), default=_plain),
             "again": "never" if self.again is None else json.dumps(asdict(self.again), default=_plain),
             "probability": repr(self.probability),

@@ -43,23 +43,13 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     """Draw a truth, sweep along it and measure.
 
     Loads are exact, from `Paths` and not from the compiled code of inference.
-
-    Parameters
-    ----------
-    experiment : SimulatedExperiment
-    rng : np.random.Generator
-
-    Raises
-    ------
-    ReachError
-        If the rod hardly ever reaches a contour of the prior.
     """
-    model, misspecification = experiment.model, experiment.misspecification
+    model, truth = experiment.model, experiment.truth
     likelihood = model.likelihood
     for _ in range(_TRIALS):
         point, _ = model.draw_prior(rng, 1)
-        contour = misspecification.contour(model.contours(point))
-        rig = misspecification.rig(model.rig(point), experiment.pivots)
+        contour = truth.contour(model.contours(point))
+        rig = truth.shifted(model.rig(point), experiment.pivots)
         loads, reached = likelihood.predict(contour, rig)
         if reached[0]:
             break
@@ -82,5 +72,5 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     measured = template.assign(columns).assign(drive_angle=("sample", angles, template.drive_angle.attrs))
     events = {name: found[0] for name, found in events_of(likelihood, contour, rig).items()}
     drawn = {name: float(value[0]) for name, value in values.items()}
-    truth = true_values(experiment.simulated, experiment.assumed, drawn)
-    return Simulation(measured, truth, contour, rig, events)
+    own = true_values(experiment.simulated, experiment.assumed, drawn)
+    return Simulation(measured, own, contour, rig, events)

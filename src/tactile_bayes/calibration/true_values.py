@@ -23,13 +23,6 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
 
     What has no true value is left out: the noise scale if channels differ, the noise of a load cell that states none,
     the length of a discrepancy that the simulated rig does not have, and parameters of another family.
-
-    Parameters
-    ----------
-    simulated, assumed : Experiment
-        From which a record is simulated, and inferred.
-    drawn : mapping of str to float
-        Parameters of the simulated experiment, in the record's units.
     """
     known = {**simulated.own_family.known, **simulated.nuisances.known, **drawn}
     rod, stated = rod_of(simulated.record), rod_of(assumed.record)

@@ -120,6 +120,7 @@ def _of_many(
 ) -> Answer:
     """Infer the contours of several records."""
     from tactile_bayes.runs.many import infer_contours
+    from tactile_bayes.tasks import Workers
 
     stated = rig.stated
     of_all = replace(stated, load_cell=rig.in_place_of(stated.load_cell))
@@ -132,7 +133,7 @@ def _of_many(
             rng=seed,
             settings=settings,
             probability=probability,
-            progress=lambda made: note(made.done),
+            workers=Workers(progress=lambda made: note(made.done)),
         )
     files = {"table": out / "runs.csv", "table, as NetCDF": out / "runs.nc"}
     return Answer([_rows_of(table), "", files], lambda: {"records": table.to_dict()["data_vars"], "files": files})

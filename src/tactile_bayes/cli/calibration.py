@@ -42,7 +42,6 @@ def calibrate(
             dir_okay=False,
         ),
     ] = None,
-    probability: Annotated[float, typer.Option(help="Probability of the bands and regions that are judged.")] = 0.9,
     work: WorkerOptions,
     seed: Seed = 1,
     replicate: Annotated[
@@ -63,16 +62,16 @@ def calibrate(
 
     from tactile_bayes.rig import Rig
     from tactile_bayes.runs.calibration import calibrate_into
+    from tactile_bayes.sweep import Rotation
 
     common = ctx.find_root().params
     common["debug"] = common["debug"] or debug
+    angles = np.radians(np.arange(-30.0, 210.0 + 0.5 * drive_step, drive_step))
     experiment: dict[str, Any] = {
         "family": family,
         "rig": rig.stated,
-        "base": pivots_in(base),
-        "drive_angles": np.radians(np.arange(-30.0, 210.0 + 0.5 * drive_step, drive_step)),
+        "drive": [Rotation(pivot, drive_angles=angles) for pivot in pivots_in(base)],
         "truth": None if truth is None else Rig.read(truth),
-        "probability": probability,
         "rng": seed,
     }
     if replicate is not None:
@@ -86,10 +85,8 @@ def calibrate(
         )
 
     with resumable_bar(replicates, "replicate", output.is_silent, have) as note:
-        experiment |= work.arguments
-        run = calibrate_into(
-            out, replicates=replicates, progress=lambda calibrating: note(calibrating.done), **experiment
-        )
+        workers = work.reporting(lambda calibrating: note(calibrating.done))
+        run = calibrate_into(out, replicates=replicates, workers=workers, **experiment)
     found = run.result
     names = ("conclusion", "lost", "probability", "power", "noticed_shift", "noticed_narrow", "noticed_wide")
     return Answer(

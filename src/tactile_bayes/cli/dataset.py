@@ -16,8 +16,8 @@ from tactile_bayes.runs.names import DATASET
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tactile_bayes.datasets import Production
     from tactile_bayes.datasets.manifest import Manifest
+    from tactile_bayes.tasks import TaskProgress
 
 __all__ = ["dataset"]
 
@@ -62,19 +62,19 @@ def generate(
     from tactile_bayes.datasets.manifest import read_manifest
 
     spec = datasets.read_specification(specification)
-    last: Production | None = None
+    last: TaskProgress | None = None
 
     def have(done: int | None) -> str:
         return "no further file was finished" if done is None else f"{done:,} of {spec.records:,} records are in {out}"
 
     with resumable_bar(spec.records, "record", output.is_silent, have) as note:
 
-        def progress(production: Production) -> None:
+        def progress(made: TaskProgress) -> None:
             nonlocal last
-            last = production
-            note(production.records)
+            last = made
+            note(made.done)
 
-        datasets.generate(spec, out, progress=progress, **work.arguments)
+        datasets.generate(spec, out, workers=work.reporting(progress))
     manifest = read_manifest(out)
     return Answer(_words(out, manifest, last), lambda: {**_numbers(out, manifest), "made": last.made if last else 0})
 
@@ -138,7 +138,7 @@ def _numbers(folder: Path, manifest: Manifest) -> dict[str, Any]:
     }
 
 
-def _words(out: Path, manifest: Manifest, last: Production | None) -> Iterator[str]:
+def _words(out: Path, manifest: Manifest, last: TaskProgress | None) -> Iterator[str]:
     size = sum(shard.bytes for shard in manifest.shards)
     made = "all existed already, with the right sizes; dataset verify compares every byte"
     if last is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -9,8 +10,7 @@ import typer
 
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
-from tactile_bayes.cli.drive_options import CarryOptions
-from tactile_bayes.cli.numbers import numbers_asked
+from tactile_bayes.cli.drive_options import CarryOptions, pivots_in
 from tactile_bayes.cli.rig_options import RigFile
 from tactile_bayes.cli.task_bar import counted, resumable_bar
 from tactile_bayes.cli.worker_options import WorkerOptions
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from tactile_bayes.runs.folder import Run
+    from tactile_bayes.sweep import Carried, Drive
 
 __all__ = ["design"]
 
@@ -70,11 +71,10 @@ def design(
     import numpy as np
 
     from tactile_bayes.errors import ParameterError
-    from tactile_bayes.planning.design import ABOVE, ACROSS
+    from tactile_bayes.planning.design import usual_drives
     from tactile_bayes.runs.design import design_into
+    from tactile_bayes.sweep import Rotation
 
-    pivots = [numbers_asked(pivot, "--base", 2) for pivot in base] if base else None
-    drives = carries.carried or None
     options: dict[str, Any] = {}
     known: xr.DataTree | str = family
     if run is not None:
@@ -83,33 +83,43 @@ def design(
         known = _posterior(run)
     else:
         options = {"rig": rig.stated}
-    steps = drive_step or [2.0]
-    usual = 0 if drives else ACROSS.size * ABOVE.size
-    count = (len(pivots or ()) + len(drives or ()) or usual) * len(steps)
+    steps = np.radians(drive_step or [2.0]).tolist()
+    if base or carries.carry:
+        drives: list[Drive] = [Rotation(pivot, drive_step=step) for pivot in pivots_in(base) for step in steps if base]
+        drives += [_as_often(drive, step) for drive in carries.carried() for step in steps]
+    else:
+        usual = [usual_drives(known, options.get("rig"), step) for step in steps]
+        drives = [drive for each in zip(*usual, strict=True) for drive in each]
 
     def have(done: int | None) -> str:
         if not nested:
             return "nothing was written"
-        return f"{done or 0:,} of {counted(count, 'candidate')} are in {out / 'nested'}"
+        return f"{done or 0:,} of {counted(len(drives), 'candidate')} are in {out / 'nested'}"
 
     then = "the same command resumes" if nested else "the same command starts again"
-    with resumable_bar(count, "candidate", output.is_silent, have, then=then) as note:
+    with resumable_bar(len(drives), "candidate", output.is_silent, have, then=then) as note:
         made = design_into(
             out,
             known,
             rng=seed,
-            bases=pivots,
             drives=drives,
-            drive_steps=np.radians(steps),
             criterion=criterion,
             nested=nested,
             draws=draws,
-            progress=lambda designing: note(designing.done),
-            **work.arguments,
+            workers=work.reporting(lambda designing: note(designing.done)),
             **options,
         )
     words = made.files["words"].read_text(encoding="utf-8").splitlines()
     return Answer([*words, "", made.files], lambda: _numbers(made, words))
+
+
+def _as_often(drive: Carried, step: float) -> Carried:
+    """Return a drive with as many samples as a rotation of a step [rad]."""
+    from tactile_bayes.sweep import blind_angles
+
+    given: Any = drive
+    made: Carried = replace(given, drive_step=float(drive.travels[-1]) / (blind_angles(step).size - 1))
+    return made
 
 
 def _posterior(run: Path) -> xr.DataTree:

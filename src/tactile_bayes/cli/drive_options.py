@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -22,16 +22,14 @@ __all__ = ["CarryOptions", "DriveOptions", "Pivots", "pivots_in"]
 _STEPS = (0.001, 28.0)
 """Smallest and largest step of rotations [degrees]."""
 
-_USUAL_STEP = 1.0
-"""Step of rotations if no option gives one [degrees]."""
-
+Directions = Literal["both", "forward", "backward"]
 
 Pivots = Annotated[
     list[str] | None, typer.Option("--base", help="A pivot, X,Y [m, or L]; may be repeated. By default one at 0,0.")
 ]
 
 
-def pivots_in(texts: Sequence[str] | None) -> list[tuple[float, ...]]:
+def pivots_in(texts: Sequence[str] | None) -> list[tuple[float, float]]:
     """Return the coordinates of pivots.
 
     Raises
@@ -39,7 +37,7 @@ def pivots_in(texts: Sequence[str] | None) -> list[tuple[float, ...]]:
     ParameterError
         If one has not two numbers.
     """
-    return [numbers_asked(text, "--base", 2) for text in texts or ["0,0"]]
+    return [(x, y) for x, y in (numbers_asked(text, "--base", 2) for text in texts or ["0,0"])]
 
 
 @dataclass(frozen=True)
@@ -57,16 +55,15 @@ class CarryOptions:
         Reads(),
     ] = None
 
-    @property
-    def carried(self) -> list[Carried]:
-        """Translations along lines, and motions along paths.
+    def carried(self, step: float | None = None) -> list[Carried]:
+        """Return translations along lines, and motions along paths, of a step [length].
 
         Raises
         ------
         ParameterError
             If an option is no drive.
         """
-        return [_motion(Path(text)) if _is_file(text) else _translation(text) for text in self.carry or []]
+        return [_motion(Path(text), step) if _is_file(text) else _translation(text, step) for text in self.carry or []]
 
 
 @dataclass(frozen=True)
@@ -81,42 +78,38 @@ class DriveOptions(CarryOptions):
         ),
     ] = None
 
-    def drives(self, pivots: Sequence[Sequence[float]]) -> list[Drive]:
-        """Return rotations about pivots, then the drives that carry the base.
+    def drives(self, base: Sequence[str] | None, direction: Directions = "both") -> list[Drive]:
+        """Return rotations about pivots, the origin if there is no drive, then the drives that carry the base.
 
         Raises
         ------
         ParameterError
-            If an option is no drive.
-        """
-        from tactile_bayes.sweep import Rotation
-
-        return [*(Rotation((x, y)) for x, y in pivots), *self.carried]
-
-    def step(self, drives: Sequence[Drive]) -> float | None:
-        """Return the step of the drives [rad or length] if all of them have one.
-
-        Raises
-        ------
-        ParameterError
-            If a step is given, and there are drives of both kinds, or it is one that no rotation has.
+            If an option is no drive, or is not for such drives.
         """
         from tactile_bayes.errors import ParameterError
         from tactile_bayes.sweep import Rotation
 
-        turns = [isinstance(drive, Rotation) for drive in drives]
-        step = self.drive_step
-        if step is not None and any(turns) != all(turns):
+        if self.carry and not base:
+            if direction != "both":
+                raise ParameterError("--direction is for rotations, and --carry says where the base goes: leave it out")
+            return [*self.carried(self.drive_step)]
+        if self.carry and self.drive_step is not None:
             raise ParameterError(
                 "--drive-step: rotations and drives that carry the base have their default steps in one record; leave "
                 "it out, or scan them one by one"
             )
-        if not all(turns):
-            return step
-        low, high = _STEPS
+        step = self.rotation_step
+        return [*(Rotation(pivot, direction, step) for pivot in pivots_in(base)), *self.carried()]
+
+    @property
+    def rotation_step(self) -> float | None:
+        """The step of rotations [rad]; ParameterError if no rotation has it."""
+        from tactile_bayes.errors import ParameterError
+
+        (low, high), step = _STEPS, self.drive_step
         if step is not None and not low <= step <= high:
             raise ParameterError(f"--drive-step is {step:g}: give a step of rotations from {low:g} to {high:g} degrees")
-        return math.radians(_USUAL_STEP if step is None else step)
+        return None if step is None else math.radians(step)
 
 
 def _is_file(text: str) -> bool:
@@ -124,16 +117,16 @@ def _is_file(text: str) -> bool:
     return "," not in text or Path(text).is_file()
 
 
-def _translation(text: str) -> Carried:
+def _translation(text: str, step: float | None) -> Carried:
     from tactile_bayes.sweep import Translation
 
     x, y, heading, angle, travel = numbers_asked(text, "--carry", 5)
-    return Translation((x, y), math.radians(heading), math.radians(angle), travel)
+    return Translation((x, y), math.radians(heading), math.radians(angle), travel, step)
 
 
-def _motion(path: Path) -> Carried:
+def _motion(path: Path, step: float | None) -> Carried:
     from tactile_bayes.record.plain_csv import columns_in
     from tactile_bayes.sweep import Motion
 
     x, y, angles = columns_in(path, ("x", "y", "drive_angle"), "pose")
-    return Motion(x, y, [math.radians(angle) for angle in angles])
+    return Motion(x, y, [math.radians(angle) for angle in angles], step)

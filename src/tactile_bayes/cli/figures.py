@@ -53,7 +53,7 @@ class _DriveOptions(DriveOptions):
         """
         from tactile_bayes.errors import ParameterError
 
-        carried = self.carried
+        carried = self.carried(self.drive_step)
         if len(carried) > 1:
             raise ParameterError(f"figures show one drive, and there are {len(carried)}: give --carry once")
         return carried[0] if carried else None
@@ -116,13 +116,12 @@ def figures(
     """
     from tactile_bayes.paper_figures import NUMBERS, caption, draw_all
     from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
-    from tactile_bayes.sweep import Rotation
 
     carried = drive.drive
     options: dict[str, Any] = {
         "distances": distance or None,
         "drive": carried,
-        "drive_step": drive.step([carried or Rotation()]),
+        "drive_step": None if carried else drive.rotation_step,
         "rods": rods,
         "load_cell": noise.load_cell,
         "rng": seed,

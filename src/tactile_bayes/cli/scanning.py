@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tactile_bayes.cli.answer import Answer, table_of
 from tactile_bayes.cli.command import Output, Writes
 from tactile_bayes.cli.contour_options import ContourOptions
-from tactile_bayes.cli.drive_options import DriveOptions, Pivots, pivots_in
+from tactile_bayes.cli.drive_options import Directions, DriveOptions, Pivots
 from tactile_bayes.cli.rig_options import RigFile
 from tactile_bayes.cli.task_bar import step_bar
 
@@ -39,9 +39,7 @@ def scan(
     rig: RigFile,
     base: Pivots = None,
     drive: DriveOptions,
-    direction: Annotated[
-        Literal["both", "forward", "backward"], typer.Option(help="Sense of the rotations about each pivot.")
-    ] = "both",
+    direction: Annotated[Directions, typer.Option(help="Sense of the rotations about each pivot.")] = "both",
     figure: Annotated[
         Path | None,
         typer.Option(
@@ -64,14 +62,7 @@ def scan(
 
         stated = rig.stated
         rod = stated.known_rod
-        drives = drive.drives([] if drive.carry and not base else pivots_in(base))
-        made = sweep(
-            choice.contour(rod),
-            stated,
-            drive=drives,
-            direction=direction,
-            drive_step=drive.step(drives),
-        )
+        made = sweep(choice.contour(rod), stated, drive=drive.drives(base, direction))
         show(1, 3 if figure else 2)
         out.parent.mkdir(parents=True, exist_ok=True)
         write_record(made.record, out)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -83,37 +84,38 @@ def sensitivity(
     from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.planning.family_parameters import enlarged
     from tactile_bayes.runs.sensitivity import sensitivity_into, steps_of
+    from tactile_bayes.sweep import Rotation
 
     profiles, distances = profile or ["II"], distance or [0.5]
     if not replicates:
         _refuse_without_study(profiles, distances, noise_factor, work)
-    stated, pivots = rig.stated, pivots_in(base)
+    stated = rig.stated
     for name in profiles:
         paper_profile(name, q=0.5)  # type: ignore[arg-type]  # refuses any other
-    common: dict[str, Any] = {"rig": stated, "drive_step": math.radians(drive_step), "rng": seed}
+    common: dict[str, Any] = {"rig": stated, "rng": seed}
+    drives = [Rotation(pivot, drive_step=math.radians(drive_step)) for pivot in pivots_in(base)]
     material = _material(stated) if best_rod else None
     first: Any = profiles[0]
     analysis = {
         **common,
         "material": material,
         "contour": enlarged(paper_profile(first, q=distances[0]), (stated.rod or Rod()).length),
-        "base": pivots,
+        "drive": drives,
         "band_widths": band_width or None,
     }
     if not replicates:
         with task_bar(steps_of(material), "step", output.is_silent) as show:
             run = sensitivity_into(out, progress=show, **analysis)
         return _answer(run)
+    over = {"distance": distances, "noise_factor": noise_factor or [0.1, 0.3, 1.0, 3.0]}
     study = {
         **common,
         "contours": profiles,
-        "distances": distances,
-        "noise_factors": noise_factor or [0.1, 0.3, 1.0, 3.0],
-        "base_x": pivots[0][0],
+        "over": over,
+        "drive": replace(drives[0], base=(drives[0].base[0], 0.0)),
         "replicates": replicates,
-        **work.arguments,
     }
-    count = math.prod(len(study[name]) for name in ("contours", "distances", "noise_factors"))
+    count = len(profiles) * math.prod(map(len, over.values()))
 
     def have(done: int | None) -> str:
         if done is None:
@@ -121,7 +123,7 @@ def sensitivity(
         return f"{done:,} of {counted(count, 'cell')} are in {out / 'study'}"
 
     with resumable_bar(count, "cell", output.is_silent, have) as note:
-        study["progress"] = lambda studied: note(studied.done)
+        study["workers"] = work.reporting(lambda studied: note(studied.done))
         run = sensitivity_into(out, study=study, **analysis)
     return _answer(run)
 

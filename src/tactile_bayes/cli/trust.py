@@ -70,8 +70,7 @@ def trust(
             assumptions=assumptions,
             probability=probability,
             rng=seed,
-            progress=note,
-            **work.arguments,
+            workers=work.reporting(note),
         )
     found = made.result
     words = [found.attrs["summary"], *found.attrs["words"].splitlines()]

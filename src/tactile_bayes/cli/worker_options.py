@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tactile_bayes.tasks import TaskProgress, Workers
 
 __all__ = ["WorkerOptions"]
 
@@ -22,9 +27,8 @@ class WorkerOptions:
         ),
     ] = None
 
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """Arguments of the functions that share their tasks.
+    def reporting(self, progress: Callable[[TaskProgress], object]) -> Workers:
+        """Return the workers, of which a function hears.
 
         Raises
         ------
@@ -32,13 +36,12 @@ class WorkerOptions:
             If it is neither a number nor an address.
         """
         from tactile_bayes.errors import ParameterError
+        from tactile_bayes.tasks import Workers
 
-        if self.workers is None:
-            return {}
-        if "://" in self.workers:
-            return {"scheduler": self.workers}
+        if self.workers is None or "://" in self.workers:
+            return Workers(self.workers, progress)
         if not (self.workers.isascii() and self.workers.isdigit() and int(self.workers)):
             raise ParameterError(
                 f"--workers is {self.workers!r}: give a number of processes, or the address of a scheduler"
             )
-        return {"workers": int(self.workers)}
+        return Workers(int(self.workers), progress)

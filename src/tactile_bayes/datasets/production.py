@@ -6,13 +6,13 @@ import hashlib
 import os
 import reprlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from tactile_bayes.checks import check_function, check_path
+from tactile_bayes.checks import check_path
 from tactile_bayes.datasets.card import CARD, card
 from tactile_bayes.datasets.manifest import MANIFEST, Manifest, read_manifest, versions_here, write_manifest
 from tactile_bayes.datasets.shard import Written, file_in, shard_file, write_shard
@@ -20,9 +20,17 @@ from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.specification_reading import read_specification
 from tactile_bayes.datasets.specification_text import UNNAMED, differences, meaning
 from tactile_bayes.errors import SpecificationError
-from tactile_bayes.tasks import alone_in, refuse_replacing, run_tasks, write_atomically
+from tactile_bayes.tasks import (
+    TaskProgress,
+    Workers,
+    alone_in,
+    refuse_replacing,
+    run_tasks,
+    workers_of,
+    write_atomically,
+)
 
-__all__ = ["Production", "generate"]
+__all__ = ["generate"]
 
 _WRITING_SHARE = 0.05
 """Share of the time that is spent on the manifest: shards that it does not list when the run is killed are repeated."""
@@ -35,25 +43,11 @@ _LONGEST_VALUE = 60
 """Largest number of characters of a value in the message."""
 
 
-class Production(NamedTuple):
-    """Progress of the production of a data set."""
-
-    records: int
-    """Number of existing records."""
-    wanted: int
-    made: int
-    """Number of records made in this run."""
-    seconds: float
-    """Time since the beginning of this run [s]."""
-
-
 def generate(
     spec: str | os.PathLike[str] | Mapping[str, Any] | Specification,
     out: str | os.PathLike[str],
     *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Callable[[Production], object] | None = None,
+    workers: int | str | Workers | None = None,
 ) -> Path:
     """Make the data set that a specification describes, or continue it.
 
@@ -67,13 +61,9 @@ def generate(
         A TOML file, its content as nested mappings, or a specification.
     out : path-like
         Folder for the shards (NetCDF), manifest.json, and README.md, the data card; it is created if necessary.
-    workers : int, optional
-        Number of processes on this machine; by default one for each core.
-    scheduler : str, optional
-        Address of a Dask scheduler, in place of `workers`. Its workers need this package in the same version, and
-        access to the folder under the same path.
-    progress : callable, optional
-        Called with a `Production` after each shard.
+    workers : int, str or Workers, optional
+        As in `calibrate`. Workers of a scheduler need access to the folder under the same path; progress is reported
+        in records, after each shard.
 
     Returns
     -------
@@ -102,8 +92,7 @@ def generate(
     ...     sorted(path.name for path in manifest.parent.iterdir())
     ['README.md', 'manifest.json', 'shard-000000.nc']
     """
-    check_function("progress", progress)
-    folder = check_path("out", out, "give the path of a folder").resolve()
+    workers, folder = workers_of(workers), check_path("out", out, "give the path of a folder").resolve()
     if isinstance(spec, str | os.PathLike):
         refuse_replacing([folder / MANIFEST, folder / CARD, *folder.glob("shard-*.nc")], [Path(spec)])
     spec = spec if isinstance(spec, Specification) else read_specification(spec)
@@ -115,15 +104,15 @@ def generate(
         next_write = began
         before = sum(shard.records for shard in manifest.shards)
         try:
-            with closing(run_tasks(write_shard, tasks, workers=workers, scheduler=scheduler)) as results:
+            with closing(run_tasks(write_shard, tasks, workers=workers)) as results:
                 for _, written in results:
                     waiting.append(written)
                     made += written.records
                     if (now := time.monotonic()) >= next_write:
                         manifest, waiting = _noted(manifest, waiting, folder), []
                         next_write = time.monotonic() + (time.monotonic() - now) / _WRITING_SHARE
-                    if progress is not None:
-                        progress(Production(before + made, spec.records, made, time.monotonic() - began))
+                    if workers.progress is not None:
+                        workers.progress(TaskProgress(before + made, spec.records, made, time.monotonic() - began))
         finally:
             manifest = _noted(manifest, waiting, folder)
         _finish(spec, manifest, folder)

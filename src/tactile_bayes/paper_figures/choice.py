@@ -12,7 +12,6 @@ from tactile_bayes.checks import (
     as_numbers,
     check_number,
     check_optional,
-    check_positive,
     check_whole_number,
 )
 from tactile_bayes.contours import paper_profile
@@ -21,7 +20,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence
 from tactile_bayes.plotting.axes import AxesArray
 from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
-from tactile_bayes.sweep import Carried, Scan, scan
+from tactile_bayes.sweep import Carried, Rotation, Scan, scan
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +43,7 @@ class Choice:
     drive : Carried or None
         Drive that carries the base; None for rotations about the origin.
     drive_step : float or None
-        Step of the drive [rad or L]; None for that of `scan`.
+        Step of rotations [rad]; None for that of `scan`.
     rods : int
         Largest number of rods drawn in one sweep.
     load_cell : LoadCell or None
@@ -90,9 +89,9 @@ class Choice:
         ContourError
             If the profile is too near, or out of reach.
         """
-        way: dict[str, Any] = {"direction": direction} if self.drive is None else {"drive": self.drive}
+        drive = self.drive or Rotation(direction=direction, drive_step=self.drive_step)
         try:
-            return scan(paper_profile(profile, q=distance), drive_step=self.drive_step, **way)
+            return scan(paper_profile(profile, q=distance), drive=drive)
         except ContourError as error:
             raise type(error)(f"profile {profile} at the distance q = {distance:g}: {error}") from None
 
@@ -124,9 +123,10 @@ def choice_of(
     if load_cell is not None and rng is None:
         raise ParameterError("the load cell has noise: give rng, like rng=1")
     seed = None if rng is None else seed_sequence(rng)
-    if drive_step is not None:
-        check_positive("drive_step", drive_step)
+    Rotation(drive_step=drive_step)  # refuses an impossible step
     check_optional("drive", drive, Carried, "the paper's rotations have none: give a Translation or a Motion")
     if drive is not None and not np.ptp(drive.poses[:, :2], axis=0).any():
         raise ParameterError("drive is a motion that does not move the base: give one that does, or no drive")
+    if drive is not None and drive_step is not None:
+        raise ParameterError("drive_step is for rotations: give it to the drive, as in Translation(…, drive_step=…)")
     return Choice(tuple(np.unique(q).tolist()), drive, drive_step, rods, load_cell, seed, width)

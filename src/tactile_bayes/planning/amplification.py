@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -24,6 +23,7 @@ from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS, carried_sweeps, travels_of
 from tactile_bayes.record.frame import to_fixed_axes
 from tactile_bayes.rig.stated import cell_with
+from tactile_bayes.sweep import Rotation
 
 __all__ = ["METHODS", "SOURCES", "Method", "amplification"]
 
@@ -105,7 +105,7 @@ def amplification(plan: Plan) -> xr.Dataset:
     `contact_coordinates`). The constrained estimate is, to first order, the weighted least-squares solution on the
     surface of possible contacts.
     """
-    refined = plan if plan.drive_angles is not None else _refined(plan)
+    refined = _refined(plan)
     if plan.rig.known.get("suspension_compliance"):
         raise ParameterError(
             "suspension_compliance is known, and amplification is of a pivot that does not yield: leave it out"
@@ -162,7 +162,12 @@ def _holds(plan: Plan, method: Method) -> Flags:
 
 
 def _refined(plan: Plan) -> Plan:
-    """Return the plan with drive angles that are dense near first contact and snap-off; unchanged without rotations."""
+    """Return the plan with drive angles that are dense near first contact and snap-off.
+
+    It is unchanged without rotations, or if one has drive angles of its own.
+    """
+    if any(isinstance(drive, Rotation) and drive.drive_angles is not None for drive in plan.drives):
+        return plan
     angles = []
     carried = carried_sweeps(plan.scan.record)
     for number, sweep in enumerate(plan.scan.sweeps):
@@ -170,7 +175,7 @@ def _refined(plan: Plan) -> Plan:
             continue
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
         angles += [first + (snap - first) * ways for ways in (_NEAR, 1.0 - _NEAR, _EVENLY)]
-    return replace(plan, drive_angles=np.unique(np.concatenate(angles))) if angles else plan
+    return plan.at_angles(np.concatenate(angles)) if angles else plan
 
 
 def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:

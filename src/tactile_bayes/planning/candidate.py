@@ -1,9 +1,10 @@
-"""A candidate for the next record: its drives, their step, and its expected results."""
+"""A candidate for the next record: its drives, and its expected results."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -17,7 +18,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.numerics.random_numbers import Seed, words
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
-from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge
+from tactile_bayes.planning.knowledge import COARSE, STEP, Base, Knowledge
 from tactile_bayes.planning.record_information import COARSE_STEP, parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Carried, Drive, Rotation
@@ -32,11 +33,21 @@ _WIDENING = 1.2
 
 @dataclass(frozen=True)
 class Candidate:
-    """Drives and a step for the next record."""
+    """Drives for the next record."""
 
     drives: tuple[Drive, ...]
-    drive_step: float
-    """Step of rotations [rad]; drives that carry the base have as many samples as a rotation with it."""
+
+    @property
+    def drive_step(self) -> float:
+        """Step of the first drive, the mean one of given angles, or that of a rotation with as many samples [rad]."""
+        first = self.drives[0]
+        if isinstance(first, Carried):
+            step = first.drive_step
+            return STEP if step is None else math.radians(240.0 / max(first.by(step).size - 1, 1))
+        if first.drive_angles is None:
+            return first.drive_step or STEP
+        angles = np.array(first.drive_angles)
+        return float(np.ptp(angles)) / max(angles.size - 1, 1)
 
     @property
     def base(self) -> Base:
@@ -51,14 +62,6 @@ class Candidate:
         return len(self.drives) == 1 and isinstance(self.drives[0], Rotation)
 
     @property
-    def described(self) -> dict[str, Any]:
-        """Everything that it consists of, as JSON has it."""
-        if self.is_pivot:
-            return {"base": self.base, "drive_step": self.drive_step}
-        drives = [drive.poses.tolist() if isinstance(drive, Carried) else drive.base for drive in self.drives]
-        return {"drives": drives, "drive_step": self.drive_step}
-
-    @property
     def words(self) -> str:
         """The drives in a few words."""
         return " and ".join(map(_in_words, self.drives))
@@ -66,7 +69,8 @@ class Candidate:
 
 def _in_words(drive: Drive) -> str:
     if isinstance(drive, Rotation):
-        return f"turned about ({drive.base[0]:g}, {drive.base[1]:g})"
+        alone = "" if drive.direction == "both" else f", {drive.direction} alone"
+        return f"turned about ({drive.base[0]:g}, {drive.base[1]:g}){alone}"
     begin, end = drive.poses[0], drive.poses[-1]
     angles = [f"{np.degrees(angle):.3g}°" for angle in sorted({begin[2], end[2]})]
     return f"carried from ({begin[0]:g}, {begin[1]:g}) to ({end[0]:g}, {end[1]:g}) at {' to '.join(angles)}"
@@ -112,14 +116,14 @@ def expected_of(task: tuple[Question, int]) -> Expected:
     The information about a draw is that of the drives that touch it.
     """
     question, number = task
-    candidate, step = question.candidates[number], question.candidates[number].drive_step
+    candidate = question.candidates[number]
     wide = band_factor(question.probability)
-    touched = np.stack([_usable(question.known, (drive,), step) for drive in candidate.drives], axis=1)
+    touched = np.stack([_usable(question.known, drive) for drive in candidate.drives], axis=1)
     usable: Flags = np.any(touched, axis=1, keepdims=False)
     rows: dict[str, list[float]] = {
         name: [] for name in ("width", "information", "nested_width", "nested_information", "draws")
     }
-    numbers = np.asarray([*candidate.base, step])
+    numbers = np.asarray([*candidate.base, candidate.drive_step])
     paths = [drive.poses.ravel() for drive in candidate.drives if isinstance(drive, Carried)]
     numbers = np.concatenate([numbers, *paths])
     rng = np.random.default_rng([*words(question.seed), *numbers.view(np.uint32)])
@@ -127,7 +131,7 @@ def expected_of(task: tuple[Question, int]) -> Expected:
     for k, touches in enumerate(touched):
         if touches.tobytes() not in by_touch:
             drives = [drive for drive, it in zip(candidate.drives, touches, strict=True) if it or not touches.any()]
-            model = question.known.model_from(drives, step)
+            model = question.known.model_from(drives)
             by_touch[touches.tobytes()] = replace(question, known=question.known.of(model)), model
         of_draw, model = by_touch[touches.tobytes()]
         known, point = of_draw.known, of_draw.known.points[k]
@@ -158,9 +162,9 @@ def expected_of(task: tuple[Question, int]) -> Expected:
     )
 
 
-def _usable(known: Knowledge, drives: tuple[Drive, ...], step: float) -> Flags:
-    """Return which draws a rod touches in these drives."""
-    model = known.model_from(drives, step)
+def _usable(known: Knowledge, drive: Drive) -> Flags:
+    """Return which draws a rod touches in a drive."""
+    model = known.model_from([drive])
     points = known.of(model).points
     return model.likelihood.usable(model.contours(points), model.rig(points))
 
@@ -224,7 +228,7 @@ def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats
 
 def _gaps(known: Knowledge, candidate: Candidate, usable: Flags) -> Floats:
     """Return the width that no sweep touches between the outermost first contacts, for each usable draw."""
-    model = known.model_from([*known.drives, *candidate.drives], COARSE)
+    model = known.model_from([*known.drives, *map(_coarse, candidate.drives)], COARSE)
     points = known.of(model).points[usable]
     if not len(points):
         return np.array([np.nan])
@@ -239,6 +243,11 @@ def _gaps(known: Knowledge, candidate: Candidate, usable: Flags) -> Floats:
             reach = max(reach, end)
         gaps.append(open_width)
     return np.array(gaps)
+
+
+def _coarse(drive: Drive) -> Drive:
+    """Return a drive without a grid of its own."""
+    return replace(drive, drive_angles=None, drive_step=None) if isinstance(drive, Rotation) else drive
 
 
 def _mean(values: Floats) -> tuple[float, float]:

@@ -6,20 +6,15 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from itertools import product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
-    check_choice,
-    check_numbers,
-    check_optional,
-    check_probability,
     check_switch,
     check_whole_number,
     refused,
@@ -27,31 +22,26 @@ from tactile_bayes.checks import (
 from tactile_bayes.errors import ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.family import Family, family_of
+from tactile_bayes.inference.result import record_of
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, words
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
+from tactile_bayes.planning.criterion import Criterion, CriterionName, criterion_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
-from tactile_bayes.planning.knowledge import (
-    COARSE,
-    Base,
-    Knowledge,
-    known_from_posterior,
-    known_from_prior,
-)
+from tactile_bayes.planning.knowledge import Knowledge, known_from_posterior, known_from_prior
+from tactile_bayes.record import rod_of
 from tactile_bayes.rig.rig import Rig, rig_of
-from tactile_bayes.sweep import Drive, Rotation, drives_of
-from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.sweep import Drive, Rotation, drives_of, recorded_drives
+from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 
-__all__ = ["design"]
-
-Criterion = Literal["band", "gap", "information"]
-_CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")
+__all__ = ["design", "usual_drives"]
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy")
 
 _GRID_POINTS = 25
 """Number of grid points of x over the span."""
 
-ACROSS, ABOVE = np.linspace(-0.5, 0.5, 11), np.array([-0.1, 0.0, 0.1])
+_ACROSS, _ABOVE = np.linspace(-0.5, 0.5, 11), np.array([-0.1, 0.0, 0.1])
 """Default positions of pivots, over the rod's length."""
 
 _NESTED = 400
@@ -63,23 +53,17 @@ def design(
     rig: Rig | None = None,
     *,
     rng: Rng,
-    bases: Sequence[tuple[float, float]] | None = None,
     drives: Sequence[Drive | Sequence[Drive]] | None = None,
-    drive_steps: Sequence[float] = (float(np.radians(2.0)),),
-    criterion: Criterion = "band",
+    criterion: CriterionName | Criterion = "band",
     nested: bool = False,
     draws: int = 24,
-    span: tuple[float, float] | None = None,
-    probability: float = 0.95,
     out: str | os.PathLike[str] | None = None,
-    workers: int | None = 1,
-    scheduler: str | None = None,
-    progress: Callable[[TaskProgress], object] | None = None,
+    workers: int | str | Workers | None = 1,
 ) -> xr.Dataset:
     """Return the expected results of the next record for every candidate drive, and the best candidate.
 
     Objects are drawn from the prior or the posterior so far; the information of the next record about each is added to
-    it, and the resulting band is averaged. A record from a pivot is a forward and a backward sweep.
+    it, and the resulting band is averaged.
 
     Parameters
     ----------
@@ -91,39 +75,29 @@ def design(
         are left out, of a posterior, too.
     rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of all random numbers.
-    bases : sequence of (float, float), optional
-        Pivots to choose from [length]; by default eleven from half a rod's length to the left of the pivot so far to
-        half to the right, at its height and a tenth of the rod's length below and above.
     drives : sequence of Rotation, Translation, Motion or sequences of them, optional
-        Drives to choose from, beside the pivots that are given; each sequence is one candidate, whose sweeps are one
-        record. Those that carry the base are sampled as often as a rotation from −30° to 210°.
-    drive_steps : sequence of float
-        Steps of the drive to choose from [rad].
-    criterion : {"band", "gap", "information"}
-        Criterion of the best candidate: the narrowest band, the smallest gap, or the most information.
+        Candidates; each sequence is one, whose sweeps are one record. Rotations without a grid of their own go from
+        −30° to 210° in steps of 2°, and drives that carry the base have as many samples. By default `usual_drives`.
+    criterion : {"band", "gap", "information"} or Criterion
+        Criterion of the best candidate: the narrowest band, the smallest gap, or the most information. A `Criterion`
+        also states where the band matters, and its probability.
     nested : bool
         Whether each candidate's posteriors are also sampled by nested Monte Carlo, which checks Laplace's
         approximation, and includes the information of the snap-off.
     draws : int
         Number of objects that are drawn, at least 2.
-    span : (float, float), optional
-        Interval of x in which the band matters [length]; by default between the outermost first contacts of the sweeps
-        so far, or, for a prior, of sweeps from the origin; medians over the draws.
-    probability : float
-        Probability of the pointwise band, in (0, 1).
     out : path-like, optional
         Folder of the results store candidates.json: the same call resumes from it, or returns at once.
-    workers, scheduler
+    workers
         As in `calibrate`; by default in this process.
-    progress : callable, optional
-        Called with a `TaskProgress` after each candidate.
 
     Returns
     -------
     xr.Dataset
-        Over "candidate", with base_x, base_y (the pivot, or where the first drive begins) [length], drive_step [rad],
-        drive, in words, is_pivot (whether it turns about one pivot), and samples, the number of readings of its record,
-        by which candidates that take the same time can be chosen:
+        Over "candidate", with base_x, base_y (the pivot, or where the first drive begins) [length], drive_step (of the
+        first drive, or of a rotation with as many samples) [rad], drive, in words, is_pivot (whether it turns about one
+        pivot), and samples, the number of readings of its record, by which candidates that take the same time can be
+        chosen:
 
         width, width_error
             Expected mean width of the band over the span [length], and its standard error over draws. For objects that
@@ -167,15 +141,14 @@ def design(
     --------
     >>> from scipy import stats
     >>> known = Family("parabola", a=stats.lognorm(0.3, scale=0.6), q=stats.uniform(0.4, 0.2), x_c=stats.norm(0, 0.05))
-    >>> found = design(known, bases=[(0.0, 0.0), (0.0, -0.3)], draws=4, rng=1)
+    >>> found = design(known, drives=[Rotation(), Rotation((0.0, -0.3))], draws=4, rng=1)
     >>> bool(found.width[1] > found.width[0])  # farther away
     True
     """
-    check_choice("criterion", criterion, _CRITERIA)
+    criterion = criterion_of(criterion)
     check_whole_number("draws", draws, 2)
     check_switch("nested", nested)
     seed = seed_sequence(rng)
-    check_probability("probability", probability)
     draws_from = np.random.default_rng([*words(seed), 1])
     if isinstance(known, str | Family):
         knowledge = known_from_prior(rig_of(rig), family_of(known), draws=int(draws), rng=draws_from)
@@ -183,28 +156,49 @@ def design(
         raise ParameterError("a rig and a posterior, which has its own: leave one of the two")
     else:
         knowledge = known_from_posterior(known, draws=int(draws), rng=draws_from)
-    correction = "give angles in radians, from 1e-5 to 0.5"
-    several = drive_steps if np.iterable(drive_steps) else [drive_steps]
-    steps = check_numbers("drive_steps", several, correction, shape=(None,), least=1e-5, most=0.5)
-    pivots = [] if bases is None and drives is not None else _bases(bases, knowledge)
-    choices: list[tuple[Drive, ...]] = [(Rotation(base),) for base in pivots]
-    choices += [tuple(drives_of(drive, (0.0, 0.0))) for drive in _several(drives)]
-    candidates = tuple(Candidate(choice, float(step)) for choice, step in product(choices, steps))
-    x = np.linspace(*_span(span, knowledge), _GRID_POINTS)
-    question = Question(knowledge, candidates, x, float(probability), _NESTED if nested else 0, seed)
+    candidates = _candidates(usual_drives(known, rig) if drives is None else drives)
+    x = np.linspace(*(criterion.span or _span(knowledge)), _GRID_POINTS)
+    question = Question(knowledge, candidates, x, criterion.probability, _NESTED if nested else 0, seed)
     with open_results_store(_identity(question), out, CANDIDATES) as store:
-        found = keep_outcomes(
-            store, expected_of, question, len(candidates), workers=workers, scheduler=scheduler, progress=progress
-        )
+        found = keep_outcomes(store, expected_of, question, len(candidates), workers=workers)
     if not any(expected.reached for expected in found.values()):
         raise ReachError(_out_of_reach(question))
-    return _labelled(question, [found[number] for number in range(len(candidates))], criterion)
+    return _labelled(question, [found[number] for number in range(len(candidates))], criterion.name)
 
 
-def _several(drives: Any) -> Sequence[Any]:
-    """Return the given drives; none by default."""
-    check_optional("drives", drives, Sequence, "give a list of drives, or of lists of them")
-    return drives or ()
+def usual_drives(
+    known: xr.DataTree | str | Family = "parabola", rig: Rig | None = None, drive_step: float | None = None
+) -> list[Rotation]:
+    """Return the default candidates of `design`, rotations about 33 pivots.
+
+    They are from half a rod's length to the left of the pivot so far to half to the right, at its height and a tenth of
+    the rod's length below and above.
+
+    Parameters
+    ----------
+    known, rig
+        As in `design`.
+    drive_step : float, optional
+        As in `Rotation`.
+    """
+    record = record_of(known) if isinstance(known, xr.DataTree) else None
+    drives = [] if record is None else recorded_drives(record)
+    x, y = next((drive.base for drive in drives if isinstance(drive, Rotation)), (0.0, 0.0))
+    stated = rig_of(rig).rod or Rod()
+    length = (stated if record is None else rod_of(record)).length
+    pivots = [(float(x + length * dx), float(y + length * dy)) for dy in _ABOVE for dx in _ACROSS]
+    return [Rotation(pivot, drive_step=drive_step) for pivot in pivots]
+
+
+def _candidates(drives: Any) -> tuple[Candidate, ...]:
+    """Return the candidates, each of one drive or several."""
+    correction = "give a list of drives, or of lists of them"
+    if not isinstance(drives, Sequence) or not drives:
+        raise refused("drives", drives, correction)
+    candidates = [Candidate(tuple(drives_of(drive))) for drive in drives]
+    if len(set(candidates)) < len(candidates):
+        raise refused("drives", drives, "one of them is given twice")
+    return tuple(candidates)
 
 
 def _out_of_reach(question: Question) -> str:
@@ -220,33 +214,15 @@ def _out_of_reach(question: Question) -> str:
     )
 
 
-def _bases(bases: Sequence[Base] | None, knowledge: Knowledge) -> list[Base]:
-    """Return the candidate pivots."""
-    if bases is None:
-        x, y = knowledge.bases[0] if knowledge.bases else (0.0, 0.0)
-        length = knowledge.rod.length
-        return [(float(x + length * dx), float(y + length * dy)) for dy in ABOVE for dx in ACROSS]
-    pivots = check_numbers("bases", bases, "give a list of pivots, [(x, y), (x, y)]", shape=(None, 2))
-    if len(np.unique(pivots, axis=0)) < len(pivots):
-        raise refused("bases", bases, "one of them is given twice")
-    return [(x, y) for x, y in pivots.tolist()]
-
-
-def _span(span: tuple[float, float] | None, knowledge: Knowledge) -> tuple[float, float]:
-    """Return the interval of x in which the band matters."""
-    if span is not None:
-        correction = "give two values of x, the smaller first"
-        left, right = check_numbers("span", span, correction, shape=(2,)).tolist()
-        if not left < right:
-            raise refused("span", span, correction)
-        return left, right
+def _span(knowledge: Knowledge) -> tuple[float, float]:
+    """Return the interval of x in which the band matters by default."""
     model, points = knowledge.experiment.model, knowledge.points
     events = events_of(model.likelihood, model.contours(points), model.rig(points), exact=False)
     first = events["first_contact_x"]
     return float(np.nanmedian(np.nanmin(first, axis=1))), float(np.nanmedian(np.nanmax(first, axis=1)))
 
 
-def _labelled(question: Question, expected: Sequence[Expected], criterion: Criterion) -> xr.Dataset:
+def _labelled(question: Question, expected: Sequence[Expected], criterion: CriterionName) -> xr.Dataset:
     """Return the result of a design; see `design`."""
     known, candidates = question.known, question.candidates
     metres = {"units": "1" if known.rod.is_dimensionless else "m"}
@@ -287,7 +263,7 @@ def _labelled(question: Question, expected: Sequence[Expected], criterion: Crite
 
 def _samples(known: Knowledge, candidate: Candidate) -> int:
     """Return the number of samples of a candidate's record."""
-    return int(known.model_from(candidate.drives, candidate.drive_step).measured.sizes["sample"])
+    return int(known.model_from(candidate.drives).measured.sizes["sample"])
 
 
 def _present_width(question: Question) -> float:
@@ -303,8 +279,8 @@ def _identity(question: Question) -> dict[str, str]:
     known = question.known
     return known.experiment.assumptions | {
         "what is known": hashlib.sha256(known.points.tobytes()).hexdigest(),
-        "drives": json.dumps(Candidate(known.drives, COARSE).described),
-        "candidates": json.dumps([candidate.described for candidate in question.candidates]),
+        "drives": json.dumps([drive.description for drive in known.drives]),
+        "candidates": json.dumps([[drive.description for drive in one.drives] for one in question.candidates]),
         "span": json.dumps([float(question.x[0]), float(question.x[-1])]),
         "probability": repr(question.probability),
         "nested": repr(question.nested),

@@ -22,6 +22,7 @@ from tactile_bayes.planning.amplification import METHODS, amplification
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, record_information
+from tactile_bayes.sweep import Rotation
 from tactile_bayes.uncertainty.band import contour_band
 
 __all__ = ["CellOutcome", "MapCell", "MapTask", "error_cell"]
@@ -51,7 +52,9 @@ class MapTask:
     contours: Mapping[str, Contour]
     cells: tuple[MapCell, ...]
     plan: Plan
-    """Plan of the sweeps, for any of the contours; base_x of its pivot is used."""
+    """Plan of the sweeps, for any of the contours."""
+    drive: Rotation
+    """Its drive, with a pivot at the height 0."""
     replicates: int
     posteriors: Mapping[int, int]
     """Number of replicates for which posteriors are inferred, by index of the cell."""
@@ -73,7 +76,8 @@ def error_cell(task: tuple[MapTask, int]) -> CellOutcome:
     study, number = task
     cell = study.cells[number]
     contour = study.contours[cell.contour]
-    plan = replace(study.plan, contour=contour, base=_pivot(contour, study.plan, cell.distance))
+    pivot = study.drive.base[0], float(contour.point(0.0)[1]) - cell.distance
+    plan = replace(study.plan, contour=contour, drive=replace(study.drive, base=pivot))
     plan = plan.with_noise(cell.noise_factor)
     try:
         with warnings.catch_warnings():
@@ -94,12 +98,6 @@ def error_cell(task: tuple[MapTask, int]) -> CellOutcome:
     return CellOutcome(numbers, "ok")
 
 
-def _pivot(contour: Contour, plan: Plan, distance: float) -> tuple[float, float]:
-    """Return the pivot: below the contour's lowest point by a distance, at base_x of the plan."""
-    lowest = float(contour.point(0.0)[1])
-    return float(np.atleast_2d(np.asarray(plan.base, dtype=float))[0, 0]), lowest - distance
-
-
 def _expected(plan: Plan, probability: float) -> dict[str, float]:
     """Return the mean widths of the expected bands."""
     model, point = plan.model, plan.point
@@ -118,7 +116,7 @@ def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
     """Return root mean square errors of contacts with the status "ok" over all replicates, and those of first order."""
     record = plan.scan.record
     loaded = record.truth_contact_phase.values != "none"
-    grown = amplification(replace(plan, drive_angles=np.unique(record.drive_angle.values)))
+    grown = amplification(plan.at_angles(record.drive_angle.values))
     first = {
         name: {
             (int(sweep), float(angle)): value

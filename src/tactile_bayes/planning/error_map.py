@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from itertools import product
@@ -16,26 +16,26 @@ import xarray as xr
 
 from tactile_bayes.checks import (
     TINY,
+    check_kind,
     check_mapping,
     check_names,
-    check_number,
     check_numbers,
-    check_probability,
     check_whole_number,
     refused,
 )
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
-from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.planning.amplification import METHODS
+from tactile_bayes.planning.bands import Bands
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
 from tactile_bayes.planning.knowledge import unmeasured
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig.rig import Rig, rig_of
-from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.sweep import Rotation
+from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 
 __all__ = ["CELLS", "error_map"]
 
@@ -50,6 +50,10 @@ _LENGTHS = (
     "posterior_touched_width",
     "posterior_gap_width",
 )
+_DRIVE, _BANDS = Rotation(drive_step=float(np.radians(2.0))), Bands()
+_AXES = {"distance": (0.5,), "noise_factor": (0.1, 0.3, 1.0, 3.0)}
+"""Axes of the map beside the contours, with their usual values."""
+
 _SHARES = ("posterior_touched_coverage", "posterior_gap_coverage", "posterior_failed")
 
 
@@ -58,19 +62,12 @@ def error_map(
     rig: Rig | None = None,
     *,
     rng: Rng,
-    distances: Sequence[float] = (0.5,),
-    noise_factors: Sequence[float] = (0.1, 0.3, 1.0, 3.0),
-    base_x: float = 0.0,
-    drive_step: float = float(np.radians(2.0)),
-    family: Family | None = None,
+    over: Mapping[str, Sequence[float]] | None = None,
+    drive: Rotation = _DRIVE,
     replicates: int = 20,
-    posterior_cells: int = 0,
-    posterior_replicates: int = 2,
-    probability: float = 0.95,
+    bands: Bands = _BANDS,
     out: str | os.PathLike[str] | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Callable[[TaskProgress], object] | None = None,
+    workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
     """Return the errors of reconstruction over contour, distance and noise, from repeated simulations of records.
 
@@ -79,32 +76,23 @@ def error_map(
     contours : mapping of str to Contour, or sequence of str
         Objects by name, in the unit of the rod's length; or names of the paper's profiles, for the dimensionless rod or
         scaled to the rod's length.
-    rig, family
-        As in `Plan`; a family is that of all contours.
+    rig : Rig, optional
+        As in `Plan`.
     rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of all random numbers; the results do not depend on the number of workers.
-    distances : sequence of float
-        Heights of the lowest point of each contour above the pivot [rod lengths].
-    noise_factors : sequence of float
-        Factors on the noise of the load cell.
-    base_x : float
-        Position of the pivot [length].
-    drive_step : float
-        As in `scan`; every cell is a forward and a backward sweep.
+    over : mapping of str to sequence of float, optional
+        The axes of the map: "distance", heights of the lowest point of each contour above the pivot [rod lengths], by
+        default 0.5; "noise_factor", factors on the noise of the load cell, by default 0.1, 0.3, 1 and 3.
+    drive : Rotation
+        The sweeps of every cell, with a pivot whose height the distance gives; by default at x = 0 in steps of 2°.
     replicates : int
         Number of records in each cell.
-    posterior_cells : int
-        Number of cells, evenly over the map, in which posteriors are inferred; each takes seconds.
-    posterior_replicates : int
-        Number of posteriors in such a cell.
-    probability : float
-        Probability of the bands, in (0, 1).
+    bands : Bands
+        The bands of the contour, and the cells in which posteriors are inferred, by default none.
     out : path-like, optional
         Folder of the results store cells.json: a run that was killed resumes.
-    workers, scheduler
+    workers
         As in `calibrate`.
-    progress : callable, optional
-        Called with a `TaskProgress` after each cell.
 
     Returns
     -------
@@ -143,40 +131,46 @@ def error_map(
 
     Examples
     --------
-    >>> found = error_map(["II"], noise_factors=[0.1, 1.0], replicates=2, rng=1, workers=1)
+    >>> found = error_map(["II"], over={"noise_factor": [0.1, 1.0]}, replicates=2, rng=1, workers=1)
     >>> found.rms_across.sel(reconstruction="constrained").values.ravel().round(4) < 0.02
     array([ True,  True])
     """
     rig = rig_of(rig)
     rod = rig.rod or Rod()
     objects = _objects(contours, rod)
-    distances, noise_factors = _grid("distances", distances), _grid("noise_factors", noise_factors)
-    counts = {"replicates": (replicates, 1), "posterior_cells": (posterior_cells, 0)}
-    counts["posterior_replicates"] = posterior_replicates, 1
-    for name, (count, least) in counts.items():
-        check_whole_number(name, count, least)
-    check_probability("probability", probability)
+    distances, noise_factors = _axes(over)
+    check_whole_number("replicates", replicates, 1)
+    check_kind("bands", bands, Bands, "give Bands(probability=..., posterior_cells=...)")
+    if not isinstance(drive, Rotation) or drive.base[1] != 0.0:
+        raise refused("drive", drive, "give a Rotation((x, 0.0)), as the distance gives the height of the pivot")
     cells = tuple(
         MapCell(name, distance * rod.length, factor)
         for name, distance, factor in product(objects, distances, noise_factors)
     )
-    base = (check_number("base_x", base_x), 0.0)
-    plan, *_ = [Plan(each, rig, base=base, drive_step=drive_step, family=family) for each in objects.values()]
-    chosen = np.unique(np.linspace(0, len(cells) - 1, min(posterior_cells, len(cells))).round().astype(int))
+    plan, *_ = [Plan(each, rig, drive, bands.family) for each in objects.values()]
+    chosen = np.unique(np.linspace(0, len(cells) - 1, min(bands.posterior_cells, len(cells))).round().astype(int))
     task = MapTask(
         objects,
         cells,
         plan,
+        drive,
         int(replicates),
-        {int(number): min(int(posterior_replicates), int(replicates)) for number in chosen},
-        float(probability),
+        {int(number): min(bands.posterior_replicates, int(replicates)) for number in chosen},
+        bands.probability,
         seed_sequence(rng),
     )
     with open_results_store(_identity(task), out, CELLS) as store:
-        kept = keep_outcomes(
-            store, error_cell, task, len(cells), workers=workers, scheduler=scheduler, progress=progress
-        )
+        kept = keep_outcomes(store, error_cell, task, len(cells), workers=workers)
     return _labelled(task, kept, list(objects), distances, noise_factors)
+
+
+def _axes(over: Mapping[str, Sequence[float]] | None) -> list[list[float]]:
+    """Return distances and noise factors."""
+    given = over or {}
+    check_mapping("over", given, 'give lists of numbers by axis, like {"distance": [0.3, 0.5]}')
+    if other := [name for name in given if name not in _AXES]:
+        raise refused("over", other[0], f"the axes are {' and '.join(_AXES)}")
+    return [_grid(name, given.get(name, usual)) for name, usual in _AXES.items()]
 
 
 def _grid(name: str, values: Sequence[float]) -> list[float]:
@@ -207,8 +201,7 @@ def _identity(task: MapTask) -> dict[str, str]:
         "family": repr(plan.family),
         "contours": json.dumps({name: repr(contour) for name, contour in task.contours.items()}),
         "cells": json.dumps([asdict(cell) for cell in task.cells]),
-        "base": repr(plan.base),
-        "drive_step": repr(plan.drive_step),
+        "drive": json.dumps([drive.description for drive in plan.drives]),
         "replicates": repr(task.replicates),
         "posteriors": json.dumps(dict(task.posteriors)),
         "probability": repr(task.probability),

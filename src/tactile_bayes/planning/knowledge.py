@@ -22,12 +22,15 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.rig.unknown import DEFAULT, NOTHING, Unknown
-from tactile_bayes.sweep import Drive, Rotation, record_template, recorded_drives
+from tactile_bayes.sweep import Drive, Rotation, blind_angles, record_template, recorded_drives
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["COARSE", "Base", "Knowledge", "known_from_posterior", "known_from_prior", "unmeasured"]
+__all__ = ["COARSE", "STEP", "Base", "Knowledge", "known_from_posterior", "known_from_prior", "unmeasured"]
 
 Base = tuple[float, float]
+
+STEP = float(np.radians(2.0))
+"""Step of the drive if a rotation has no grid of its own [rad]."""
 
 COARSE = float(np.radians(5.0))
 """Step of the drive for records of which only the events are used [rad]."""
@@ -64,9 +67,9 @@ class Knowledge:
         """The rod of the experiment."""
         return rod_of(self.experiment.record)
 
-    def model_from(self, drives: Sequence[Drive], drive_step: float) -> ContourModel:
-        """Return the model of an empty record by these drives."""
-        return self.model(_empty_record(drives, drive_step, self.rod, self.experiment.noise.cell))
+    def model_from(self, drives: Sequence[Drive], drive_step: float = STEP) -> ContourModel:
+        """Return the model of an empty record by these drives; the step is of those without a grid of their own."""
+        return self.model(record_template(drives, blind_angles(drive_step), self.rod, self.experiment.noise.cell))
 
     def model(self, record: xr.Dataset) -> ContourModel:
         """Return the model of a record, empty or measured, without the unknowns that it does not show."""
@@ -82,40 +85,15 @@ class Knowledge:
         return replace(self, points=self.points[:, own], precision=np.linalg.inv(covariance))
 
 
-def _empty_record(drives: Sequence[Drive], drive_step: float, rod: Rod, load_cell: LoadCell) -> xr.Dataset:
-    """Return an empty record by these drives, rotations forward and backward.
-
-    Rotations go from before any first contact to after any snap-off, where the object lies above the pivot.
-    """
-    angles = np.arange(np.radians(-30.0), np.radians(210.0) + 1e-9, drive_step)
-    return record_template(drives, ("forward", "backward"), angles, rod, load_cell)
-
-
 def unmeasured(rig: Rig, family: Family | str = "parabola", drives: Sequence[Drive] = (Rotation(),)) -> Experiment:
     """Return the experiment of an empty record by some drives, with the usual load cell if the rig states none."""
     rod = rig.rod or Rod()
     cell = rig.load_cell or usual_load_cell(rod)
-    return Experiment(_empty_record(drives, COARSE, rod, cell), replace(rig, load_cell=cell), family)
+    return Experiment(record_template(drives, blind_angles(COARSE), rod, cell), replace(rig, load_cell=cell), family)
 
 
 def known_from_prior(rig: Rig, family: Family, *, draws: int, rng: np.random.Generator) -> Knowledge:
-    """Draw truths from the priors of a rig and a family, restricted to contours within reach.
-
-    Parameters
-    ----------
-    rig : Rig
-    family : Family
-    draws : int
-        Number of draws.
-    rng : np.random.Generator
-
-    Raises
-    ------
-    ParameterError
-        If the family is shape-free.
-    ReachError
-        If the rod hardly ever reaches a contour of the prior.
-    """
+    """Draw truths from the priors of a rig and a family, restricted to contours within reach."""
     _refuse_shape_free(family.name)
     experiment = unmeasured(replace(rig, unknown=_without_shifts(rig.entries)), family)
     points, _ = experiment.model.draw_prior(rng, draws)
@@ -124,22 +102,7 @@ def known_from_prior(rig: Rig, family: Family, *, draws: int, rng: np.random.Gen
 
 
 def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.Generator) -> Knowledge:
-    """Draw truths from a posterior of `infer_contour`, with its rig, load cell and pivots.
-
-    Parameters
-    ----------
-    posterior : xr.DataTree
-    draws : int
-        Number of draws, at most all.
-    rng : np.random.Generator
-
-    Raises
-    ------
-    InferenceError
-        If the tree is no posterior of a contour.
-    ParameterError
-        If the contour is shape-free.
-    """
+    """Draw truths from a posterior of `infer_contour`, with its rig, load cell and pivots."""
     contour_draws(posterior)
     attrs: dict[Any, Any] = posterior.attrs
     _refuse_shape_free(str(attrs["family"]))

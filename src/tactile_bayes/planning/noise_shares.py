@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -135,19 +134,7 @@ def noise_shares(
 def first_and_total(
     function: Callable[[Floats], Floats], distributions: Sequence[Any], samples: int, rng: Rng
 ) -> tuple[Floats, Floats]:
-    """Return first-order and total Sobol' indices of a function's values, shape (values, inputs) each.
-
-    Parameters
-    ----------
-    function : callable
-        Maps inputs, shape (inputs, n), to values, shape (values, n).
-    distributions : sequence of frozen scipy.stats distribution
-        Distributions of the independent inputs.
-    samples : int
-        Number of samples, a power of two.
-    rng : int, numpy.random.SeedSequence or numpy.random.Generator
-        Seed of the scrambled Sobol' sequences.
-    """
+    """Return first-order and total Sobol' indices of a function's values, shape (values, inputs) each."""
     found = stats.sobol_indices(func=function, n=samples, dists=distributions, rng=generator(rng))
     return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)  # SciPy squeezes a single value
 
@@ -182,7 +169,7 @@ def _states(plan: Plan, count: int) -> xr.Dataset:
     for sweep in plan.scan.sweeps:
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
         angles.append(first + (snap - first) * (np.arange(count) + 0.5) / count)
-    record = _with_travels(replace(plan, drive_angles=np.concatenate(angles)).scan.record)
+    record = _with_travels(plan.at_angles(np.concatenate(angles)).scan.record)
     near = np.array([np.isin(record.drive_angle.values[i], angles[s]) for i, s in enumerate(record.sweep.values)])
     return record.isel(sample=np.flatnonzero(near & (record.truth_contact_phase.values != "none")))
 

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -30,8 +30,7 @@ from tactile_bayes.record import CHANNELS, validate, with_rod
 from tactile_bayes.rig.corrected import corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.stated import stated_values
-from tactile_bayes.sweep import Drive, Scan, scan
-from tactile_bayes.sweep.scanning import drives_of
+from tactile_bayes.sweep import Drive, Rotation, Scan, drives_of, scan
 
 __all__ = ["Plan"]
 
@@ -48,8 +47,8 @@ class Plan:
         As in `infer_contour`; by default with the dimensionless rod. Its load cell has by default force_noise
         0.05 EI/L² and moment_noise 0.02 EI/L. Numbers that are known act in sweeps and readings; what is unknown is as
         stated there.
-    drive, base, direction, drive_step, drive_angles
-        As in `scan`.
+    drive : Rotation, Translation or Motion, or a sequence of them, optional
+        Path of the base, by default a rotation about the origin.
     family : Family, optional
         Family of the contour, with priors of its parameters; by default those of `infer_contour`.
 
@@ -69,17 +68,12 @@ class Plan:
     contour: Contour
     rig: Rig = field(default_factory=Rig)
     drive: Drive | Sequence[Drive] | None = None
-    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0)
-    direction: Literal["both", "forward", "backward"] = "both"
-    drive_step: float | None = None
-    drive_angles: ArrayLike | None = None
     family: Family | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rig", rig_of(self.rig))
         check_single("contour", self.contour)
-        drives_of(self.drive, self.base)
-        check_choice("direction", self.direction, ("both", "forward", "backward"))
+        drives_of(self.drive)
         self._refuse_other_family()
         deviations = self.cell.standard_deviations
         silent = [name for name in CHANNELS if not 0.0 < deviations[name] < np.inf]
@@ -122,15 +116,19 @@ class Plan:
         """The sweeps without errors; angles that one direction adds may be those of another turn in the other one."""
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=".* a turn ", category=ClearanceWarning)
-            return scan(
-                self.contour,
-                replace(self.rig, rod=self.rod),
-                drive=self.drive,
-                direction=self.direction,
-                base=self.base,
-                drive_step=self.drive_step,
-                drive_angles=self.drive_angles,
-            )
+            return scan(self.contour, replace(self.rig, rod=self.rod), drive=self.drive)
+
+    @property
+    def drives(self) -> list[Drive]:
+        """The drives, in their order."""
+        return drives_of(self.drive)
+
+    def at_angles(self, drive_angles: ArrayLike) -> Plan:
+        """Return the plan with other drive angles of all rotations."""
+        angles: dict[str, Any] = {"drive_step": None, "drive_angles": drive_angles}
+        return replace(
+            self, drive=[replace(one, **angles) if isinstance(one, Rotation) else one for one in self.drives]
+        )
 
     @cached_property
     def record(self) -> xr.Dataset:

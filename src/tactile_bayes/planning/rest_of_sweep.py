@@ -14,7 +14,7 @@ from tactile_bayes.planning.expected_band import band_factor, deviation_of_heigh
 from tactile_bayes.planning.knowledge import known_from_posterior
 from tactile_bayes.planning.record_information import COARSE_STEP, reading_slopes, record_information
 from tactile_bayes.record import carried_sweeps
-from tactile_bayes.sweep import Rotation, record_template
+from tactile_bayes.sweep import Direction, Rotation, record_template
 
 __all__ = ["rest_of_sweep"]
 
@@ -83,7 +83,8 @@ def rest_of_sweep(
     known = known_from_posterior(posterior, draws=draws, rng=generator(rng))
     record = record_of(posterior)
     last = record.isel(sample=-1)
-    direction, end = str(last.direction.values), float(last.drive_angle)
+    direction: Direction = "forward" if last.direction == "forward" else "backward"
+    end = float(last.drive_angle)
     if int(last.sweep) in carried_sweeps(record):
         raise ParameterError("the drive carries the base in the last sweep: give the whole drive to design instead")
     ahead = angles > end if direction == "forward" else angles < end
@@ -94,7 +95,7 @@ def rest_of_sweep(
         )
     base = (float(last.base_x), float(last.base_y))
     cell = known.experiment.noise.cell
-    model = known.model(record_template([Rotation(base)], (direction,), angles, known.rod, cell))
+    model = known.model(record_template([Rotation(base, direction)], angles, known.rod, cell))
     own, factor = known.of(model), band_factor(probability)
     count = len(own.points)
     now, then = np.empty((count, at.size)), np.empty((count, at.size))

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from typing import Literal
 
 import xarray as xr
-from numpy.typing import ArrayLike
 
 from tactile_bayes.checks import (
-    check_function,
     check_names,
     check_probability,
     check_whole_number,
@@ -29,7 +25,6 @@ from tactile_bayes.planning.requirement import required_noise
 from tactile_bayes.planning.sensitivity_summary import sensitivity_summary
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive
-from tactile_bayes.tasks import TaskProgress
 
 __all__ = ["PARTS", "sensitivity"]
 
@@ -45,16 +40,11 @@ def sensitivity(
     *,
     rng: Rng,
     drive: Drive | Sequence[Drive] | None = None,
-    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
-    direction: Literal["both", "forward", "backward"] = "both",
-    drive_step: float | None = None,
-    drive_angles: ArrayLike | None = None,
     family: Family | None = None,
     band_widths: Sequence[float] | None = None,
     probability: float = 0.95,
     samples: int = 1024,
     parts: Sequence[str] = PARTS,
-    progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.DataTree:
     """Return the effects of errors of the sensor on contact points and on a contour, and the required noise.
 
@@ -63,12 +53,10 @@ def sensitivity(
     contour : Contour, optional
         Contour of a family with parameters, in the unit of the rod's length; by default profile II of Merker et al.
         2018 (doi 10.1155/2018/1613945) at the distance 0.5 rod lengths.
-    rig, family
+    rig, drive, family
         As in `Plan`.
     rng : int, numpy.random.SeedSequence or numpy.random.Generator
         Seed of the samples by which Sobol' indices are estimated.
-    drive, base, direction, drive_step, drive_angles
-        As in `scan`.
     band_widths : sequence of float, optional
         Mean widths of bands whose required noise is computed [length]; by default 0.0005 to 0.01 rod lengths.
     probability : float
@@ -77,8 +65,6 @@ def sensitivity(
         Number of samples for Sobol' indices, a power of two.
     parts : sequence of str
         Names of the groups to compute.
-    progress : callable, optional
-        Called with a `TaskProgress` after each part.
 
     Returns
     -------
@@ -117,21 +103,11 @@ def sensitivity(
     seed = seed_sequence(rng)
     check_probability("probability", probability)
     check_whole_number("samples", samples, 1)
-    check_function("progress", progress)
     rig = rig_of(rig)
     rod = rig.rod or Rod()
     if contour is None:
         contour = enlarged(paper_profile("II", q=0.5), rod.length)
-    plan = Plan(
-        contour,
-        rig,
-        drive=drive,
-        base=base,
-        direction=direction,
-        drive_step=drive_step,
-        drive_angles=drive_angles,
-        family=family,
-    )
+    plan = Plan(contour, rig, drive, family)
     widths = band_widths if band_widths is not None else [width * rod.length for width in _WIDTHS]
     made_by: dict[str, Callable[[], xr.Dataset]] = {
         "amplification": lambda: amplification(plan),
@@ -139,14 +115,7 @@ def sensitivity(
         "noise_shares": lambda: noise_shares(plan, rng=seed, samples=samples),
         "required_noise": lambda: required_noise(plan, widths, probability=probability),
     }
-    chosen = [part for part in made_by if part in parts]
-    groups: dict[str, xr.Dataset] = {}
-    began = time.monotonic()
-    for done, part in enumerate(chosen, start=1):
-        groups[part] = made_by[part]()
-        if progress is not None:
-            progress(TaskProgress(done, len(chosen), done, time.monotonic() - began))
-    tree = xr.DataTree.from_dict(groups)
+    tree = xr.DataTree.from_dict({part: make() for part, make in made_by.items() if part in parts})
     tree.attrs = {
         "contour": repr(contour),
         "units": plan.record.attrs["units"],

@@ -18,26 +18,7 @@ __all__ = ["calibrate_into"]
 
 
 def calibrate_into(out: str | os.PathLike[str], **options: Any) -> Run[xr.Dataset]:
-    """Calibrate, and write the result to a folder.
-
-    Parameters
-    ----------
-    out : path-like
-        Folder for replicates.json (the checkpoint from which a stopped run resumes), calibration.nc, verdict.txt,
-        ranks.png and coverage.png; created if missing. Files of these names in it are replaced.
-    options
-        Options of `calibrate`.
-
-    Returns
-    -------
-    Run
-        The result of `calibrate`, and the files.
-
-    Raises
-    ------
-    ParameterError, CalibrationError, TaskError
-        As in `calibrate`.
-    """
+    """Calibrate, and write the result to a folder."""
     found = calibrate(out=out, **options)
     with Folder(out, CALIBRATION) as folder:
         folder.files["replicates"] = folder.path / REPLICATES.file

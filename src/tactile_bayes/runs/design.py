@@ -19,29 +19,7 @@ __all__ = ["design_into", "design_messages"]
 
 
 def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, **options: Any) -> Run[xr.Dataset]:
-    """Choose the next record, and write the result to a folder.
-
-    Parameters
-    ----------
-    out : path-like
-        Folder for design.nc, candidates.csv, words.txt and design.png; created if missing. Files of these names in it
-        are replaced.
-    args, options
-        Arguments and options of `design`.
-    nested : bool
-        Option of `design`; if True, results of each candidate are kept in a subfolder "nested", from which a stopped
-        run resumes.
-
-    Returns
-    -------
-    Run
-        The result of `design`, and the files.
-
-    Raises
-    ------
-    ParameterError, InferenceError, ReachError, StudyError, TaskError
-        As in `design`.
-    """
+    """Choose the next record, and write the result to a folder."""
     found = design(*args, nested=nested, out=Path(out) / "nested" if nested else None, **options)
     numbers = found.drop_vars(["drive", "is_pivot"]).data_vars
     columns = [str(name) for name, values in numbers.items() if values.dims == ("candidate",)]

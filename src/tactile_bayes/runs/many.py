@@ -7,7 +7,7 @@ import json
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_function, check_path, check_probability, refused
+from tactile_bayes.checks import check_path, check_probability, refused
 from tactile_bayes.errors import ParameterError, TactileBayesError
 from tactile_bayes.inference.ensembles import SamplerSettings, settings_of
 from tactile_bayes.inference.family import Family, family_of
@@ -28,7 +28,15 @@ from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.runs.contour import analyse
 from tactile_bayes.runs.folder import Folder
 from tactile_bayes.runs.names import MANY
-from tactile_bayes.tasks import TaskProgress, errors_of, refuse_replacing, run_tasks, write_atomically
+from tactile_bayes.tasks import (
+    TaskProgress,
+    Workers,
+    errors_of,
+    refuse_replacing,
+    run_tasks,
+    workers_of,
+    write_atomically,
+)
 from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["ROW", "infer_contours", "records_in"]
@@ -74,8 +82,7 @@ def infer_contours(
     rng: Rng,
     settings: SamplerSettings | None = None,
     probability: float = 0.95,
-    workers: int | str | None = None,
-    progress: Callable[[TaskProgress], object] | None = None,
+    workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
     """Infer the contours of many records of one rig, each into a folder of its own, and return one table of all.
 
@@ -96,11 +103,8 @@ def infer_contours(
         As in `infer_contour`.
     probability : float
         Probability of bands and intervals, in (0, 1).
-    workers : int or str, optional
-        Number of processes on this machine, by default one for each core, or the address of a Dask scheduler, such as
-        "tcp://10.0.0.1:8786".
-    progress : callable, optional
-        Called with a `TaskProgress` after each record.
+    workers
+        As in `calibrate`.
 
     Returns
     -------
@@ -118,20 +122,19 @@ def infer_contours(
     """
     paths, folder = records_in(records), check_path("out", out, "give the path of a folder")
     check_probability("probability", probability)
-    check_function("progress", progress)
+    workers = workers_of(workers)
     names = _names(paths)
     refuse_replacing((folder / name for name in MANY), paths)
     made = (rig_of(rig), family_of(family), seed_sequence(rng), settings_of(settings), probability)
     tasks = [_Task(path, folder / name, *made) for path, name in zip(paths, names, strict=True)]
     rows = {task.out.name: row for task in tasks if (row := _kept(task)) is not None}
     began, left = time.monotonic(), [task for task in tasks if task.out.name not in rows]
-    pool: dict[str, Any] = {"scheduler": workers} if isinstance(workers, str) else {"workers": workers}
-    with closing(run_tasks(_analysed, left, **pool)) as results:
+    with closing(run_tasks(_analysed, left, workers=workers)) as results:
         for count, (task, row) in enumerate(results, start=1):
             rows[task.out.name] = row
-            if progress is not None:
+            if workers.progress is not None:
                 done = len(tasks) - len(left) + count
-                progress(TaskProgress(done, len(tasks), count, time.monotonic() - began))
+                workers.progress(TaskProgress(done, len(tasks), count, time.monotonic() - began))
     table = _table({name: rows[name] for name in names})
     with Folder(folder, MANY) as written:
         written.write_netcdf("table", "runs.nc", table)

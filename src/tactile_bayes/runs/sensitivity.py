@@ -16,7 +16,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
-from tactile_bayes.planning.sensitivity import PARTS, sensitivity
+from tactile_bayes.planning.sensitivity import sensitivity
 from tactile_bayes.rig.rig import rig_of
 from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.runs.names import SENSITIVITY, STUDY
@@ -114,7 +114,8 @@ def sensitivity_into(
     if material is not None and (rig.rod is None or rig.load_cell is None):
         raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
     report = progress or (lambda done: None)
-    found = sensitivity(**options, progress=lambda part: report(part.done))
+    found = sensitivity(**options)
+    report(1)
     rods, studied = None, None
     with Folder(out, SENSITIVITY) as folder:
         folder.write_netcdf("sensitivity", "sensitivity.nc", found)
@@ -123,7 +124,7 @@ def sensitivity_into(
             folder.draw(part, f"{part}.png", draw, found)
         words = [found.attrs["words"]]
         if material is not None:
-            rods = _rods(material, options, lambda rod: report(len(PARTS) + rod.done))
+            rods = _rods(material, options, lambda rod: report(1 + rod.done))
             folder.write_netcdf("rods", "rods.nc", rods)
             folder.draw("required_rod", "required_rod.png", plotting.required_rod, rods)
             words.append(rod_message(rods))
@@ -160,7 +161,7 @@ def rod_message(rods: xr.Dataset) -> str:
 
 def steps_of(material: Material | None) -> int:
     """Return the number of steps of an analysis without a study."""
-    return len(PARTS) + (0 if material is None else _LENGTHS.size * _DIAMETERS.size)
+    return 1 + (0 if material is None else _LENGTHS.size * _DIAMETERS.size)
 
 
 def _rods(material: Material, options: Mapping[str, Any], progress: Callable[[TaskProgress], object]) -> xr.Dataset:

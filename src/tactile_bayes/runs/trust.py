@@ -23,28 +23,7 @@ REPLICATES_FOLDER = "trust"
 def trust_into(
     run: str | os.PathLike[str], out: str | os.PathLike[str] | None = None, **options: Any
 ) -> Run[xr.Dataset]:
-    """Judge the posterior of a run, and write the result.
-
-    Parameters
-    ----------
-    run : path-like
-        Folder that `tactile-bayes infer` has written.
-    out : path-like, optional
-        Folder for trust.nc, trust.txt, assumptions.png (if asked for) and the subfolder trust; by default that of the
-        run, whose report then states it.
-    options
-        Options of `trust`.
-
-    Returns
-    -------
-    Run
-        The result of `trust`, and the files.
-
-    Raises
-    ------
-    InferenceError, ParameterError, CalibrationError, TaskError
-        As in `trust`.
-    """
+    """Judge the posterior of a run, and write the result."""
     path = posterior_in(Path(run))
     place = path.parent if out is None else Path(out)
     refuse_replacing((place / name for name in TRUST), [path])

@@ -1,17 +1,27 @@
 """Step 1: the readings of a sweep along a contour, or states at slope angles, with events, labels and units."""
 
 from tactile_bayes.sweep.columns import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
-from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation, Translation, recorded_drives
+from tactile_bayes.sweep.drive import (
+    Carried,
+    Direction,
+    Drive,
+    Motion,
+    Rotation,
+    Translation,
+    drives_of,
+    recorded_drives,
+)
 from tactile_bayes.sweep.events import Event, SweepEvents
 from tactile_bayes.sweep.lab_frame import to_lab_frame
-from tactile_bayes.sweep.scanning import Scan, drives_of, equilibria, scan
+from tactile_bayes.sweep.scanning import Scan, equilibria, scan
 from tactile_bayes.sweep.scanning_many import scan_many
-from tactile_bayes.sweep.template import record_template
+from tactile_bayes.sweep.template import blind_angles, record_template
 
 __all__ = [
     "EVENT_COLUMNS",
     "SAMPLE_COLUMNS",
     "Carried",
+    "Direction",
     "Drive",
     "Event",
     "ManyUnits",
@@ -20,6 +30,7 @@ __all__ = [
     "Scan",
     "SweepEvents",
     "Translation",
+    "blind_angles",
     "drives_of",
     "equilibria",
     "phases_of",

@@ -4,23 +4,41 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_array, check_number, check_numbers, check_positive
+from tactile_bayes.checks import (
+    as_numbers,
+    check_array,
+    check_choice,
+    check_number,
+    check_numbers,
+    check_positive,
+    refused,
+)
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import carried_sweeps
 
-__all__ = ["Carried", "Drive", "Motion", "Rotation", "Translation", "recorded_drives"]
+__all__ = ["Carried", "Drive", "Motion", "Rotation", "Translation", "drives_of", "recorded_drives"]
 
 _ROUNDING = 1e-15
 _TURN = 2.0 * math.pi
+_FINEST = 1e-6
+"""Least step of a rotation [rad], and of other drives over their travel; finer ones give millions of samples."""
+
+_COARSEST = 0.5
+"""Largest step of a rotation [rad]; a larger one is probably in degrees."""
+
+_SHARE = 1e-9
+"""Share of a step by which the last one may be too short."""
+
 _IN_DEGREES = "give an angle in radians, at most a turn (2π); one in degrees is converted by np.radians"
 
 
@@ -31,27 +49,69 @@ class Rotation:
     Parameters
     ----------
     base : (float, float)
-        The pivot, in the contour's unit of length.
+        The pivot, in the contour's unit of length. The contour must lie above it.
+    direction : {"both", "forward", "backward"}
+        Directions of its sweeps; "both" is a forward sweep, which is counter-clockwise, then a backward one.
+    drive_step : float, optional
+        Step of the drive [rad], at most 0.5; by default 1° in a scan, and 2° in a plan or a calibration whose drive
+        angles do not depend on the contour.
+    drive_angles : array_like, shape (n,), optional
+        Readings of a perfect encoder [rad] in place of such a grid, used in increasing order forward and in decreasing
+        order backward, without duplicates.
 
     Raises
     ------
     ParameterError
-        If the pivot is not two finite numbers.
+        If the pivot is not two finite numbers, there is no such direction, a step or an angle is impossible, or both
+        are given.
 
     Examples
     --------
-    >>> Rotation(base=(0.1, 0.0)).base
-    (0.1, 0.0)
+    >>> Rotation(base=(0.1, 0.0), direction="forward", drive_angles=[1.0, 0.5]).drive_angles
+    (0.5, 1.0)
     """
 
     base: tuple[float, float] = (0.0, 0.0)
+    direction: Literal["both", "forward", "backward"] = "both"
+    drive_step: float | None = None
+    drive_angles: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "base", _pair(self.base))
+        directions = ("both", "forward", "backward")
+        check_choice("direction", self.direction, directions, "choose 'forward' or 'backward', or 'both'")
+        if self.drive_step is not None:
+            correction = (
+                f"give a positive angle in radians, at most {_COARSEST}; one in degrees is converted by np.radians, "
+                f"and below {_FINEST:g} there would be millions of samples"
+            )
+            step = check_number("drive_step", self.drive_step, correction, least=_FINEST, most=_COARSEST)
+            object.__setattr__(self, "drive_step", step)
+        if self.drive_angles is not None:
+            object.__setattr__(self, "drive_angles", tuple(_angles(self.drive_angles).tolist()))
+            if self.drive_step is not None:
+                raise ParameterError("drive_step and drive_angles are two grids of one rotation: give one of them")
+
+    @property
+    def directions(self) -> tuple[Direction, ...]:
+        """Directions of its sweeps, in their order."""
+        return ("forward", "backward") if self.direction == "both" else (self.direction,)
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """Everything that it consists of, as JSON has it, without what is left to defaults."""
+        given = {"direction": self.direction, "drive_step": self.drive_step, "drive_angles": self.drive_angles}
+        return {"base": self.base, **{name: value for name, value in given.items() if value not in (None, "both")}}
 
 
 class Carried(ABC):
-    """Drive that carries the base along a path: straight lines from pose to pose."""
+    """Drive that carries the base along a path: straight lines from pose to pose.
+
+    It makes one sweep, which is called forward if the rod touches the object with its left side, as in a
+    counter-clockwise rotation, and else backward.
+    """
+
+    drive_step: float | None
 
     @property
     @abstractmethod
@@ -72,6 +132,23 @@ class Carried(ABC):
         ahead = steps[:, 1] * np.cos(angle) - steps[:, 0] * np.sin(angle) + 0.5 * length * steps[:, 2]
         return "forward" if ahead.sum() >= 0.0 else "backward"
 
+    @property
+    def description(self) -> dict[str, Any]:
+        """Everything that it consists of, as JSON has it, without what is left to defaults."""
+        step = {} if self.drive_step is None else {"drive_step": self.drive_step}
+        return {"poses": self.poses.tolist(), **step}
+
+    def by(self, step: float) -> Floats:
+        """Return the travels of the samples by a step [length, or rad]."""
+        return np.asarray(step * np.arange(math.floor(float(self.travels[-1]) / step + _SHARE) + 1))
+
+    def _check_step(self) -> None:
+        """Refuse a step that is not positive, or too fine."""
+        if self.drive_step is not None:
+            least = _FINEST * float(self.travels[-1])
+            what = f"give a positive length; below {least:g} there would be millions of samples"
+            object.__setattr__(self, "drive_step", check_number("drive_step", self.drive_step, what, least=least))
+
     def at(self, travels: ArrayLike) -> Floats:
         """Poses of the base at travels between the first and the last [length and rad], shape (k, 3)."""
         wanted = check_array("travels", travels)
@@ -79,6 +156,7 @@ class Carried(ABC):
 
 
 Drive = Rotation | Carried
+Direction = Literal["forward", "backward"]
 
 
 @dataclass(frozen=True)
@@ -95,6 +173,9 @@ class Translation(Carried):
         Slope of the unloaded rod at its base [rad].
     travel : float
         Distance by which the base moves [length].
+    drive_step : float, optional
+        Step of the drive in its travel [length]; by default a hundredth of the rod's length in a scan, and in plans and
+        calibrations whose drive angles do not depend on the contour as many samples as of a rotation.
 
     Raises
     ------
@@ -112,6 +193,7 @@ class Translation(Carried):
     heading: float
     drive_angle: float
     travel: float
+    drive_step: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "base", _pair(self.base))
@@ -119,6 +201,7 @@ class Translation(Carried):
             value = check_number(name, getattr(self, name), _IN_DEGREES, least=-_TURN, most=_TURN)
             object.__setattr__(self, name, value)
         object.__setattr__(self, "travel", check_positive("travel", self.travel, "give a positive length"))
+        self._check_step()
 
     @property
     def poses(self) -> Floats:
@@ -139,6 +222,8 @@ class Motion(Carried):
         Positions of the base in their order, in the contour's unit of length.
     drive_angle : array_like, broadcastable to shape (n,)
         Slope of the unloaded rod at its base there [rad].
+    drive_step : float, optional
+        As in `Translation`; a scan by more than 8 poses is by default sampled at these.
 
     Raises
     ------
@@ -159,6 +244,7 @@ class Motion(Carried):
     x: Any
     y: Any
     drive_angle: Any
+    drive_step: float | None = None
 
     def __post_init__(self) -> None:
         names = ("x", "y", "drive_angle")
@@ -179,10 +265,21 @@ class Motion(Carried):
             raise ParameterError(f"the poses {at} and {at + 1} are the same: leave one of them out")
         for name, column in zip(names, columns, strict=True):
             object.__setattr__(self, name, np.array(column))
+        self._check_step()
 
     @property
     def poses(self) -> Floats:
         return np.stack([self.x, self.y, self.drive_angle], axis=1)
+
+
+def drives_of(drive: Drive | Sequence[Drive] | None) -> list[Drive]:
+    """Return drives from one or several, by default a rotation about the origin; ParameterError if they are none."""
+    if drive is None:
+        return [Rotation()]
+    drives = [drive] if isinstance(drive, Rotation | Carried) else list(drive) if isinstance(drive, Sequence) else []
+    if not drives or not all(isinstance(one, Rotation | Carried) for one in drives):
+        raise refused("drive", drive, "give a Rotation, a Translation or a Motion, or a list of them")
+    return drives
 
 
 def recorded_drives(record: xr.Dataset) -> list[Drive]:
@@ -199,6 +296,14 @@ def recorded_drives(record: xr.Dataset) -> list[Drive]:
             x, y = poses[0, :2].tolist()
             drives.setdefault((x, y), Rotation((x, y)))
     return list(drives.values())
+
+
+def _angles(given: ArrayLike) -> Floats:
+    """Return different angles in increasing order; ParameterError if they are none."""
+    angles = as_numbers(given)
+    if angles is None or angles.ndim > 1 or not angles.size or not np.all(np.abs(angles) <= _TURN):
+        raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
+    return np.unique(angles)
 
 
 def _pair(base: Any) -> tuple[float, float]:

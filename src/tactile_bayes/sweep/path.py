@@ -16,12 +16,10 @@ from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.sweep.drive import Carried
+from tactile_bayes.sweep.drive import Carried, Direction
 from tactile_bayes.sweep.sliding import sliding_from
 
-__all__ = ["Direction", "carried_paths", "friction_angle_of", "sweep_paths", "to_sweep_frame"]
-
-Direction = Literal["forward", "backward"]
+__all__ = ["carried_paths", "friction_angle_of", "sweep_paths", "to_sweep_frame"]
 
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import as_numbers, check_choice, check_number, check_pivots, refused
+from tactile_bayes.checks import as_numbers, check_pivots
 from tactile_bayes.contours.base import Contour, Locus
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
 from tactile_bayes.mechanics.branches.line import lines_through
@@ -26,12 +26,12 @@ from tactile_bayes.rig import make_record
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import of_pivots
-from tactile_bayes.sweep.drive import Carried, Drive, Motion, Rotation, Translation
+from tactile_bayes.sweep.drive import Carried, Direction, Drive, Motion, Rotation, Translation, drives_of
 from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
-from tactile_bayes.sweep.path import Direction, carried_paths, friction_angle_of, sweep_paths, to_sweep_frame
+from tactile_bayes.sweep.path import carried_paths, friction_angle_of, sweep_paths, to_sweep_frame
 
-__all__ = ["Scan", "acting", "drives_of", "equilibria", "scan"]
+__all__ = ["Scan", "acting", "equilibria", "scan"]
 
 _MARGIN = 15
 """Number of drive steps before first contact and after snap-off."""
@@ -39,17 +39,11 @@ _MARGIN = 15
 _MOST_MOVES, _SETTLED = 50, 1e-15
 """Largest number of corrections of a tapered rod's standoff, and the last change of the arc length [L]."""
 
-_FINEST = 1e-6
-"""Least step of the drive [rad]; smaller ones would give millions of samples."""
-
 _STEP, _SHARE = float(np.radians(1.0)), 0.01
 """Default steps of rotations [rad], and of drives that carry the base, over the rod's length."""
 
 _FEWEST_POSES = 8
 """Number of poses of a motion up to which it is sampled by steps, and not at these."""
-
-_ROUNDING = 1e-9
-"""Share of a step by which the last one may be too short."""
 
 _TURN = 2.0 * math.pi
 
@@ -59,9 +53,6 @@ _NOT_SWEPT = {
     **dict.fromkeys(("moment_noise", "force_noise"), "state it in the load cell, which `Rig.measure` applies"),
 }
 """Parameters that do not act in sweeps nor in readings, and what to do."""
-
-_COARSEST = 0.5
-"""Largest step of the drive [rad]; a larger one is probably in degrees."""
 
 
 class _ByDirection(dict[str, SweepEvents]):
@@ -230,23 +221,13 @@ def scan(
         pivot and is curved toward the object sticks at first, which is not modelled: these samples are left out
         (`SweepEvents.slides_from`).
     drive : Rotation, Translation or Motion, or a sequence of them, optional
-        Path of the base; by default a rotation about `base`. One that carries the base makes one sweep, from its
-        beginning to its end. It is called forward if the rod touches the object with its left side, as in a
-        counter-clockwise rotation, and else backward. The sweeps of several drives are numbered consecutively.
-    direction : {"both", "forward", "backward"}
-        Directions of rotations; "both" is a forward sweep (number 0), then a backward one (number 1).
-    base : (float, float) or sequence of them
-        The pivot of a rotation, in the contour's unit of length, if there is no `drive`. The contour must lie above it.
-        With several pivots (a support that is moved, or an array of whiskers) each is used in turn, and the sweeps are
-        numbered consecutively.
-    drive_step : float, optional
-        Step of a rotation [rad], at most 0.5 and by default 1°; the grid consists of its multiples, from 15 steps
-        before contact to 15 steps after it, within a turn. Step of a drive that carries the base, in its travel
-        [length], by default a hundredth of the rod's length; a `Motion` of more than 8 poses is by default sampled at
-        these.
-    drive_angles : array_like, shape (n,), optional
-        Drive angles of rotations in place of this grid [rad], used in increasing order forward and in decreasing order
-        backward, without duplicates, and without those at which the rod is in the same contact a turn before or later.
+        Path of the base. The sweeps of several drives (a support that is moved, or an array of whiskers) are numbered
+        consecutively. The grid of a rotation consists of multiples of its step, from 15 steps before contact to 15
+        steps after it, within a turn; given drive angles at which the rod is in the same contact a turn before or later
+        are left out.
+    direction, base, drive_step, drive_angles
+        Short for ``drive=Rotation(base, direction, drive_step, drive_angles)``, if there is no `drive`; with several
+        pivots, for one rotation about each.
 
     Returns
     -------
@@ -282,38 +263,32 @@ def scan(
     3.154275
     """
     rod, friction, compliance = acting(rig)
-    check_choice("direction", direction, ("both", "forward", "backward"), "choose 'forward' or 'backward', or 'both'")
-    drives = _shifted(drives_of(drive, base), rig_of(rig))
-    step = _checked_step(drive_step, drives, rod)
-    given = None if drive_angles is None else _floats(drive_angles)
-    grid = None if given is None else np.unique(given)
-    if given is not None and not (given.ndim < 2 and given.size and np.all(np.abs(given) <= 2.0 * np.pi)):
-        raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
-    if all(isinstance(one, Carried) for one in drives) and (given is not None or direction != "both"):
+    short = {"direction": direction, "drive_step": drive_step, "drive_angles": drive_angles}
+    drives = _rotations(base, short) if drive is None else drives_of(drive)
+    if drive is not None and (given := _given(base, short)):
         raise ParameterError(
-            f"{'direction' if given is None else 'drive_angles'} is for rotations, and the drive carries the base: its "
-            "poses say where it goes, and drive_step how finely it is sampled"
+            f"{given} is for rotations without a drive: give it to the drive, as in Rotation({given}=…)"
         )
 
+    drives = _shifted(drives, rig_of(rig))
     columns: list[dict[str, NDArray[np.generic]]] = []
     sweeps: list[SweepEvents] = []
-    senses: tuple[Direction, ...] = ("forward", "backward") if direction == "both" else (direction,)
     for one in drives:
         if isinstance(one, Carried):
             paths, sense = carried_paths(contour, one, rod=rod, friction=friction, compliance=compliance)
             sweep = events_of(paths, sense, one, rod)
             _warn_of(sweep, one, rod)
-            travels = _travels(one, step, sweep, rod)
+            travels = _travels(one, sweep, rod)
             found = [(paths, sweep, one.at(travels), _ways(one, travels, sense, rod))]
         else:
             found = []
-            for sense in senses:
+            for sense in one.directions:
                 paths = sweep_paths(
                     contour, base=one.base, direction=sense, rod=rod, friction=friction, compliance=compliance
                 )
                 sweep = events_of(paths, sense, one, rod)
                 _warn_of(sweep, one, rod)
-                angles = _angles(grid, step, sweep)
+                angles = _angles(one, sweep)
                 poses = np.column_stack([*(np.full(angles.size, value) for value in one.base), angles])
                 found.append((paths, sweep, poses, np.pi - angles if sense == "backward" else angles))
         for paths, sweep, poses, ways in found:
@@ -362,57 +337,32 @@ def _shifted(drives: list[Drive], rig: Rig) -> list[Drive]:
     return found
 
 
-def drives_of(drive: Drive | Sequence[Drive] | None, base: Any) -> list[Drive]:
-    """Return drives, or rotations about pivots; ParameterError if they are neither, or both are given."""
-    pivots = check_pivots("base", base)
-    if drive is None:
-        return [Rotation(pivot) for pivot in pivots]
-    drives = [drive] if isinstance(drive, Rotation | Carried) else list(drive) if isinstance(drive, Sequence) else []
-    if not drives or not all(isinstance(one, Rotation | Carried) for one in drives):
-        raise refused("drive", drive, "give a Rotation, a Translation or a Motion, or a list of them")
-    if pivots != [(0.0, 0.0)]:
-        raise ParameterError("base is for rotations without a drive: give the base to the drive, as in Rotation(base)")
-    return drives
+def _rotations(base: Any, options: Mapping[str, Any]) -> list[Drive]:
+    """Return a rotation about each pivot."""
+    return [Rotation(pivot, **options) for pivot in check_pivots("base", base)]
 
 
-def _checked_step(step: float | None, drives: Sequence[Drive], rod: Rod) -> float | None:
-    """Return the step of the drives [rad or length] if it is given."""
-    if step is None:
-        return None
-    if any(isinstance(one, Rotation) for one in drives):
-        if any(isinstance(one, Carried) for one in drives):
-            raise ParameterError(
-                "drive_step would be an angle in rotations, and a length where the base is carried: leave it out, or "
-                "scan them one by one"
-            )
-        return check_number(
-            "drive_step",
-            step,
-            f"give a positive angle in radians, at most {_COARSEST}; one in degrees is converted by np.radians, and "
-            f"below {_FINEST:g} there would be millions of samples",
-            least=_FINEST,
-            most=_COARSEST,
-        )
-    least = _FINEST * max(float(one.travels[-1]) for one in drives if isinstance(one, Carried))
-    return check_number(
-        "drive_step", step, f"give a positive length; below {least:g} there would be millions of samples", least=least
-    )
+def _given(base: Any, options: Mapping[str, Any]) -> str | None:
+    """Return the name of the first option of a rotation that is given; None if all are left out."""
+    given = [name for name, value in options.items() if value is not None and str(value) != "both"]
+    return "base" if check_pivots("base", base) != [(0.0, 0.0)] else next(iter(given), None)
 
 
-def _angles(grid: Floats | None, step: float | None, sweep: SweepEvents) -> Floats:
+def _angles(drive: Rotation, sweep: SweepEvents) -> Floats:
     """Drive angles of the samples of a rotation, in their order."""
     forward = sweep.direction == "forward"
-    if grid is None:
-        step = _STEP if step is None else step
+    is_asked = drive.drive_angles is not None
+    if is_asked:
+        angles = np.array(drive.drive_angles)
+    else:
+        step = drive.drive_step or _STEP
         first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
         angles = np.arange(np.floor(first / step) - _MARGIN, np.ceil(snap / step) + _MARGIN + 1) * step
         angles = angles[np.abs(angles) <= 2.0 * np.pi]  # a drive turns by no more
-    else:
-        angles = grid
     sense = 1.0 if forward else -1.0
     if not sweep.clear:
         angles = angles[sense * (sweep.snap_off.drive_angle - angles) >= 0.0]
-    angles = _within_a_turn(angles, sense, sweep, is_asked=grid is not None)
+    angles = _within_a_turn(angles, sense, sweep, is_asked=is_asked)
     touching = sense * (angles - sweep.first_contact.drive_angle) >= 0.0
     angles = angles[~(touching & (sense * (sweep.slides_from - angles) > 0.0))]
     return angles[:: 1 if forward else -1]
@@ -436,14 +386,12 @@ def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents, *, is_asked
     return np.asarray(angles[kept])
 
 
-def _travels(drive: Carried, step: float | None, sweep: SweepEvents, rod: Rod) -> Floats:
+def _travels(drive: Carried, sweep: SweepEvents, rod: Rod) -> Floats:
     """Travels of the samples of a drive that carries the base."""
-    travels: Floats
-    if step is None and isinstance(drive, Motion) and drive.x.size > _FEWEST_POSES:
+    if drive.drive_step is None and isinstance(drive, Motion) and drive.x.size > _FEWEST_POSES:
         travels = drive.travels
     else:
-        step = _SHARE * rod.length if step is None else step
-        travels = np.asarray(step * np.arange(math.floor(float(drive.travels[-1]) / step + _ROUNDING) + 1))
+        travels = drive.by(drive.drive_step or _SHARE * rod.length)
     last = sweep.touches_again if sweep.clear else sweep.snap_off.travel
     return travels[~(travels > last)]
 

@@ -15,48 +15,40 @@ from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.sweep.drive import Carried, Drive
 
-__all__ = ["record_template"]
+__all__ = ["blind_angles", "record_template"]
 
 
-def record_template(
-    drives: Sequence[Drive],
-    directions: Sequence[str],
-    drive_angles: Floats,
-    rod: Rod | None,
-    load_cell: LoadCell,
-) -> xr.Dataset:
+def blind_angles(drive_step: float) -> Floats:
+    """Return drive angles [rad] from before any first contact with an object above the pivot to after any snap-off."""
+    return np.arange(np.radians(-30.0), np.radians(210.0) + 1e-9, drive_step)
+
+
+def record_template(drives: Sequence[Drive], drive_angles: Floats, rod: Rod | None, load_cell: LoadCell) -> xr.Dataset:
     """Return a record of sweeps by every drive, with loads of zero.
 
     Its drive angles include the encoder's offset and backlash.
 
-    Parameters
-    ----------
-    drives : sequence of Rotation, Translation or Motion
-        In the unit of length of the record. Those that carry the base are sampled at as many places as there are drive
-        angles.
-    directions : sequence of {"forward", "backward"}
-        Directions of the sweeps of each rotation.
-    drive_angles : ndarray, shape (n,)
-        Drive angles of rotations, in any order [rad].
-    rod : Rod, optional
-        By default the dimensionless rod.
-    load_cell : LoadCell
-        Provides the frame, and the encoder's offset and backlash.
+    The angles are of rotations without a grid of their own; drives that carry the base have as many samples.
     """
-    angles = np.sort(drive_angles)
     parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}
     sweeps: list[tuple[str, Floats]] = []
     for drive in drives:
         if isinstance(drive, Carried):
             side = drive.side(1.0 if rod is None else rod.length)
-            sweeps.append((side, drive.at(np.linspace(0.0, drive.travels[-1], angles.size))))
+            even = np.linspace(0.0, drive.travels[-1], drive_angles.size)
+            sweeps.append((side, drive.at(even if drive.drive_step is None else drive.by(drive.drive_step))))
         else:
-            for direction in directions:
+            angles = np.sort(drive_angles)
+            if drive.drive_angles is not None:
+                angles = np.array(drive.drive_angles)
+            elif drive.drive_step is not None:
+                angles = blind_angles(drive.drive_step)
+            for direction in drive.directions:
                 turned = angles if direction == "forward" else angles[::-1]
                 sweeps.append((direction, np.column_stack([*(np.full(angles.size, v) for v in drive.base), turned])))
-    for sweep, (direction, poses) in enumerate(sweeps):
+    for sweep, (way, poses) in enumerate(sweeps):
         parts["sweep"].append(np.full(len(poses), sweep))
-        parts["direction"].append(np.full(len(poses), direction))
+        parts["direction"].append(np.full(len(poses), way))
         for name, column in zip(("base_x", "base_y", "drive_angle"), poses.T, strict=True):
             parts[name].append(column)
     columns: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}

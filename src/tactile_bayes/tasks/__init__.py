@@ -8,14 +8,15 @@ from tactile_bayes.tasks.files import (
     replace_together,
     write_atomically,
 )
-from tactile_bayes.tasks.results_store import Kind, ResultsStore, TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.tasks.results_store import Kind, ResultsStore, keep_outcomes, open_results_store
 from tactile_bayes.tasks.threads import in_parts, one_thread
-from tactile_bayes.tasks.workers import run_tasks
+from tactile_bayes.tasks.workers import TaskProgress, Workers, run_tasks, workers_of
 
 __all__ = [
     "Kind",
     "ResultsStore",
     "TaskProgress",
+    "Workers",
     "alone_in",
     "errors_of",
     "in_parts",
@@ -26,5 +27,6 @@ __all__ = [
     "refuse_replacing",
     "replace_together",
     "run_tasks",
+    "workers_of",
     "write_atomically",
 ]

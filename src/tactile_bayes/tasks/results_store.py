@@ -11,13 +11,13 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from tactile_bayes.checks import check_function, check_path
+from tactile_bayes.checks import check_path
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.tasks.files import alone_in, write_atomically
-from tactile_bayes.tasks.workers import run_tasks
+from tactile_bayes.tasks.workers import TaskProgress, Workers, run_tasks, workers_of
 
-__all__ = ["Kind", "ResultsStore", "TaskProgress", "keep_outcomes", "open_results_store"]
+__all__ = ["Kind", "ResultsStore", "keep_outcomes", "open_results_store"]
 
 Task = TypeVar("Task")
 Outcome = TypeVar("Outcome")
@@ -45,17 +45,6 @@ class Kind(NamedTuple):
     @property
     def file(self) -> str:
         return f"{self.what}.json"
-
-
-class TaskProgress(NamedTuple):
-    """Progress of many tasks."""
-
-    done: int
-    wanted: int
-    made: int
-    """Number of tasks done in this run."""
-    seconds: float
-    """Time since the beginning of this run [s]."""
 
 
 class ResultsStore(Generic[Outcome]):
@@ -102,24 +91,21 @@ def keep_outcomes(
     task: Task,
     count: int,
     *,
-    workers: int | None,
-    scheduler: str | None,
-    progress: Callable[[TaskProgress], object] | None,
+    workers: int | str | Workers | None,
 ) -> dict[int, Outcome]:
     """Return the outcomes of a task for the numbers from 0 to `count` − 1, and compute those not in the store."""
-    check_function("progress", progress)
-    began = time.monotonic()
+    workers, began = workers_of(workers), time.monotonic()
     kept = {number: outcome for number, outcome in store.outcomes.items() if number < count}
     tasks = [(task, number) for number in range(count) if number not in kept]
     next_write, done = began, len(kept)
-    with closing(run_tasks(function, tasks, workers=workers, scheduler=scheduler)) as results:
+    with closing(run_tasks(function, tasks, workers=workers)) as results:
         for made, ((_, number), outcome) in enumerate(results, start=1):
             store.outcomes[number] = kept[number] = outcome
             if (now := time.monotonic()) >= next_write:
                 store.write()
                 next_write = time.monotonic() + (time.monotonic() - now) / _WRITING_SHARE
-            if progress is not None:
-                progress(TaskProgress(done + made, count, made, time.monotonic() - began))
+            if workers.progress is not None:
+                workers.progress(TaskProgress(done + made, count, made, time.monotonic() - began))
     return kept
 
 

@@ -10,19 +10,20 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from tactile_bayes.checks import check_optional, check_whole_number
+from tactile_bayes.checks import check_function, check_whole_number
 from tactile_bayes.errors import ParameterError, TaskError
 from tactile_bayes.matplotlib_defaults import ignore_user_settings
 from tactile_bayes.tasks.threads import cores, one_thread
 
-__all__ = ["check_pool", "run_tasks"]
+__all__ = ["TaskProgress", "Workers", "run_tasks", "workers_of"]
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -34,12 +35,61 @@ _RETRIES = 3
 """Number of retries of a task after its process died."""
 
 
+class TaskProgress(NamedTuple):
+    """Progress of many tasks."""
+
+    done: int
+    wanted: int
+    made: int
+    """Number of tasks done in this run."""
+    seconds: float
+    """Time since the beginning of this run [s]."""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where many tasks are done, and what hears of their progress.
+
+    Every function with an argument `workers` takes one; a number or an address alone is short for it.
+
+    Parameters
+    ----------
+    where : int or str, optional
+        Number of processes on this machine, by default one for each core that this process may use; or the address of
+        a Dask scheduler, such as "tcp://10.0.0.1:8786", whose workers need this package in the same version. With 1 all
+        tasks run in this process. Each process begins by importing the script that is run: code that starts processes
+        belongs under `if __name__ == "__main__":`.
+    progress : callable, optional
+        Called with a `TaskProgress` after each task: done, wanted, made (in this run), seconds.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such number, or the progress is not callable.
+
+    Examples
+    --------
+    >>> Workers(2, progress=print).where
+    2
+    """
+
+    where: int | str | None = None
+    progress: Callable[[Any], object] | None = None
+
+    def __post_init__(self) -> None:
+        if self.where is not None and not (isinstance(self.where, str) and ":" in self.where):
+            what = "give a positive number, or the address of a Dask scheduler, like 'tcp://10.0.0.1:8786'"
+            check_whole_number("workers", self.where, 1, what)
+        check_function("progress", self.progress)
+
+
+def workers_of(workers: int | str | Workers | None) -> Workers:
+    """Return workers, from their number or the address of a scheduler."""
+    return workers if isinstance(workers, Workers) else Workers(workers)
+
+
 def run_tasks(
-    function: Callable[[Task], Result],
-    tasks: Sequence[Task],
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
+    function: Callable[[Task], Result], tasks: Sequence[Task], *, workers: int | str | Workers | None = None
 ) -> Generator[tuple[Task, Result], None, None]:
     """Call a function on every task, and yield results in the order in which they are ready.
 
@@ -47,11 +97,11 @@ def run_tasks(
     depend on where or when it is computed. Each task runs on one thread. Processes end with the
     iterator, and with this process, however it ends; only this process receives Ctrl-C.
     """
-    check_pool(workers, scheduler)
-    if scheduler is not None:
-        yield from _on_cluster(function, tasks, scheduler)
+    where = workers_of(workers).where
+    if isinstance(where, str):
+        yield from _on_cluster(function, tasks, where)
         return
-    count = min(workers or cores(), len(tasks))
+    count = min(where or cores(), len(tasks))
     if count <= 1:
         for task in tasks:
             yield task, _alone(function, task)
@@ -211,13 +261,6 @@ def _travels(error: Exception) -> bool:
     except Exception:
         return False
     return True
-
-
-def check_pool(workers: Any, scheduler: Any) -> None:
-    """Refuse a number of processes, or the address of a scheduler, that `run_tasks` does not take."""
-    if workers is not None:
-        check_whole_number("workers", workers, 1, "give a positive number")
-    check_optional("scheduler", scheduler, str, "give the address of a Dask scheduler, like 'tcp://10.0.0.1:8786'")
 
 
 # ---- a cluster

@@ -23,7 +23,7 @@ from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.load_cell.discrepancy import Course
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import NOTHING, Rig
-from tactile_bayes.sweep import Translation, scan
+from tactile_bayes.sweep import Rotation, Translation, scan
 from tactile_bayes.uncertainty.band import contour_band
 
 SMOOTH = ("discrepancy",)
@@ -135,8 +135,8 @@ def test_repeated_sweeps_have_it_in_common():
 
 
 def test_its_coordinate_is_the_travel_where_the_base_is_carried():
-    drive = Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6)
-    record = CELL.measure(scan(Circle(0.5, 0.5), drive=drive, drive_step=0.04).record, rng=1)
+    drive = Translation(base=(0.8, 0.0), heading=np.pi, drive_angle=1.2, travel=1.6, drive_step=0.04)
+    record = CELL.measure(scan(Circle(0.5, 0.5), drive=drive).record, rng=1)
     model = model_of(record, family="circle")
     course = model.likelihood.segments.course
     assert course.is_measured_order
@@ -202,7 +202,9 @@ def test_simulated_readings_have_the_density_of_the_likelihood():
         "discrepancy_length": stats.lognorm(s=1e-9, scale=0.3),
     }
     rig = Rig(load_cell=CELL, unknown=unknown)
-    experiment = experiment_of(family, rig, rng=1, drive_angles=np.radians(np.arange(-30.0, 211.0, 4.0)))
+    experiment = experiment_of(
+        family, rig, rng=1, drive=Rotation(drive_angles=np.radians(np.arange(-30.0, 211.0, 4.0)))
+    )
     squares = []
     for seed in range(40):
         made = simulate(experiment, np.random.default_rng(seed))

@@ -484,8 +484,8 @@ def test_loads_of_rods_that_vary_are_within_1e_5_of_the_largest(name):
 
 def test_a_drive_that_repeats_itself_is_followed_once_and_has_one_discrepancy():
     """Two sweeps through the same poses, and the same with the second further on by less than what matters."""
-    there, contour = Translation((0.8, 0.0), np.pi, 1.2, 1.6), Circle(0.3, 0.8)
-    whole = scan(contour, drive=[there, there], drive_step=0.05).record
+    there, contour = Translation((0.8, 0.0), np.pi, 1.2, 1.6, 0.05), Circle(0.3, 0.8)
+    whole = scan(contour, drive=[there, there]).record
     measured = CELL.measure(whole, rng=1)
     apart = measured.assign(base_x=measured.base_x - 1e-12 * (measured.sweep == 1))
     once, twice = RecordLikelihood(measured, CELL), RecordLikelihood(apart, CELL)

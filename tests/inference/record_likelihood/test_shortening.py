@@ -181,8 +181,8 @@ def test_thinned_samples_drift_as_they_did(drift):
 
 
 def test_a_thinned_way_keeps_its_ends_and_no_drive_is_averaged():
-    drive = Translation((1.2, 0.0), np.pi, np.pi / 2, 2.4)
-    record = CELL.measure(scan(CONTOUR, drive=drive, drive_step=2.4 / 5_000).record, rng=1)
+    drive = Translation((1.2, 0.0), np.pi, np.pi / 2, 2.4, 2.4 / 5_000)
+    record = CELL.measure(scan(CONTOUR, drive=drive).record, rng=1)
     made, _ = shortened(record, CELL)
     assert made.sizes["sample"] < MOST_SAMPLES + 10
     assert made.base_x.values[[0, -1]].tolist() == record.base_x.values[[0, -1]].tolist()
