@@ -91,37 +91,7 @@ def band_by_assumption(
     out: str | os.PathLike[str] | None = None,
     workers: int | str | Workers | None = None,
 ) -> xr.Dataset:
-    """Infer a record again under every other assumption, and compare the bands.
-
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`.
-    experiment : Experiment
-        Its experiment.
-    x : ndarray, shape (n,)
-        Grid points of the bands [length].
-    probability : float
-        Probability of the bands, in (0, 1).
-    seed, out, workers
-        As in `calibrate`.
-
-    Returns
-    -------
-    xr.Dataset
-        Over "assumption": kind ("fixed": a nuisance parameter is taken as stated; "added": a further one is inferred;
-        "family": another family, under its default priors), fits (1 if the record passes its check), converged (0 or
-        1), message (the sampler's, or the error by which there is no band). Over "assumption" and "grid": other_lower,
-        other_median, other_upper [length], and moved, the distance of the medians over the width of the band of the
-        posterior there. The coordinate grid_x holds x.
-
-    Raises
-    ------
-    StudyError
-        If `out` holds alternatives of another posterior, or another run uses it.
-    TaskError
-        As in `calibrate`.
-    """
+    """Infer a record again under every other assumption, and compare the bands. Shapes: x (n,)."""
     study = _Study(tuple(alternatives_of(experiment)), x, probability, seed)
     count = len(study.alternatives)
     with open_results_store(study.identity, out, _ALTERNATIVES) as store:
@@ -152,18 +122,7 @@ def band_by_assumption(
 
 
 def alternatives_of(experiment: Experiment) -> list[Alternative]:
-    """Return the experiments that differ in one assumption, except those that the record cannot identify.
-
-    Examples
-    --------
-    >>> from tactile_bayes import Rig, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> from tactile_bayes.rig import NOTHING
-    >>> record = scan(paper_profile("II", q=0.5)).record
-    >>> rig = Rig(unknown={**NOTHING, "friction": "default"})
-    >>> [each.name for each in alternatives_of(Experiment(record, rig))][:3]
-    ['rigidity_scale inferred', 'drive_angle_offset inferred', 'bias inferred']
-    """
+    """Return the experiments that differ in one assumption, except those that the record cannot identify."""
     names, found = set(experiment.nuisances.names), []
     for group in _NUISANCES:
         members = {name for name in names if belongs(name, group)}

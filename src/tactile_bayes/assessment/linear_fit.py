@@ -156,11 +156,7 @@ class Linearisation:
     def fits(self, readings: Floats, starts: Floats) -> list[LinearFit | None]:
         """Return the fits of records, each from a start; None where the rod does not reach its contour.
 
-        Parameters
-        ----------
-        readings : ndarray, shape (records, samples, 3)
-            Dimensionless, NaN where a channel is missing.
-        starts : ndarray, shape (records, d)
+        Shapes: readings (records, samples, 3), starts (records, d).
         """
         found: list[LinearFit | None] = []
         numbers = (2 * self._count + 3) * readings[0].size

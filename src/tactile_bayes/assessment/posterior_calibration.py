@@ -149,36 +149,6 @@ def posterior_calibration(
     among the draws is uniform (posterior simulation-based calibration: Säilynoja, Schmitt, Bürkner & Vehtari 2025,
     arXiv:2502.03279). In contrast to `calibrate`, truths are like the object and rig at hand. It is no test of the
     assumptions, which are those of the simulation as well.
-
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`, with predictions.
-    experiment : Experiment
-        Its experiment.
-    seed : int
-        Seed of all random numbers.
-    replicates : int
-        Number of truths.
-    probability : float
-        Probability of the intervals that are tested, in (0, 1).
-    out, workers
-        As in `calibrate`.
-
-    Returns
-    -------
-    xr.Dataset
-        As from `calibrate`, and over "region" (in_gap, beside): factor, by which the half widths of the band would hold
-        with the stated probability, and corrected (0 or 1), whether its coverage shows that this is needed.
-
-    Raises
-    ------
-    InferenceError
-        If the tree holds fewer predictions than replicates.
-    CalibrationError
-        If `out` holds replicates of another experiment, or another run uses it.
-    TaskError
-        As in `calibrate`.
     """
     task = _task(posterior, experiment, replicates, probability, seed)
     with open_results_store(task.identity, out, REPLICATES) as store:

@@ -28,28 +28,12 @@ _POWERS = (0.99, 1.01)
 def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapping[str, Floats]) -> xr.Dataset:
     """Return how much the posterior changes if prior or likelihood is raised to a power near one.
 
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`.
-    model : ContourModel
-        Its model.
-    regions : mapping of str to ndarray, shape (n,)
-        Grid points of x by region of the band, such as "in_gap" and "beside".
-
-    Returns
-    -------
-    xr.Dataset
-        Over "quantity" (parameters, and a band for each region, as "band in_gap") and "component" (the prior of the
-        contour, that of rig and noise, the likelihood): sensitivity. Over "quantity": set_by, "record" where those to
-        the priors are below 0.05, else "both", or "prior" where one of them is the largest.
-
-    Notes
-    -----
     The sensitivity is the cumulative Jensen–Shannon distance of the scaled posterior from the posterior, over the
     change of the logarithm of the power, from Pareto-smoothed weights of the draws (Kallioinen, Paananen, Bürkner &
     Vehtari 2024, doi 10.1007/s11222-023-10366-5); that of a band is the largest of its heights. Limits of reach have no
     power, and do not count.
+
+    Shapes: regions (n,).
     """
     points = points_of(posterior, model.names)
     every = posterior["sample_stats"].to_dataset()["lp"].transpose("chain", "draw").values
@@ -80,13 +64,7 @@ def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapp
 
 
 def _what_sets(contour: float, rig: float, likelihood: float) -> str:
-    """Return "record", "both" or "prior", whichever sets a quantity, from the sensitivities to the three components.
-
-    Examples
-    --------
-    >>> _what_sets(0.01, 0.02, 0.2), _what_sets(0.01, 0.06, 0.2), _what_sets(0.1, 0.0, 0.06)
-    ('record', 'both', 'prior')
-    """
+    """Return "record", "both" or "prior", whichever sets a quantity, from the sensitivities to the three components."""
     prior = max(contour, rig)
     if prior < _SENSITIVE:
         return "record"

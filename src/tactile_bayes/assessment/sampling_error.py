@@ -23,44 +23,10 @@ WANTED_SHARE = 0.1
 def sampling_error(posterior: xr.DataTree, x: ArrayLike, probability: float = 0.95) -> xr.Dataset:
     """Return the Monte-Carlo standard errors of the ends of a band, and the draws for an error of a tenth of the band.
 
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`.
-    x : array_like, shape (n,)
-        Grid points of the band [length].
-    probability : float
-        Probability of the band, in (0, 1).
-
-    Returns
-    -------
-    xr.Dataset
-        Over "x": lower_error, median_error, upper_error, the standard errors of the ends and of the median of
-        `contour_band` [length]; share, the larger error of an end over the width of the band there; NaN where some
-        contours end before. Scalars: draws, of which the band is computed, at most 4000; effective_draws, the least
-        effective sample size of an end; draws_needed, for which the largest share would be 0.1.
-
-    Raises
-    ------
-    ParameterError
-        If the probability is not in (0, 1), or x is not a list of finite numbers.
-    InferenceError
-        If no grid point is reached by all contours.
-
-    Notes
-    -----
     Errors of quantiles follow from the effective sample size of the indicator of a quantile (Vehtari et al. 2021, doi
     10.1214/20-BA1221), with an ensemble as a chain.
 
-    Examples
-    --------
-    >>> q = np.random.default_rng(1).normal(0.3, 0.01, (4, 1000))
-    >>> draws = {"a": np.full_like(q, 0.5), "q": q, "x_c": np.zeros_like(q)}
-    >>> tree = xr.DataTree.from_dict({"posterior": xr.Dataset({k: (("chain", "draw"), v) for k, v in draws.items()})})
-    >>> tree.attrs = {"family": "parabola", "units": "dimensionless"}
-    >>> found = sampling_error(tree, [0.0])
-    >>> round(float(found.share[0]), 2), int(found.draws)
-    (0.01, 4000)
+    Shapes: x (n,).
     """
     at, (low, middle, high) = grid_points(x), central_levels(probability)
     chains = contour_draws(posterior).sizes["chain"]

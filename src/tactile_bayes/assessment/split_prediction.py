@@ -47,30 +47,6 @@ class _Row(NamedTuple):
 def split_prediction(posterior: xr.DataTree, model: ContourModel) -> xr.Dataset:
     """Predict each part of a record from all others, and compare.
 
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`, with predictions.
-    model : ContourModel
-        Its model.
-
-    Returns
-    -------
-    xr.Dataset
-        Over "part" (see `parts_of`, and "noise"): p_value, the probability of so large a disagreement if the model
-        holds, and sd, the same as standard deviations of a normal distribution. Over "part" and "parameter": moves,
-        the change of each parameter by the samples that the part lacks, in standard deviations expected before; NaN
-        for "noise". Scalar overall_p_value: share of predicted records, this one included, of which some part
-        disagrees at least as much. Attributes: false_alarm, passed (0 or 1), records (number of predicted ones).
-
-    Raises
-    ------
-    InferenceError
-        If the tree has fewer than 99 predicted records, or more than 2000 samples share a drift process, or a bias that
-        is integrated out.
-
-    Notes
-    -----
     At the joint optimum the score of the rest is normal, with a covariance that follows from the slopes of the readings
     to first order: its quadratic form over the scatter of all residuals has an F distribution. The zeros of the
     channels are compared as well, whether they are inferred or not. No alternative model is fitted. The F statistics of

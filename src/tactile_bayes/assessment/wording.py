@@ -33,19 +33,7 @@ def conclusion(
     calibrated: xr.Dataset | None,
     attrs: Mapping[Any, Any],
 ) -> tuple[str, str]:
-    """Return the conclusion, and a sentence with its reasons.
-
-    Parameters
-    ----------
-    found : xr.Dataset
-        Results of `trust` so far.
-    check, parts : xr.Dataset
-        From `check_record` and `split_prediction`.
-    calibrated : xr.Dataset, optional
-        From `posterior_calibration`.
-    attrs : mapping
-        Attributes of the posterior.
-    """
+    """Return the conclusion, and a sentence with its reasons."""
     share = f"{found.attrs['probability']:.3g}"
     reasons = []
     if not check.attrs["passed"]:

@@ -16,31 +16,7 @@ _MARGIN = 0.01
 
 
 def coverage_p_value(share: ArrayLike, count: int, probability: float, *, is_whole: bool) -> Floats:
-    """Return an upper bound on the probability that an observed coverage is as far from the stated one by chance.
-
-    Parameters
-    ----------
-    share : array_like
-        Mean over replicates of the share in which a claim holds in each, from 0 to 1; any shape.
-    count : int
-        Number of replicates.
-    probability : float
-        Stated probability; a deviation of 0.01 counts as none.
-    is_whole : bool
-        Whether the claim holds or fails as a whole in each replicate. Then the p-value is binomial; otherwise it is
-        the bound for any numbers between 0 and 1 (Hoeffding 1963, doi 10.1080/01621459.1963.10500830, theorem 1), since
-        the grid points of one replicate are correlated.
-
-    Returns
-    -------
-    ndarray
-        Two-sided p-values, in the shape of `share`.
-
-    Examples
-    --------
-    >>> coverage_p_value([0.9, 0.5], 20, 0.9, is_whole=True).round(4)
-    array([1., 0.])
-    """
+    """Return an upper bound on the probability that an observed coverage is as far from the stated one by chance."""
     share = np.asarray(share, dtype=float)
     limit = np.clip(share, probability - _MARGIN, min(probability + _MARGIN, 1.0))
     is_tested = (share != limit) & (limit > 0.0) & (limit < 1.0)
@@ -59,29 +35,6 @@ def noticed_coverage(
 
     The number of replicates in which a claim holds is binomial, and the coverages follow from that exactly. A claim
     that holds at a share of the grid points is taken to hold at all or none of them, which has the largest variance.
-
-    Parameters
-    ----------
-    count : int
-        Number of replicates.
-    probability : float
-        Stated probability.
-    level : float
-        Level of the test, the largest p-value that counts as a fault.
-    power : float
-        Probability of detection.
-    is_whole : bool
-        As in `coverage_p_value`.
-
-    Returns
-    -------
-    below, above : float
-        Coverages; NaN if no coverage is detected with that probability.
-
-    Examples
-    --------
-    >>> [round(coverage, 3) for coverage in noticed_coverage(200, 0.9, 0.001, 0.9, is_whole=True)]
-    [0.77, 0.984]
     """
     held = np.arange(count + 1)
     is_fault = coverage_p_value(held / count, count, probability, is_whole=is_whole) <= level

@@ -45,22 +45,7 @@ def uniformity_p_value(ranks: ArrayLike, top: int) -> float:
     At each rank the share of ranks up to it is binomial; the statistic is the least probable of these shares, as in
     simultaneous bands for empirical distributions (Säilynoja, Bürkner & Vehtari 2022, doi 10.1007/s11222-022-10090-6).
 
-    Parameters
-    ----------
-    ranks : array_like of int, shape (n,)
-        Ranks of the truths, from 0 to `top`.
-    top : int
-        Largest possible rank, the number of draws.
-
-    Returns
-    -------
-    float
-        P-value, from `_SIMULATIONS` simulated sets of uniform ranks, always the same ones.
-
-    Examples
-    --------
-    >>> uniformity_p_value(np.arange(100), top=99), uniformity_p_value(np.arange(100) // 2, top=99) < 1e-3
-    (1.0, True)
+    Shapes: ranks (n,).
     """
     counts = np.bincount(np.asarray(ranks, dtype=np.intp), minlength=top + 1)
     least = _least_probability(np.cumsum(counts)[None, :-1], int(counts.sum()))[0]
@@ -74,22 +59,7 @@ def expected_shares(top: int) -> Floats:
 
 
 def simultaneous_band(count: int, top: int, probability: float) -> tuple[Floats, Floats]:
-    """Return the simultaneous band of the empirical distribution of uniform ranks.
-
-    Parameters
-    ----------
-    count : int
-        Number of ranks.
-    top : int
-        Largest possible rank.
-    probability : float
-        Probability that all shares lie within the band.
-
-    Returns
-    -------
-    lower, upper : ndarray, shape (top,)
-        Bounds on the shares of ranks up to 0, 1, …, top − 1, whose means are `expected_shares`.
-    """
+    """Return the simultaneous band of the empirical distribution of uniform ranks. Returns shape (top,)."""
     null = _null(count, top)
     # The largest level below which no more sets of uniform ranks fall than the probability allows.
     level = float(null[min(int((1.0 - probability) * null.size), null.size - 1)])
@@ -104,23 +74,6 @@ def noticed_ranks(count: int, top: int, level: float, power: float) -> NoticedRa
     An error is detected if `uniformity_p_value` is at most `level` with probability `power`. That probability is
     computed without simulation (see `_power`); the critical value is that of the simulated uniform ranks, as in the
     test.
-
-    Parameters
-    ----------
-    count : int
-        Number of ranks.
-    top : int
-        Largest possible rank.
-    level : float
-        Level of the test.
-    power : float
-        Probability of detection.
-
-    Examples
-    --------
-    >>> noticed = noticed_ranks(200, 99, 0.001, 0.9)
-    >>> [round(error, 2) for error in noticed]
-    [0.39, 1.42, 1.51]
     """
 
     def smallest(shift: float, log_scale: float) -> float:

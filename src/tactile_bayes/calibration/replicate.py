@@ -100,16 +100,7 @@ def replicate(task: tuple[SimulatedExperiment, int]) -> Outcome:
 
 
 def make_replicate(experiment: SimulatedExperiment, number: int, *, throw: bool = False) -> Replicate:
-    """Simulate record `number` of an experiment, infer from it, and compare.
-
-    Parameters
-    ----------
-    experiment : SimulatedExperiment
-    number : int
-        Number of the replicate, from which its random numbers follow.
-    throw : bool
-        Whether an error is raised; otherwise it is the outcome. An interrupt is always raised.
-    """
+    """Simulate record `number` of an experiment, infer from it, and compare."""
     for_record, for_posterior, for_ranks = child(experiment.seed, number).spawn(3)
     simulation: Simulation | None = None
     result: Sampled | None = None

@@ -88,13 +88,7 @@ def as_command(function: Callable[..., Answer]) -> Callable[..., None]:
 
 
 def _refuse_replaced_inputs(options: Iterable[Parameter], given: Mapping[str, Any]) -> None:
-    """Refuse options by which the command would replace a file that it reads.
-
-    Raises
-    ------
-    ParameterError
-        If an output is an input.
-    """
+    """Refuse options by which the command would replace a file that it reads."""
     from tactile_bayes.tasks import refuse_replacing
 
     outputs, inputs = list[Path](), list[Path]()

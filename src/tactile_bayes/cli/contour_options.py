@@ -54,15 +54,7 @@ class ContourOptions:
     ] = None
 
     def contour(self, rod: Rod) -> Contour:
-        """Return the contour that the options choose, in the unit of the rod and scaled to its length.
-
-        Raises
-        ------
-        ParameterError
-            If the options choose more than one contour, or lack a parameter.
-        ContourError
-            If there is no such contour.
-        """
+        """Return the contour that the options choose, in the unit of the rod and scaled to its length."""
         import numpy as np
 
         from tactile_bayes.contours import from_points, paper_profile
@@ -105,15 +97,7 @@ class GaugeOptions:
 
     @property
     def contour(self) -> Contour:
-        """The contour of the gauge.
-
-        Raises
-        ------
-        ParameterError
-            If the family is unknown, or lacks a parameter.
-        ContourError
-            If there is no such contour.
-        """
+        """The contour of the gauge."""
         return _of_family(self.family, self.parameter)
 
 

@@ -30,13 +30,7 @@ Pivots = Annotated[
 
 
 def pivots_in(texts: Sequence[str] | None) -> list[tuple[float, float]]:
-    """Return the coordinates of pivots.
-
-    Raises
-    ------
-    ParameterError
-        If one has not two numbers.
-    """
+    """Return the coordinates of pivots."""
     return [(x, y) for x, y in (numbers_asked(text, "--base", 2) for text in texts or ["0,0"])]
 
 
@@ -56,13 +50,7 @@ class CarryOptions:
     ] = None
 
     def carried(self, step: float | None = None) -> list[Carried]:
-        """Return translations along lines, and motions along paths, of a step [length].
-
-        Raises
-        ------
-        ParameterError
-            If an option is no drive.
-        """
+        """Return translations along lines, and motions along paths, of a step [length]."""
         return [_motion(Path(text), step) if _is_file(text) else _translation(text, step) for text in self.carry or []]
 
 
@@ -79,13 +67,7 @@ class DriveOptions(CarryOptions):
     ] = None
 
     def drives(self, base: Sequence[str] | None, direction: Directions = "both") -> list[Drive]:
-        """Return rotations about pivots, the origin if there is no drive, then the drives that carry the base.
-
-        Raises
-        ------
-        ParameterError
-            If an option is no drive, or is not for such drives.
-        """
+        """Return rotations about pivots, the origin if there is no drive, then the drives that carry the base."""
         from tactile_bayes.errors import ParameterError
         from tactile_bayes.sweep import Rotation
 

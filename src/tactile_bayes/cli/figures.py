@@ -44,13 +44,7 @@ class _DriveOptions(DriveOptions):
 
     @property
     def drive(self) -> Carried | None:
-        """The drive that carries the base, if there is one.
-
-        Raises
-        ------
-        ParameterError
-            If there are several, or an option is no drive.
-        """
+        """The drive that carries the base, if there is one."""
         from tactile_bayes.errors import ParameterError
 
         carried = self.carried(self.drive_step)
@@ -70,13 +64,7 @@ class _NoiseOptions(NoiseOptions):
 
     @property
     def load_cell(self) -> LoadCell | None:
-        """The load cell, or None if no option gives one.
-
-        Raises
-        ------
-        ParameterError
-            If one of the two options is missing.
-        """
+        """The load cell, or None if no option gives one."""
         from tactile_bayes.errors import ParameterError
 
         if (not self.force_noise) != (not self.moment_noise):

@@ -12,13 +12,7 @@ __all__ = ["as_typed", "assigned", "numbers_asked"]
 
 
 def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
-    """Parse a given number of numbers, with commas between them.
-
-    Raises
-    ------
-    ParameterError
-        If there are more or fewer, or one is no number.
-    """
+    """Parse a given number of numbers, with commas between them."""
     from tactile_bayes.errors import ParameterError
     from tactile_bayes.record.spelling import plain_number
 
@@ -52,13 +46,7 @@ def as_typed(word: str) -> str:
 def assigned(
     option: str, texts: Sequence[str] | None, form: str = "", *, known: Collection[str] = ()
 ) -> dict[str, str]:
-    """Parse the values of a repeated option NAME=VALUE, by name.
-
-    Raises
-    ------
-    ParameterError
-        If a text has another form, its name is not known, or it is given twice.
-    """
+    """Parse the values of a repeated option NAME=VALUE, by name."""
     from tactile_bayes.errors import ParameterError
 
     values: dict[str, str] = {}

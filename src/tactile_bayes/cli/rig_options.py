@@ -55,38 +55,18 @@ class RigFile:
 
     @property
     def of_file(self) -> Rig:
-        """The rig as the file states it; without a file, one that says nothing.
-
-        Raises
-        ------
-        ParameterError
-            If the file is none of a rig.
-        """
+        """The rig as the file states it; without a file, one that says nothing."""
         from tactile_bayes.rig import Rig
 
         return Rig() if self.rig is None else Rig.read(self.rig)
 
     @property
     def stated(self) -> Rig:
-        """The rig as file and options state it, apart from its noise.
-
-        Raises
-        ------
-        ParameterError
-            If the file is none of a rig, or options contradict each other.
-        """
+        """The rig as file and options state it, apart from its noise."""
         return self.of_file
 
     def read(self, path: Path) -> tuple[xr.Dataset, Rig]:
-        """Read a record, and return it with its rig; report assumed units.
-
-        Raises
-        ------
-        ParameterError
-            If options contradict each other, or the record.
-        RecordError
-            If the file holds no record.
-        """
+        """Read a record, and return it with its rig; report assumed units."""
         from tactile_bayes.rig import read_record
 
         rig = self.stated
@@ -121,13 +101,7 @@ class NoiseOptions:
     ] = None
 
     def in_place_of(self, cell: LoadCell | None) -> LoadCell | None:
-        """Return a load cell with the noise that is given.
-
-        Raises
-        ------
-        ParameterError
-            If it is negative.
-        """
+        """Return a load cell with the noise that is given."""
         from tactile_bayes.load_cell import LoadCell
 
         names = ("force_noise", "moment_noise")
@@ -152,13 +126,7 @@ class RigOptions(NoiseOptions, RigFile):
         return replace(rig, rod=self._rod(rig.rod))
 
     def _for(self, record: xr.Dataset, rig: Rig) -> Rig:
-        """Return the rig of a record, with the noise that is given.
-
-        Raises
-        ------
-        ParameterError
-            If the noise of a measured channel is left out.
-        """
+        """Return the rig of a record, with the noise that is given."""
         from tactile_bayes.errors import ParameterError
         from tactile_bayes.load_cell import LoadCell
         from tactile_bayes.record import present_channels
@@ -176,13 +144,7 @@ class RigOptions(NoiseOptions, RigFile):
         return replace(rig, load_cell=cell)
 
     def _rod(self, rod: Rod | None) -> Rod | None:
-        """Return the rod of the file with the numbers that are given.
-
-        Raises
-        ------
-        ParameterError
-            If one of them is missing, as no file states it.
-        """
+        """Return the rod of the file with the numbers that are given."""
         from tactile_bayes.errors import ParameterError
         from tactile_bayes.mechanics.rods.rod import Rod
 

@@ -76,13 +76,7 @@ def scan(
 
 
 def refuse_other_suffix(path: Path, known: tuple[str, ...] = (".csv", ".nc"), what: str = "a record") -> None:
-    """Refuse a file with another suffix, or below another file, before anything is computed.
-
-    Raises
-    ------
-    ParameterError
-        If the name has another suffix, or its folder is a file.
-    """
+    """Refuse a file with another suffix, or below another file, before anything is computed."""
     from tactile_bayes.errors import ParameterError
 
     if path.suffix not in known:

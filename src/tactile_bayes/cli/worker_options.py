@@ -28,13 +28,7 @@ class WorkerOptions:
     ] = None
 
     def reporting(self, progress: Callable[[TaskProgress], object]) -> Workers:
-        """Return the workers, of which a function hears.
-
-        Raises
-        ------
-        ParameterError
-            If it is neither a number nor an address.
-        """
+        """Return the workers, of which a function hears."""
         from tactile_bayes.errors import ParameterError
         from tactile_bayes.tasks import Workers
 

@@ -125,13 +125,7 @@ class _Shards(BackendArray):
 
 
 def read_shard(folder: Path, shard: Written) -> xr.Dataset:
-    """Read a shard, with numbers as they are stored.
-
-    Raises
-    ------
-    SpecificationError
-        If it is missing, or not as it was written.
-    """
+    """Read a shard, with numbers as they are stored."""
     path = _unchanged(folder, shard)
     found = read_netcdf(
         path, xr.open_dataset, _refusal(path), sha256=shard.sha256, decode_times=False, decode_timedelta=False

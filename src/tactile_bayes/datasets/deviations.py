@@ -54,25 +54,7 @@ def deviations_of_table(
     load_cell: Mapping[str, Variation],
     calibration: RigPrior | None,
 ) -> dict[str, Variation]:
-    """Return the deviations that the table `unknown` of a specification states, without those that are as stated.
-
-    Parameters
-    ----------
-    said : mapping, "nothing" or None
-        The table; by default nothing is unknown.
-    is_si : bool
-    pivots : int
-        Number of pivots, or of places where the base begins.
-    turns_back : bool
-        Whether a record has rotations in both directions, which show a backlash.
-    load_cell : mapping of str to Variation
-    calibration : RigPrior, optional
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is unknown, or what is said of it is impossible, or cannot be drawn.
-    """
+    """Return the deviations that the table `unknown` of a specification states, without those that are as stated."""
     found = () if calibration is None else tuple(calibration.priors)
     if said is None:
         said = {name: value for name, value in expanded(NOTHING).items() if name not in found}
@@ -128,13 +110,7 @@ def drawn_deviations(
 ) -> dict[str, Floats]:
     """Return the deviations that are drawn around what data sheets state, by the keys of their distributions.
 
-    Parameters
-    ----------
-    spec : Specification
-    values : mapping of str to ndarray, shape (n,)
-        Numbers by the keys of the other distributions.
-    shares : mapping of str to ndarray, shape (n,)
-        Uniform numbers by key.
+    Shapes: values (n,), shares (n,).
     """
     drawn = {name: v for name, v in spec.unknown.items() if v.kind not in _DISCRETE}
     if not drawn:
@@ -172,11 +148,7 @@ def _stated(values: Mapping[str, Floats], count: int) -> Stated:
 def as_built(spec: Specification, values: Mapping[str, Floats]) -> dict[str, Floats]:
     """Return the numbers of rods, load cells and pivots with the deviations from what data sheets state.
 
-    Parameters
-    ----------
-    spec : Specification
-    values : mapping of str to ndarray, shape (n,)
-        Numbers by the keys of all distributions.
+    Shapes: values (n,).
     """
     built = dict(values)
     off = {name: values[f"unknown.{name}"] for name in spec.unknown}

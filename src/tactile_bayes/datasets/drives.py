@@ -40,16 +40,7 @@ class Drives(NamedTuple):
 
 
 def drives_of(spec: Specification, values: Mapping[str, Floats], length: Floats) -> Drives:
-    """Return the drives of records.
-
-    Parameters
-    ----------
-    spec : Specification
-    values : mapping of str to ndarray, shape (records,)
-        Numbers by the keys of the distributions.
-    length : ndarray, shape (n,)
-        Length of the rod in each sweep.
-    """
+    """Return the drives of records. Shapes: values (records,), length (n,)."""
     return _translations(spec, values, length) if spec.translations else _rotations(spec, values, length.size)
 
 

@@ -111,11 +111,6 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
     The random numbers of a record depend on the seed and its index only, and those of its contour are drawn before all
     others. Rounding may depend on the records that are generated together, so that only the same range of records gives
     identical bits.
-
-    Raises
-    ------
-    SpecificationError
-        If none of 1000 draws of a record is a contour that every sweep reaches.
     """
     index = np.arange(begin, end)
     drawn = {key: np.full(index.size, np.nan) for key in spec.numbers}

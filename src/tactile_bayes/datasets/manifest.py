@@ -113,14 +113,7 @@ def _table(manifest: Manifest) -> dict[str, Any]:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Read the manifest in a folder.
-
-    Raises
-    ------
-    SpecificationError
-        If there is none, it has changed since it was written, its numbers contradict its specification or each other,
-        or it lists other files than shards.
-    """
+    """Read the manifest in a folder."""
     path = file_in(folder, MANIFEST)
     try:
         content = path.read_bytes()
@@ -149,13 +142,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def _check(manifest: Manifest) -> None:
-    """Check that entries have their types, and that shards are those of the records of the specification, in order.
-
-    Raises
-    ------
-    ValueError
-        If not.
-    """
+    """Check that entries have their types, and that shards are those of the records of the specification, in order."""
     _refuse_unless_typed(manifest, texts=("name", "specification", "specification_sha256", "card_sha256"))
     _refuse_unless_typed(manifest, counts=("seed", "records", "shard_records"))
     if not all(isinstance(text, str) for text in [*manifest.versions.keys(), *manifest.versions.values()]):

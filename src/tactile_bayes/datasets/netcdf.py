@@ -21,16 +21,6 @@ def netcdf_of(dataset: xr.Dataset) -> list[memoryview]:
 
     It is made in memory, since HDF5 aborts the process if it cannot write, as on a full disk. The same dataset gives
     the same bytes with the same libraries.
-
-    Parameters
-    ----------
-    dataset : xr.Dataset
-        Variables of numbers; attributes are text, numbers or arrays of numbers.
-
-    Returns
-    -------
-    list of memoryview
-        Parts of the file, in order. The numbers are not copied.
     """
     found = []
     for before, name in _frame(_Template(dataset)):

@@ -67,20 +67,7 @@ def file_in(folder: Path, name: str) -> Path:
 
 
 def write_shard(task: tuple[str, int, str]) -> Written:
-    """Generate a shard of a specification, and write it atomically to a folder.
-
-    Parameters
-    ----------
-    task : (str, int, str)
-        Text of the specification, number of the shard, folder.
-
-    Raises
-    ------
-    SpecificationError
-        If no contour is reached in 1000 draws of a record, or a link to another folder is in its place.
-    OSError
-        If the file cannot be written; it does not exist then.
-    """
+    """Generate a shard of a specification, and write it atomically to a folder."""
     text, shard, folder = task
     spec = _parsed(text)
     begin = shard * spec.shard_records

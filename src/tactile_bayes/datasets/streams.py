@@ -30,21 +30,6 @@ def streams(seed: int, records: Index, purpose: int) -> list[np.random.Generator
     """Make the generators of many records, each as `default_rng(SeedSequence(seed, spawn_key=(record, purpose)))`.
 
     Seeding them together takes a tenth of the time.
-
-    Parameters
-    ----------
-    seed : int
-        Seed below 2^128.
-    records : ndarray of int
-        Numbers of the records.
-    purpose : int
-        `CONTOUR` or `NOISE`.
-
-    Examples
-    --------
-    >>> one = np.random.default_rng(np.random.SeedSequence(7, spawn_key=(1234, NOISE)))
-    >>> streams(7, np.array([1234]), NOISE)[0].random() == one.random()
-    True
     """
     given: Iterable[ISeedSequence]
     if np.any(records >> 32):  # the number of such a record is two words

@@ -104,16 +104,6 @@ def variation_of(value: Any, key: str, number: Callable[[Any], float | None] = a
     """Parse the distribution that a value of a specification states; messages name it by `key`.
 
     `number` returns a number that stands there, also as a text with a unit, or None if there is none.
-
-    Raises
-    ------
-    SpecificationError
-        If the value is not a distribution.
-
-    Examples
-    --------
-    >>> variation_of({"uniform": [0.3, 0.8]}, "contours[0].q").at(np.array([0.0, 0.5]), np.zeros(2, dtype=int))
-    array([0.3 , 0.55])
     """
     plain = number(value)
     if plain is not None and math.isfinite(plain):

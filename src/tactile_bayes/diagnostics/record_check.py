@@ -200,13 +200,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
 
 
 def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
-    """Return the residuals of the record and of every prediction, by channel.
-
-    Raises
-    ------
-    InferenceError
-        If the tree is not a result of `infer_contour` with its record and predictions.
-    """
+    """Return the residuals of the record and of every prediction, by channel."""
     refuse_no_contour(posterior, "posterior_predictive", "observed_data", "constant_data", "sample_stats")
     posterior_draws(posterior)
     predicted, observed = posterior["posterior_predictive"].to_dataset(), posterior["observed_data"].to_dataset()

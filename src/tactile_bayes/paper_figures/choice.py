@@ -82,13 +82,7 @@ class Choice:
         return figure, figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False, subplot_kw=options)
 
     def scan(self, profile: Profile, distance: float, direction: Direction = "both") -> Scan:
-        """Return the scan of a profile of the paper at a distance; the direction is that of rotations.
-
-        Raises
-        ------
-        ContourError
-            If the profile is too near, or out of reach.
-        """
+        """Return the scan of a profile of the paper at a distance; the direction is that of rotations."""
         drive = self.drive or Rotation(direction=direction, drive_step=self.drive_step)
         try:
             return scan(paper_profile(profile, q=distance), drive=drive)
@@ -106,13 +100,7 @@ def choice_of(
     rng: Rng | None,
     width: float,
 ) -> Choice:
-    """Return the checked options of a figure.
-
-    Raises
-    ------
-    ParameterError
-        If an option is not valid.
-    """
+    """Return the checked options of a figure."""
     q = as_numbers(distances)
     if q is None or q.ndim != 1 or not q.size or not np.all(np.isfinite(q) & (q > 0.0)):
         raise ParameterError(f"distances are {distances!r}: give rod lengths above 0, like [0.3, 0.5]")

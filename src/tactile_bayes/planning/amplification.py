@@ -75,32 +75,6 @@ class _Forward(NamedTuple):
 def amplification(plan: Plan) -> xr.Dataset:
     """Return the errors of contact points due to errors of the sensor, to first order, in closed form.
 
-    Parameters
-    ----------
-    plan : Plan
-        Plan of the sweeps. Without drive angles of its own, samples are dense near first contact and snap-off.
-
-    Returns
-    -------
-    xr.Dataset
-        Over "sample", the loaded ones of all sweeps, with sweep, direction, drive_angle [rad], contact_phase and the
-        contact (contact_x, contact_y, slope_angle), after_first_contact and before_snap_off (along the drive: [rad], or
-        [length] in sweeps in which it carries the base):
-
-        gain_along, gain_across (reconstruction, sample, source)
-            Derivatives of the contact point, along the contour and across it, by a reading [length/(N m), length/N,
-            length/rad]; NaN if the method has no answer.
-        sd_along, sd_across (reconstruction, sample)
-            Standard deviations from all errors of the load cell and the encoder together [length].
-        holds (reconstruction, sample)
-            Whether the first order holds at this noise: `reconstruct` of an ideal sample has the status "ok".
-
-        Over "event" ("first contact", "snap-off") and "stroke": growth_along and growth_across (reconstruction, stroke,
-        event), the power of the distance along the drive with which the standard deviation grows toward the event: −1
-        doubles it at half the distance, 0 leaves it bounded; NaN if too few samples are close.
-
-    Notes
-    -----
     Raw Step 2 is a function of four numbers, whose derivatives follow from the closed form (`place_by_wrench` of
     `contact_coordinates`). The constrained estimate is, to first order, the weighted least-squares solution on the
     surface of possible contacts.

@@ -40,18 +40,7 @@ def whitening(
 ) -> Whitening:
     """Return the whitening of the readings of loads, with errors of the encoder to first order.
 
-    Parameters
-    ----------
-    cell : LoadCell
-        The load cell, dimensionless.
-    loads : ndarray, shape (samples, 3)
-        Noise-free loads [EI/L, EI/L²].
-    by_angle : ndarray, shape (samples, 3)
-        Derivatives of the readings by the drive angle.
-    present : ndarray of bool, shape (3,)
-        True for channels that were measured.
-    discrepancy : Discrepancy, optional
-        Smooth deviation that samples share.
+    Shapes: loads (samples, 3), by_angle (samples, 3), present (3,).
     """
     samples = len(loads)
     covariance = cell.covariance(loads)

@@ -72,15 +72,7 @@ def height_slopes(model: ContourModel, point: Floats, x: Floats) -> Floats:
 
 
 def deviation_of_heights(slopes: Floats, precision: Floats) -> Floats:
-    """Return the standard deviation of each height [length], shape (x,).
-
-    Parameters
-    ----------
-    slopes : ndarray, shape (x, d)
-        Derivatives of the heights, from `height_slopes`.
-    precision : ndarray, shape (d, d)
-        Precision (information) of the parameters; the result is infinite if it is singular.
-    """
+    """Return the standard deviation of each height [length], shape (x,)."""
     scale = np.sqrt(np.maximum(np.diag(precision), 1e-300))
     scaled = precision / np.outer(scale, scale)
     try:

@@ -12,30 +12,7 @@ __all__ = ["enlarged", "family_parameters"]
 
 
 def family_parameters(contour: Contour) -> tuple[str, dict[str, float]]:
-    """Return the name of a contour's family, as in `infer_contour`, and its parameters.
-
-    Parameters
-    ----------
-    contour : Contour
-        A single contour.
-
-    Returns
-    -------
-    family : str
-    parameters : dict of str to float
-        Values by name, lengths in the unit of the contour.
-
-    Raises
-    ------
-    ParameterError
-        If the object is no single contour, or of no family with parameters.
-
-    Examples
-    --------
-    >>> from tactile_bayes.contours import paper_profile
-    >>> family_parameters(paper_profile("IV", q=0.5))
-    ('parabola/power-law', {'left_a': 0.5, 'right_w': 1.0, 'right_n': 4.0, 'q': 0.5, 'x_c': 0.0})
-    """
+    """Return the name of a contour's family, as in `infer_contour`, and its parameters."""
     if not isinstance(contour, Contour):
         raise ParameterError(f"{contour!r} is no contour: give one of tb.contours, like paper_profile('II', q=0.5)")
     if contour.shape != ():
@@ -58,26 +35,7 @@ def family_parameters(contour: Contour) -> tuple[str, dict[str, float]]:
 
 
 def enlarged(contour: Contour, factor: float) -> Contour:
-    """Return a contour scaled by a factor about the origin.
-
-    Parameters
-    ----------
-    contour : Contour
-        A single contour of a family with parameters.
-    factor : float
-        Factor on all lengths, > 0.
-
-    Raises
-    ------
-    ParameterError
-        If the contour is of no family with parameters.
-
-    Examples
-    --------
-    >>> from tactile_bayes.contours import paper_profile
-    >>> enlarged(paper_profile("II", q=0.5), 0.2)
-    Parabola(a=2.5, q=0.1, x_c=0.0)
-    """
+    """Return a contour scaled by a factor about the origin."""
     name, values = family_parameters(contour)
     family = family_named(name)
     return family.build(*(values[p] * factor ** family.length_powers[p] for p in family.parameters))

@@ -21,45 +21,6 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
     No unbiased estimate has a smaller standard deviation than the Cramér-Rao bound, and for small noise a posterior is
     as wide as the bound with the priors added (Bernstein-von Mises theorem). The bounds are of first order and exclude
     the information of the snap-off itself: see `record_information`.
-
-    Parameters
-    ----------
-    plan : Plan
-    probability : float
-        Probability of the expected bands, in (0, 1).
-
-    Returns
-    -------
-    xr.Dataset
-        Over "parameter", those that `infer_contour` would infer, in the record's units:
-
-        value
-            Value of the plan.
-        bound
-            Cramér-Rao bound: standard deviation from the record alone, infinite if it carries no information.
-        bound_with_priors
-            The bound with the information of the priors added, the expected posterior standard deviation.
-        bound_if_rest_known
-            The bound if all other parameters were known.
-        prior_sd
-            Standard deviation of the prior.
-        correlation (parameter, parameter_)
-            Expected correlation of the posterior.
-
-        Over "channel": bound_of_channel (channel, parameter), with priors, from that channel alone, and
-        bound_without_channel, from the other two. Over "sample", with the record's columns: leverage (sample, channel),
-        the diagonal of the hat matrix, which sums to the number of parameters that the record determines (the
-        attribute `told`); and leverage_on (sample, parameter), the share of the bound's inverse square that is lost
-        without the sample.
-
-        Over "x", in the touched stretches and in the gaps between: stretch, height, and height_sd, standard deviation
-        of the contour's height with priors [length]. Scalars: touched_width and gap_width, the mean widths of the
-        pointwise bands of that `probability` there [length]; NaN if there is no gap.
-
-    Raises
-    ------
-    ReachError
-        If the rod does not reach the contour in every sweep.
     """
     model, point = plan.model, plan.point
     whole = record_information(model, point, slopes=plan.reading_slopes)

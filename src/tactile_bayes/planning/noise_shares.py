@@ -35,44 +35,6 @@ def noise_shares(
     nonlinear. To first order every share is gain² σ² over the sum of these, and shares sum to one; a smaller sum comes
     from interactions of noises, and measures the deviation from first order.
 
-    Parameters
-    ----------
-    plan : Plan
-        Plan of the sweeps. Its load cell's white noise counts, as if that of every channel were independent of the
-        others and of the load; bias and drift do not.
-    rng : int, numpy.random.SeedSequence or numpy.random.Generator
-        Seed of the scrambled Sobol' sequences.
-    samples : int
-        Number of samples for each index, a power of two; `samples · (noises + 2)` contacts are reconstructed at each
-        state.
-    states : int
-        Number of states in each sweep, evenly in drive angle, at least 2.
-    methods : tuple of str
-        Methods of reconstruction, "raw" and "constrained".
-
-    Returns
-    -------
-    xr.Dataset
-        Over "sample", with sweep, direction and drive_angle [rad], contact_phase, after_first_contact and
-        before_snap_off [rad]:
-
-        share (reconstruction, sample, error, source)
-            First-order index of the error "along" and "across" the contour; NaN if some noise leaves a sample without
-            an answer.
-        total_share (reconstruction, sample, error, source)
-            Total index, with all interactions of the noise with others.
-        rms_error (reconstruction, sample, error)
-            Root mean square of the error of the answers [length].
-        without_answer (reconstruction, sample)
-            Share of reconstructions without an answer.
-
-    Raises
-    ------
-    ParameterError
-        If `samples` is no power of two, or `states` is less than 2.
-
-    Notes
-    -----
     The estimators are those of Saltelli et al. (2010) with scrambled Sobol' sequences, as in
     `scipy.stats.sobol_indices`.
     """

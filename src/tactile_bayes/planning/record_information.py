@@ -58,21 +58,7 @@ class RecordInformation(NamedTuple):
 
 
 def reading_slopes(model: ContourModel, point: Floats, step: float = STEP) -> ReadingSlopes:
-    """Return loads and derivatives of a record's readings at a point of the model's parameters.
-
-    Parameters
-    ----------
-    model : ContourModel
-    point : ndarray, shape (d,)
-        Parameters in the order of `model.names`.
-    step : float
-        Step of differences, over the scale of each parameter; larger if loads are interpolated coarsely.
-
-    Raises
-    ------
-    ReachError
-        If the rod does not reach the contour in every sweep.
-    """
+    """Return loads and derivatives of a record's readings at a point of the model's parameters. Shapes: point (d,)."""
     cell, count = model.likelihood.load_cell, len(model.forward_parameters)
     if not model.likelihood.usable(model.contours(point[None]), model.rig(point[None]))[0]:
         raise ReachError(
@@ -110,22 +96,7 @@ def record_information(
     discrepancy, are not counted either, and the information about the noise scale is that of white noise, which is too
     large with drift, encoder noise or a discrepancy.
 
-    Parameters
-    ----------
-    model : ContourModel
-    point : ndarray, shape (d,)
-        Parameters in the order of `model.names`.
-    channels : ndarray of bool, shape (3,), optional
-        Channels that are used, if they were measured.
-    slopes : ReadingSlopes, optional
-        Derivatives at this point, if they are known already.
-    load_cell : LoadCell, optional
-        Load cell in place of the model's, in its units, that differs only in the noise of its channels.
-
-    Raises
-    ------
-    ReachError
-        If the rod does not reach the contour in every sweep.
+    Shapes: point (d,), channels (3,).
     """
     cell = model.likelihood.load_cell if load_cell is None else load_cell.dimensionless(model.likelihood.rod)
     cell = scaled_cell(cell, model.noise_scale(point[None])[0])

@@ -38,13 +38,7 @@ _MISFIT = 25.0
 
 
 def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
-    """Most likely contacts, with their covariance on the sheet of possible contacts.
-
-    Raises
-    ------
-    ParameterError
-        If a channel has no noise, or noise without a variance.
-    """
+    """Most likely contacts, with their covariance on the sheet of possible contacts."""
     _refuse_without_noise(samples)
     count = delta.size
     place, covariance = np.full((count, 4), np.nan), np.full((count, 4, 4), np.nan)

@@ -103,17 +103,7 @@ def is_weak(loads: Floats, covariance: Floats) -> Flags:
 def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, Floats]]) -> Flags:
     """Return where contacts one standard deviation aside contradict a covariance of first order.
 
-    Parameters
-    ----------
-    place : ndarray, shape (n, 4)
-    covariance : ndarray, shape (n, 4, 4)
-    aside : list of pairs of ndarray, shape (n, ≥ 2)
-        Contacts for data that are one standard deviation larger, and smaller, in each independent error.
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
-        True also where such a contact does not exist.
+    Shapes: place (n, 4), covariance (n, 4, 4), aside (n, ≥ 2) → (n,).
     """
     xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
     bent = np.zeros(len(place), dtype=bool)

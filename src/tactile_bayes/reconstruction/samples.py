@@ -66,20 +66,6 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
 
     With a compliant suspension the pivot turns under the moment, so that the rod's slope differs from the drive angle,
     with which the load cell may turn.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A valid record.
-    cell : LoadCell
-        Load cell in the record's units.
-    suspension_compliance : float
-        Turn of the suspension per holding moment [rad per unit of moment of the record].
-
-    Raises
-    ------
-    RecordError
-        If a load channel is missing.
     """
     absent = [name for name in CHANNELS if name not in present_channels(measured)]
     if absent:
@@ -127,19 +113,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
 
 
 def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> Flags:
-    """Find the samples whose load is significant.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A record.
-    load_cell : LoadCell, optional
-        In the record's units; by default its data sheet, if any. See `reconstruct` for the rule.
-
-    Returns
-    -------
-    ndarray of bool, shape (samples,)
-    """
+    """Find the samples whose load is significant. Returns shape (samples,)."""
     load_cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     present = present_channels(measured)
     readings = np.full((measured.sizes["sample"], len(CHANNELS)), np.nan)

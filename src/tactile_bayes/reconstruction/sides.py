@@ -63,17 +63,6 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
     contact; otherwise it is a load. Since seemingly unloaded samples may have a constant load, the moment must also
     have the opposite sign for all zeros within three of these deviations. A record may state the sides of its sweeps
     (`with_sides`).
-
-    Parameters
-    ----------
-    record : xr.Dataset
-        A valid record, corrected for known errors of the load cell.
-    load_cell : LoadCell, optional
-        Its noise is a lower bound of the noise estimated from neighbouring samples.
-
-    Returns
-    -------
-    ndarray, shape (samples,)
     """
     sides, _ = sides_and_doubts(record, load_cell)
     side = np.ones(record.sizes["sample"])
@@ -108,33 +97,7 @@ def side_of(record: xr.Dataset, sweep: int) -> str:
 
 
 def with_sides(record: xr.Dataset, sides: Mapping[int, str]) -> xr.Dataset:
-    """State the sides of some sweeps of a record: "forward" for the side that a forward sweep touches, or "backward".
-
-    Parameters
-    ----------
-    record : xr.Dataset
-        A record.
-    sides : mapping of int to {"forward", "backward"}
-        Sides by the number of the sweep.
-
-    Returns
-    -------
-    xr.Dataset
-        The record with the attribute `contact_sides`.
-
-    Raises
-    ------
-    ParameterError
-        If the record has no such sweep, or a side is invalid.
-
-    Examples
-    --------
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> record = scan(paper_profile("II", q=0.5), direction="forward").record
-    >>> sorted(set(contact_sides(with_sides(record, {0: "backward"})).tolist()))
-    [-1.0]
-    """
+    """State the sides of sweeps: "forward" for the side that a forward sweep touches, or "backward"."""
     for sweep, side in sides.items():
         if sweep not in record.sweep.values or side not in ("forward", "backward"):
             raise ParameterError(f"there is no side {side!r} of sweep {sweep!r}: give sweeps, each forward or backward")

@@ -160,13 +160,7 @@ def reconstruct(
 
 
 def contacts_of(found: Corrected, method: Literal["raw", "constrained"]) -> xr.Dataset:
-    """Return the contacts of a record of a valid rig; see `reconstruct`.
-
-    Raises
-    ------
-    RecordError, ParameterError
-        As in `reconstruct`.
-    """
+    """Return the contacts of a record of a valid rig; see `reconstruct`."""
     measured, cell, friction = found.record, found.load_cell, found.friction
     most = float(np.tan(MAX_FRICTION_ANGLE))
     check_number("friction", friction, f"give Coulomb's coefficient, from 0 to {most:.2f}", least=0.0, most=most)

@@ -36,13 +36,6 @@ def misspelt(name: str, value: Any) -> str | None:
     """Return why an attribute is probably a misspelt one of the rod, the load cell or the units; else None.
 
     Numbers under a name that begins with `rod_` or `load_cell_` are, and texts if the name is similar to a known one.
-
-    Examples
-    --------
-    >>> misspelt("rod_tapper", 0.4)
-    "a rod has no entry 'tapper': did you mean 'taper'? An attribute ..."
-    >>> misspelt("Rod-Taper", "0.4"), misspelt("rodent", 7), misspelt("rod_material", "nitinol")
-    ("it is no attribute of a record: did you mean 'rod_taper'?", None, None)
     """
     if name in USED:
         return None
@@ -56,15 +49,7 @@ def misspelt(name: str, value: Any) -> str | None:
 
 
 def stray_attribute(comment: str) -> tuple[str, str] | None:
-    """Return the name of an attribute that a commented line states in a form that is not read, and why; else None.
-
-    Examples
-    --------
-    >>> stray_attribute("rod_taper = 0.4")
-    ('rod_taper', "it is stated in a form that is not read: write '# rod_taper: 0.4'")
-    >>> stray_attribute("whisker rig, wire 120 mm x 0.5 mm"), stray_attribute("see rod_taper above")
-    (None, None)
-    """
+    """Return the name of an attribute that a commented line states in a form that is not read, and why; else None."""
     comment = plain(comment)
     match = _STRAY.fullmatch(comment) or _WORDS.fullmatch(comment)
     if match is None:

@@ -26,13 +26,7 @@ _BEZIERS = 64
 
 
 def curves_in(path: Path) -> tuple[list[Floats], float]:
-    """Return the curves of a drawing as polylines, shape (n, 2) each, and the size of its unit in metres, 0 for none.
-
-    Raises
-    ------
-    ParameterError
-        If ezdxf is not installed, the file is no drawing, has a rare unit, or no curve is shown.
-    """
+    """Return the curves of a drawing as polylines, shape (n, 2) each, and its unit [m], 0 for none."""
     try:
         import ezdxf
     except ImportError as error:

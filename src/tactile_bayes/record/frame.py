@@ -98,14 +98,7 @@ def in_frame(record: xr.Dataset, frame: Frame) -> xr.Dataset:
 
 
 def turned(force_x: ArrayLike, force_y: ArrayLike, angle: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the components of forces along axes that are turned counter-clockwise by an angle [rad].
-
-    Examples
-    --------
-    >>> along, across = turned(0.0, 2.0, np.pi / 6)
-    >>> round(float(along), 6), round(float(across), 6)
-    (1.0, 1.732051)
-    """
+    """Return the components of forces along axes that are turned counter-clockwise by an angle [rad]."""
     x, y = np.asarray(force_x, dtype=np.float64), np.asarray(force_y, dtype=np.float64)
     cos, sin = np.cos(angle), np.sin(angle)
     return np.asarray(x * cos + y * sin), np.asarray(y * cos - x * sin)

@@ -42,15 +42,6 @@ def write_netcdf(
     attributes, scalars, strings of different lengths and the structure of the file cannot have them. Therefore the last
     line of the file, beyond the end that HDF5 knows, is the SHA-256 of all bytes before it; `read_netcdf` verifies it.
     Programs that modify the file drop that line.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as directory:
-    ...     write_netcdf(xr.Dataset({"q": ("draw", [0.5, 0.6])}), Path(directory) / "a.nc")
-    ...     found = read_netcdf(Path(directory) / "a.nc", xr.open_dataset, ValueError)
-    >>> found["q"].values.tolist()
-    [0.5, 0.6]
     """
     image = _image_of(content, encoding or {})
     with write_atomically(path) as temporary, open(temporary, "wb") as file:

@@ -84,11 +84,6 @@ def column_entry(column: xr.DataArray, *, sense: int = 1, added: float = 0.0, di
 
     A column that was not read from a file has the same name and unit there. "" if its origin does not have the unit of
     the record, as after a conversion by the rod.
-
-    Examples
-    --------
-    >>> column_entry(xr.DataArray([0.0], name="force_y", attrs={"units": "N"}), added=0.01824)
-    'force_y+0.0182'
     """
     name, unit = str(column.name), str(column.attrs.get("units", "1"))
     stored = column.encoding.get(ORIGIN) or column.attrs.get(ORIGIN)
@@ -115,11 +110,6 @@ def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source)
     """Find the origins of the columns of a record that have other names in a file, by their columns there.
 
     Columns like "force_x [mN]" need no entry. What cannot be parsed, or is not in the file, is refused.
-
-    Examples
-    --------
-    >>> origins_of({"force_x": "-Fx[mN]", "drive_angle": "90-Angle[deg]"}, ["Fx", "Angle"], Source())["drive_angle"]
-    Origin(column='Angle', unit='deg', sign=-1, offset=90.0, value=None, factor=1.0)
     """
     names = list(names)
     origins = {target: _origin(target, str(text), names, source) for target, text in columns.items()}

@@ -33,13 +33,7 @@ class Points(NamedTuple):
     """"m", "1" for rod lengths, or "" if the file states none."""
 
     def in_unit(self, unit: str, name: str) -> list[Floats]:
-        """Return the pieces in "m" or "1", as which numbers without a unit are taken; the name is for the message.
-
-        Raises
-        ------
-        ParameterError
-            If the file states the other one.
-        """
+        """Return the pieces in "m" or "1", as which numbers without a unit are taken; the name is for the message."""
         if self.unit not in ("", unit):
             raise ParameterError(f"{name} is in {_CALLED[self.unit]}, and {_CALLED[unit]} are wanted: convert it")
         return self.pieces

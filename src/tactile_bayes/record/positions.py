@@ -26,11 +26,6 @@ def positions_of(travel: Floats) -> Index:
 
     The differences of neighbours are divided where two successive ones, by size, are furthest apart in ratio: larger
     ones are steps if all of them are in the sense of the drive, and smaller ones noise if they hardly move it.
-
-    Examples
-    --------
-    >>> positions_of(np.repeat([0.0, 0.1, 0.2, 0.3], 2)).tolist(), positions_of(np.arange(4.0)).tolist()
-    ([0, 0, 1, 1, 2, 2, 3, 3], [0, 1, 2, 3])
     """
     steps = np.diff(travel) * (1.0 if travel[-1] >= travel[0] else -1.0)
     sizes = np.sort(np.abs(steps))

@@ -10,13 +10,7 @@ __all__ = ["file_entry", "rig_entries", "rig_entry"]
 
 
 def rig_entry(name: str, value: Any, table: str = "file") -> str:
-    """Return an entry of rig.toml, with its place.
-
-    Examples
-    --------
-    >>> rig_entry("force_x", "-Fx[mN]")
-    'force_x = "-Fx[mN]" under [file] of rig.toml'
-    """
+    """Return an entry of rig.toml, with its place."""
     return rig_entries({name: value}, table)
 
 

@@ -165,13 +165,7 @@ ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
 
 
 def column_of(name: str) -> Column | None:
-    """Return the meaning of a column, with or without the prefix `truth_`; None for one that the schema does not know.
-
-    Examples
-    --------
-    >>> column_of("truth_contact_x").scale, column_of("temperature")
-    ('length_unit', None)
-    """
+    """Return the meaning of a column, with or without the prefix `truth_`; None if it is unknown."""
     known = COLUMNS.get(name.removeprefix("truth_"))
     if known is None or known.name == name:
         return known

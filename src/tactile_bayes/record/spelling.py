@@ -35,13 +35,7 @@ _LONGEST = 200
 
 
 def nearest(name: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """Find the candidate most similar to a name, regardless of case and the order of words; None below a similarity.
-
-    Examples
-    --------
-    >>> nearest("noise_force", ["bias_force_x", "force_noise"])
-    'force_noise'
-    """
+    """Find the candidate most similar to a name, regardless of case and the order of words; None below a similarity."""
     found = max(candidates, key=lambda candidate: _likeness(name, candidate), default=None)
     return found if found is not None and _likeness(name, found) >= cutoff else None
 
@@ -49,24 +43,7 @@ def nearest(name: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | 
 def refuse_unknown_keys(
     table: Iterable[str], known: Iterable[str], prefix: str = "", tables: Mapping[str, Iterable[str]] | None = None
 ) -> None:
-    """Refuse keys of a table of a file that it cannot have, with the nearest one, or the table that has it.
-
-    Parameters
-    ----------
-    table : iterable of str
-        The keys.
-    known : iterable of str
-        Those that there are.
-    prefix : str
-        Name of the table with a dot; "" for the top.
-    tables : mapping of str to iterable of str
-        Keys of the tables of the file by their names, "" for the top.
-
-    Raises
-    ------
-    ParameterError
-        If there is such a key.
-    """
+    """Refuse keys of a table of a file that it cannot have, with the nearest one, or the table that has it."""
     known = list(known)
     for key in table:
         if key in known:
@@ -85,34 +62,17 @@ def plain(text: str) -> str:
     """Replace characters by those that they look like and stand for; those without a width are removed.
 
     These are minus signs, degrees, dots, quotation marks, blanks, full-width characters, and digits of any script.
-
-    Examples
-    --------
-    >>> plain("90\N{MINUS SIGN}Angle[\N{MASCULINE ORDINAL INDICATOR}]"), plain("1\N{NO-BREAK SPACE}mN")
-    ('90-Angle[°]', '1 mN')
     """
     return text if text.isascii() else "".join(map(_meant, text))
 
 
 def visible(text: str) -> str:
-    """Remove characters without a width, and replace blanks of any width by usual ones.
-
-    Examples
-    --------
-    >>> visible("\N{ZERO WIDTH NO-BREAK SPACE}Fx\N{NO-BREAK SPACE}[mN]")
-    'Fx [mN]'
-    """
+    """Remove characters without a width, and replace blanks of any width by usual ones."""
     return text if text.isascii() else "".join(_meant(sign) if _meant(sign) in ("", " ") else sign for sign in text)
 
 
 def plain_number(text: str) -> str:
-    """Return the text of a number in plain characters, without separators of thousands that stand for nothing else.
-
-    Examples
-    --------
-    >>> plain_number("\N{MINUS SIGN}1\N{NARROW NO-BREAK SPACE}234.5"), plain_number("1\N{NARROW NO-BREAK SPACE}23")
-    ('-1234.5', '1 23')
-    """
+    """Return the text of a number in plain characters, without separators of thousands that stand for nothing else."""
     if text.isascii():
         return text
     digits = "".join(sign if (value := unicodedata.decimal(sign, None)) is None else str(value) for sign in text)
@@ -120,13 +80,7 @@ def plain_number(text: str) -> str:
 
 
 def look_alikes(text: str) -> str:
-    """Name the characters that look like others, for messages; "" without.
-
-    Examples
-    --------
-    >>> look_alikes("\N{EN DASH}1"), look_alikes("-1")
-    (" (U+2013 EN DASH stands there for '-')", '')
-    """
+    """Name the characters that look like others, for messages; "" without."""
     odd = [sign for sign in dict.fromkeys(text) if not sign.isascii() and _meant(sign) != sign and sign not in "\u00b5"]
     named = [f"U+{ord(sign):04X} {unicodedata.name(sign, 'without a name')}" for sign in odd[:3]]
     meant = [f"stands there for {_meant(sign)!r}" if _meant(sign) else "cannot be seen" for sign in odd[:3]]
@@ -151,11 +105,6 @@ def _meant(sign: str) -> str:
 def is_misspelling(name: str, meant: str) -> bool:
     """Return whether a name differs from another one in at most a letter, or one in eight: left out, added, other,
     or exchanged with its neighbour.
-
-    Examples
-    --------
-    >>> is_misspelling("tapre", "taper"), is_misspelling("type", "taper"), is_misspelling("rodent", "rod")
-    (True, False, False)
     """
     most = max(1, len(meant) // 8)
     return abs(len(name) - len(meant)) <= most and _edits(name, meant) <= most

@@ -41,13 +41,7 @@ def is_storable_attribute(name: Any) -> bool:
 
 
 def not_storable(text: str) -> str | None:
-    """Return the reason why not every file can store a text, None if there is none.
-
-    Examples
-    --------
-    >>> not_storable("a\\0b"), not_storable("°C")
-    ('has a NUL character (0x00) in it', None)
-    """
+    """Return the reason why not every file can store a text, None if there is none."""
     match = _NOT_STORABLE.search(text)
     if match is None:
         return None
@@ -55,12 +49,6 @@ def not_storable(text: str) -> str | None:
 
 
 def storable(name: str) -> str:
-    """Replace slashes in a name, which separate groups in a NetCDF file.
-
-    Examples
-    --------
-    >>> storable("Temp / °C"), storable("Fx/Fy"), storable("v / m/s")
-    ('Temp [°C]', 'Fx|Fy', 'v [m|s]')
-    """
+    """Replace slashes in a name, which separate groups in a NetCDF file."""
     match = _WITH_UNIT.fullmatch(name)  # the notation of DIN 1313
     return (f"{match['stem']} [{match['unit']}]" if match else name).replace("/", "|")

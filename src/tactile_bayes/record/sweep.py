@@ -126,14 +126,7 @@ def _is_carried(base_x: Floats, base_y: Floats, angle: Floats) -> bool:
 
 
 def base_of_sample(record: xr.Dataset) -> tuple[list[tuple[float, float]], Index]:
-    """Return the bases of a record, and the index of that of each sample.
-
-    Returns
-    -------
-    bases : list of (float, float)
-        Pivots, and where drives that carry the base begin [length], in the order of the record.
-    index : ndarray, shape (samples,)
-    """
+    """Return the bases of a record, and the index of that of each sample. Returns shape index (samples,)."""
     x, y, sweep = record.base_x.values.copy(), record.base_y.values.copy(), record.sweep.values
     for number in carried_sweeps(record):
         rows = sweep == number

@@ -32,13 +32,7 @@ SHARE = 0.1
 
 
 def turning_points(angle: Floats, least: float) -> list[int]:
-    """Find the extremes of an angle after which it returns by more than a threshold, minima and maxima alternating.
-
-    Examples
-    --------
-    >>> turning_points(np.array([0.0, 1.0, 0.9, 2.0, 3.0, 1.0, 0.0, 2.0]), least=0.5)
-    [4, 6]
-    """
+    """Find the extremes of an angle after which it returns by more than a threshold, minima and maxima alternating."""
     falls, rises = _left_extreme(angle, 0, 1, least), _left_extreme(angle, 0, -1, least)
     if falls is None or rises is None:
         return []

@@ -25,13 +25,7 @@ __all__ = ["assumed_units", "in_units_of_record", "rod_of", "to_dimensionless", 
 
 
 def rod_of(record: xr.Dataset) -> Rod:
-    """Return the rod of a record; for a dimensionless record `Rod()`, with a diameter in rod lengths.
-
-    Raises
-    ------
-    RecordError
-        If the attributes of the record state no rod, or an invalid one.
-    """
+    """Return the rod of a record; for a dimensionless record `Rod()`, with a diameter in rod lengths."""
     return stated_rod(record.attrs, Source())
 
 
@@ -58,14 +52,6 @@ def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
 
     Equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945. The data sheet of the load cell is converted with
     the columns. Columns that the schema does not know are kept as they are.
-
-    Examples
-    --------
-    >>> from tactile_bayes.rig import Rig, make_record
-    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [6e-5]}
-    >>> record = make_record(columns, Rig(Rod(0.1, 1.2e-5), file={"missing": ["force_x", "force_y"]}))
-    >>> float(to_dimensionless(record)["holding_moment"][0])
-    0.5
     """
     if record.attrs.get("units") == "dimensionless":
         return record
@@ -73,13 +59,7 @@ def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
 
 
 def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
-    """Convert a dimensionless record to SI units with a rod; the inverse of `to_dimensionless`.
-
-    Raises
-    ------
-    RecordError
-        If `record` is not a record, or its rod has another diameter or shape in lengths of the rod.
-    """
+    """Convert a dimensionless record to SI units with a rod; the inverse of `to_dimensionless`."""
     stated = rod_of(record)
     if record.attrs.get("units") == "SI":
         if not same_rod(stated, rod):

@@ -26,41 +26,9 @@ __all__ = ["checked_record", "validate"]
 def validate(record: xr.Dataset) -> xr.Dataset:
     """Validate and complete a record, or raise an error that says what is wrong, where, and what to do.
 
-    Parameters
-    ----------
-    record : xr.Dataset
-        A candidate, dimension "sample".
-
-    Returns
-    -------
-    xr.Dataset
-        The same record with columns in the order of the schema, absent bases as 0, and `units` and `long_name`
-        on every variable. The argument is not changed; valid values are not copied.
-
-    Raises
-    ------
-    RecordError
-        If a column is missing or misspelt; a cell of a measured column is text, NaN or infinite (a channel that
-        is NaN throughout is a missing channel, and allowed); every channel is missing; a direction is neither
-        "forward" nor "backward"; drive angles look like degrees (more than a turn); one sweep has two
-        directions or two pivots, or turns about one with a drive angle that runs against its direction; units are unknown, or differ
-        from column to column; the rod is not stated; the frame of the load cell is neither "fixed" nor "turning";
-        there are no samples.
-
-    Notes
-    -----
     Encoders are noisy, so a sweep runs against its direction only if every step of its drive angle does, or if
     the least-squares trend does by more than six of its own standard errors.
-
-    Examples
-    --------
-    >>> from tactile_bayes.rig import Rig, make_record
-    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.3, 1.2], "holding_moment": [0.0, 0.4]}
-    >>> make_record(columns, Rig(file={"missing": ["force_x", "force_y"]}))
-    Traceback (most recent call last):
-    ...
-    tactile_bayes.errors.RecordError: sweep 0 is labelled 'forward', but its drive angle decreases, from 1.3 rad (sample 0) to 1.2 rad (sample 1): label it 'backward', or put its samples in the order in which they were measured
-    """  # noqa: E501
+    """
     source = Source()
     if not isinstance(record, xr.Dataset):
         hint = "take its record" if hasattr(record, "record") else "build one with make_record"

@@ -27,13 +27,7 @@ _TALLEST, _LOWEST = 460.0, 140.0
 
 
 def element(name: str, *content: str, **attributes: object) -> Markup:
-    """Return an element of SVG; `class_` is its class, `_` in other names stands for a hyphen. Text is escaped.
-
-    Examples
-    --------
-    >>> element("text", "a < b", class_="tick", text_anchor="end")
-    Markup('<text class="tick" text-anchor="end">a &lt; b</text>')
-    """
+    """Return an element of SVG; `class_` is its class, `_` in other names stands for a hyphen. Text is escaped."""
     said = Markup("").join(
         Markup(' {}="{}"').format(key.rstrip("_").replace("_", "-"), value)
         for key, value in attributes.items()

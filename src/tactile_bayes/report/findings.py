@@ -90,22 +90,6 @@ def findings_of(
 
     Everything follows from posterior.nc, which also holds the record; the tables that `infer` writes beside it hold the
     same numbers.
-
-    Parameters
-    ----------
-    run : Path
-        Folder that `tactile_bayes.runs.contour.analyse` has written.
-    compare : Path, optional
-        Folder of a comparison of families; by default `run`, if it holds a comparison that states its record.
-    progress : callable
-        Called with the number of steps done, of `FINDING_STEPS`.
-    overlay : Path, optional
-        Folder of another run, or file of points, as `read_overlay` takes it.
-
-    Raises
-    ------
-    InferenceError
-        If the folders hold no such results.
     """
     path = posterior_in(run)
     content = path.read_bytes()

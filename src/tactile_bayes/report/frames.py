@@ -78,19 +78,7 @@ class Motion:
 
 
 def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
-    """Return the rods of the most probable draw, with that draw's rigidity, encoder, friction, suspension and pivots.
-
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`.
-    most : int
-        Largest number of samples, evenly picked from every sweep.
-
-    Returns
-    -------
-    Motion
-    """
+    """Return the rods of the most probable draw, with its rigidity, encoder, friction, suspension and pivots."""
     record = record_of(posterior)
     best = posterior["sample_stats"]["lp"].argmax(("chain", "draw"))
     draw = posterior_draws(posterior).isel(best)

@@ -54,13 +54,7 @@ _CHANNELS = {"moment": "the holding moment", "force_x": "force x", "force_y": "f
 
 
 def meaning_of(name: str, family: str) -> str:
-    """Return the meaning of a parameter of a contour, of its rig, or of the noise.
-
-    Examples
-    --------
-    >>> meaning_of("q", "parabola"), meaning_of("force_x_bias", "circle"), meaning_of("left_a", "parabola/power-law")
-    ('height of the lowest point', 'zero of force x', 'left flank: half the curvature of the lowest point')
-    """
+    """Return the meaning of a parameter of a contour, of its rig, or of the noise."""
     if match := _CALIBRATION.fullmatch(name):
         return f"{_WHATS[match['what']]} of {_CHANNELS[match['channel']]}"
     if match := _BASE.fullmatch(name):

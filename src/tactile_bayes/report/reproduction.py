@@ -21,29 +21,7 @@ def command_of(attrs: Mapping[Any, Any]) -> str:
 
 
 def python_lines(attrs: Mapping[Any, Any]) -> str:
-    """Return lines of Python that infer the posterior again from the record in its file, and compare the draws.
-
-    Examples
-    --------
-    >>> said = {"seed": "1", "settings": '{"ensembles": 2}'}
-    >>> print(python_lines(said))
-    import tactile_bayes as tb
-    import xarray as xr
-    <BLANKLINE>
-    stored = tb.read_result("posterior.nc")
-    columns = [stored[group].to_dataset() for group in ("constant_data", "observed_data")]
-    record = xr.merge(columns).assign_attrs(stored.attrs)
-    again = tb.infer_contour(
-        record,
-        family=tb.Family.of(stored),
-        rig=tb.Rig.of(stored),
-        rng=1,
-        settings=tb.SamplerSettings(
-            ensembles=2,
-        ),
-    )
-    print(again["posterior"].equals(stored["posterior"]))
-    """
+    """Return lines of Python that infer the posterior again from the record in its file, and compare the draws."""
     seed, settings = str(attrs["seed"]), read_json(attrs["settings"], "settings")
     streamed = is_streamed(attrs)
     options = [

@@ -92,26 +92,7 @@ def folders_of(runs: Sequence[Path]) -> dict[Path, str]:
 def runs_page_of(
     runs: Mapping[Path, str], out: Path, name: str, overlay: Path | None, progress: Callable[[int], object]
 ) -> dict[str, Any]:
-    """Return the values of the template's variables.
-
-    Parameters
-    ----------
-    runs : mapping of Path to str
-        From `folders_of`.
-    out : Path
-        File of the page, from which its links lead.
-    name : str
-        Name of the whole.
-    overlay : Path, optional
-        As for `read_overlay`.
-    progress : callable
-        Called with the number of runs read.
-
-    Raises
-    ------
-    InferenceError
-        If none of them has a result, or their records have different units.
-    """
+    """Return the values of the template's variables."""
     names, errors, found = _names(list(runs)), dict(runs), dict[Path, _Found]()
     for count, (folder, error) in enumerate(runs.items(), start=1):
         try:

@@ -33,25 +33,7 @@ def write_watch_page(
     is_well: bool,
     refresh: int | None,
 ) -> None:
-    """Write the page of a record so far, which needs no network and no other file.
-
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        Posterior of the record so far.
-    numbers : xr.Dataset
-        Its summary.
-    band : xr.Dataset, optional
-        Its band.
-    path : Path
-        File to be written.
-    headline, sentences : str, sequence of str
-        State of the measurement.
-    is_well : bool
-        False if it should be looked at.
-    refresh : int, optional
-        Time after which the page loads itself again [s]; None for the last page.
-    """
+    """Write the page of a record so far, which needs no network and no other file."""
     family, probability = str(posterior.attrs["family"]), float(numbers.attrs["probability"])
     contour = None
     if band is not None:

@@ -49,15 +49,7 @@ class Shown(NamedTuple):
 
 
 def shown_as(column: str, attrs: Mapping[Any, Any], values: Any) -> Shown:
-    r"""Return the unit that suits values of a column of a record: mm, mN m, or that of the rod.
-
-    Examples
-    --------
-    >>> shown_as("force_x", {"units": "N"}, [0.012]).full(0.0123)
-    '12.3\xa0mN'
-    >>> shown_as("force_x", {"units": "1"}, [0.012])
-    Shown(power=0, name='EI/L²')
-    """
+    r"""Return the unit that suits values of a column of a record: mm, mN m, or that of the rod."""
     power, unit = shown_unit(column, attrs, np.asarray(values, dtype=float))
     return Shown(power, unit.replace("$", "").replace("^2", "²"))
 
@@ -78,13 +70,7 @@ def sentence(words: str) -> str:
 
 
 def fixed(value: float, form: str) -> str:
-    """Return a number in a format, with a true minus sign, except for zero; – if not finite.
-
-    Examples
-    --------
-    >>> fixed(-0.04, ".1f"), fixed(-1.26, ".1f")
-    ('0.0', '−1.3')
-    """
+    """Return a number in a format, with a true minus sign, except for zero; – if not finite."""
     if not math.isfinite(value):
         return "–"
     text = f"{value:{form}}"
@@ -92,13 +78,7 @@ def fixed(value: float, form: str) -> str:
 
 
 def chance(value: float) -> str:
-    """Return a probability to three decimals; only exact 0 and 1 are written so.
-
-    Examples
-    --------
-    >>> chance(0.25), chance(1e-9), chance(1.0), chance(float("nan"))
-    ('0.250', '<0.001', '1', '–')
-    """
+    """Return a probability to three decimals; only exact 0 and 1 are written so."""
     if not math.isfinite(value):
         return "–"
     if 0.0 < value < 1.0:
@@ -107,11 +87,5 @@ def chance(value: float) -> str:
 
 
 def percent(value: float) -> str:
-    """Return a share in per cent, to six significant digits.
-
-    Examples
-    --------
-    >>> percent(0.95)
-    '95\\xa0%'
-    """
+    """Return a share in per cent, to six significant digits."""
     return f"{100.0 * value:.6g}\u00a0%"

@@ -102,13 +102,7 @@ class GrowingRecord:
         self._noted: list[str] = []
 
     def poll(self) -> Growth | None:
-        """Return the record if the file has whole lines that it did not have before, or other ones; else None.
-
-        Raises
-        ------
-        OSError
-            If the file is there and cannot be opened.
-        """
+        """Return the record if the file has whole lines that it did not have before, or other ones; else None."""
         refuse_no_file(self._path)  # opening a pipe would wait
         try:
             with open(self._path, "rb") as file:

@@ -296,13 +296,7 @@ class Rig:
 
 
 def rig_of(rig: Rig | None) -> Rig:
-    """Return a rig, by default one that says nothing.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
+    """Return a rig, by default one that says nothing."""
     check_optional("rig", rig, Rig, "give Rig(rod=..., load_cell=...), or Rig.read(path)")
     return rig or Rig()
 

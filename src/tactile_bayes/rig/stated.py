@@ -85,13 +85,7 @@ class Stated(NamedTuple):
 
 
 def within_bounds(name: str, distribution: Distribution, share: Floats) -> Floats:
-    """Return the quantiles of a parameter at probabilities in [0, 1), as a distribution within its bounds has them.
-
-    Raises
-    ------
-    ParameterError
-        If the distribution has no quantiles, or none within the bounds.
-    """
+    """Return the quantiles of a parameter at probabilities in [0, 1), as a distribution within its bounds has them."""
     parameter = parameter_named(name)
     assert parameter is not None
     if not (hasattr(distribution, "ppf") and hasattr(distribution, "cdf")):

@@ -32,13 +32,7 @@ _BASES = ("base", "base_x", "base_y")
 
 
 def expanded(unknown: Mapping[str, Unknown]) -> dict[str, Unknown]:
-    """Return what is said of each parameter, groups first, so that one of a group may be an exception.
-
-    Examples
-    --------
-    >>> expanded({"moment_bias": 0.1, "bias": "default"})
-    {'moment_bias': 0.1, 'force_x_bias': 'default', 'force_y_bias': 'default'}
-    """
+    """Return what is said of each parameter, groups first, so that one of a group may be an exception."""
     of_groups = {member: value for name, value in unknown.items() if name in GROUPS for member in GROUPS[name]}
     return {**of_groups, **{name: value for name, value in unknown.items() if name not in GROUPS}}
 

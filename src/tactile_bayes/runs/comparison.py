@@ -32,30 +32,7 @@ def compare_into(
     progress: Callable[[str, Progress], object] = lambda name, progress: None,
     **options: Any,
 ) -> Run[xr.Dataset]:
-    """Compare families of contours, and write the result to a folder.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A record.
-    out : path-like
-        Folder for comparison.nc, comparison.csv and families.png; created if missing, once sampling has begun. Files
-        of these names in it are replaced.
-    rig, progress, options
-        Options of `compare_families`.
-
-    Returns
-    -------
-    Run
-        The result of `compare_families`, and the files.
-
-    Raises
-    ------
-    RecordError, ParameterError, InferenceError
-        As in `compare_families`; if no contour is found, with the messages of `check_units_and_signs`.
-    OSError
-        If the folder cannot be created.
-    """
+    """Compare families of contours, and write the result to a folder."""
     path = Path(out)
     above = next(place for place in (path, *path.absolute().parents) if place.exists())
     if not above.is_dir():

@@ -131,37 +131,8 @@ def analyse(
     """Write contact points, contour posterior, band and figures of a record to a folder.
 
     The posterior is written as soon as it is sampled, and again with its predictions. A part that fails afterwards is
-    left out and named, and all others are made.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A record.
-    out : path-like
-        Folder for posterior.nc, contacts.csv, band.csv, summary.txt (which begins with the verdicts), summary.csv and
-        the figures; created if missing. The posterior replaces all files of these names in it, and report.html,
-        watch.html, trust.nc and the replicates behind it, which would belong to the former posterior; the other files
-        come together at the end, so that a folder without summary.txt is not complete.
-    rig, rng, options
-        Options of `infer_contour`.
-    probability : float
-        Probability of the band and of the intervals in the summary, in (0, 1).
-    truth : Contour, optional
-        The true contour, to be drawn into the figures.
-    record_file : path-like, optional
-        File that the record was read from; the posterior then states its name and SHA-256.
-    command : sequence of str
-        Words of the command that started this run; the posterior then states them.
-
-    Returns
-    -------
-    ContourRun
-
-    Raises
-    ------
-    RecordError, ParameterError, InferenceError
-        As in `infer_contour`; if no contour is found, with the messages of `check_units_and_signs`; if a file of the
-        run would replace `record_file`.
+    left out and named, and all others are made. The posterior removes what belonged to a former one; the other files
+    come together at the end, so that a folder without summary.txt is not complete.
     """
     check_probability("probability", probability)
     rig = rig_of(rig)

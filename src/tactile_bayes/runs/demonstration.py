@@ -38,25 +38,7 @@ RIG = Rig(rod=ROD, load_cell=LOAD_CELL, unknown="nothing")
 
 
 def measure_demo(out: str | os.PathLike[str], *, rng: Rng) -> tuple[Path, Path]:
-    """Sweep forward and backward in steps of 1°, measure, and write record.csv, without columns of truth, and rig.toml.
-
-    Parameters
-    ----------
-    out : path-like
-        Folder, created if missing; a run in it is removed.
-    rng : int, numpy.random.SeedSequence or numpy.random.Generator
-        Seed of the load cell's noise.
-
-    Raises
-    ------
-    ParameterError
-        If the folder holds a record.csv that is no record of the demonstration.
-
-    Returns
-    -------
-    record, rig : Path
-        The files of the record and of the rig.
-    """
+    """Sweep forward and backward in steps of 1°, and write record.csv, without the truth, and rig.toml."""
     measured = LOAD_CELL.measure(scan(CONTOUR, Rig(rod=ROD)).record, rng=rng)
     path, rig = Path(out) / "record.csv", Path(out) / "rig.toml"
     _refuse_another_record(path)

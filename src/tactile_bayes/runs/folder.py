@@ -120,20 +120,7 @@ def panels(rows: int, columns: int, width: float, height: float, **options: Any)
 
 
 def posterior_in(run: Path) -> Path:
-    """Return the path of the posterior in the folder of a run, without opening it.
-
-    Raises
-    ------
-    InferenceError
-        If the folder holds no posterior.
-
-    Examples
-    --------
-    >>> posterior_in(Path("no/such/run"))
-    Traceback (most recent call last):
-    ...
-    tactile_bayes.errors.InferenceError: there is no folder no/such/run: give the folder that `tactile-bayes infer RECORD --out FOLDER` has written
-    """  # noqa: E501
+    """Return the path of the posterior in the folder of a run, without opening it."""
     correction = "give the folder that `tactile-bayes infer RECORD --out FOLDER` has written"
     if not run.exists():
         raise InferenceError(f"there is no folder {run}: {correction}")

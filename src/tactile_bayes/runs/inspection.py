@@ -24,42 +24,7 @@ __all__ = ["write_inspection"]
 def write_inspection(
     inspection: Inspection, out: str | os.PathLike[str], *, text: Sequence[str] = (), rig: Rig | None = None
 ) -> Mapping[str, Path]:
-    """Write an inspection to a folder.
-
-    Parameters
-    ----------
-    inspection : Inspection
-        From `inspect_record`.
-    out : path-like
-        Folder for inspection.txt, sweeps.csv, channels.csv, samples.csv (a line for every sample, with 1 where
-        something looks wrong) and inspection.png; created if missing. Files of these names in it are
-        replaced, all together.
-    text : sequence of str
-        Lines that follow the messages in inspection.txt.
-    rig : Rig, optional
-        The rig by which the record was read: with what the inspection shows it is written to rig.toml, and what looks
-        wrong stands there as comments. A file of this name that was edited is never replaced.
-
-    Returns
-    -------
-    mapping of str to Path
-        Files by content.
-
-    Raises
-    ------
-    ParameterError
-        If the folder has a rig.toml that was edited, or is another one.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from tactile_bayes import inspect_record, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> record = scan(paper_profile("II", q=0.5), drive_step=0.05).record
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     sorted(path.name for path in write_inspection(inspect_record(record), folder).values())
-    ['channels.csv', 'inspection.png', 'inspection.txt', 'samples.csv', 'sweeps.csv']
-    """
+    """Write an inspection to a folder."""
     rig_file = "" if rig is None else _rig_file(inspection, rig)
     if rig is not None:
         _refuse_edited(Path(out) / "rig.toml")

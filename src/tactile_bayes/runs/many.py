@@ -144,13 +144,7 @@ def infer_contours(
 
 
 def records_in(records: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[Path]:
-    """Return the files of records, of a folder those with the suffix of a record.
-
-    Raises
-    ------
-    ParameterError
-        If there are none.
-    """
+    """Return the files of records, of a folder those with the suffix of a record."""
     correction = "give files of records, or a folder of them"
     if not isinstance(records, str | os.PathLike | Iterable):
         raise refused("records", records, correction)

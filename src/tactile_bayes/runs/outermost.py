@@ -12,19 +12,7 @@ __all__ = ["outermost"]
 
 
 def outermost(choices: Iterable[tuple[Floats, float, str, str]]) -> str:
-    """Return the extremes at which the best choice lies, as text; "" if it lies inside all ranges.
-
-    Parameters
-    ----------
-    choices : iterable of tuple
-        The values that were tried, shape (n,), the best of them, and words for the smallest and for the largest.
-
-    Examples
-    --------
-    >>> lengths, widths = np.array([1.0, 2.0, 3.0]), np.array([0.5])
-    >>> outermost([(lengths, 3.0, "shortest", "longest"), (widths, 0.5, "thinnest", "thickest")])
-    'longest'
-    """
+    """Return the extremes at which the best choice lies, as text; "" if it lies inside all ranges."""
     words: list[str] = []
     for tried, best, least, most in choices:
         if np.ptp(tried) > 0.0:

@@ -58,41 +58,7 @@ def reconstruct_into(
     method: Literal["raw", "constrained"] | None = None,
     rig: Rig | None = None,
 ) -> ReconstructionRun:
-    """Write contact points of a record, and a map of them, to a folder.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A record with all three load channels.
-    out : path-like
-        Folder for contacts.csv, and for contacts.png if there are at least two contact points; created if missing.
-        Files of these names in it are replaced, and an old contacts.png is removed if none is drawn.
-    method : {"raw", "constrained"}, optional
-        Method of `reconstruct`; by default "constrained", or "raw" if the noise of a channel is not known.
-    rig : Rig, optional
-        The rig, in the record's units. Its load cell is by default the data sheet of the record, or the estimate of
-        `LoadCell.from_zero_load`. Numbers under `unknown`, like that of friction, are taken into account; what is
-        unknown is taken as stated.
-
-    Returns
-    -------
-    ReconstructionRun
-
-    Raises
-    ------
-    RecordError, ParameterError
-        As in `reconstruct`.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     run = reconstruct_into(scan(paper_profile("II", q=0.5), drive_step=0.05).record, folder)
-    >>> run.result.attrs["method"], sorted(run.files)
-    ('raw', ['contacts', 'map'])
-    """
+    """Write contact points of a record, and a map of them, to a folder."""
     rig = rig_of(rig)
     measured = with_rod(validate(measured), rig.rod)
     cell, source = known_cell(measured, rig.load_cell)
@@ -108,25 +74,7 @@ def reconstruct_into(
 
 
 def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
-    """Return messages on the samples' statuses and the agreement of their loads; what is wrong comes first.
-
-    Parameters
-    ----------
-    contacts : xr.Dataset
-        From `reconstruct`.
-
-    Returns
-    -------
-    tuple of str
-
-    Examples
-    --------
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> from tactile_bayes.reconstruction import reconstruct
-    >>> reconstruction_messages(reconstruct(scan(paper_profile("II", q=0.5)).record))
-    ('266 contact points by the raw method; samples: 266 ok, 64 no contact.',)
-    """
+    """Return messages on the samples' statuses and the agreement of their loads; what is wrong comes first."""
     counts = Counter(contacts.status.values.tolist())
     fates = ", ".join(f"{count} {fate}" for fate, count in counts.most_common())
     found = int(np.count_nonzero(np.isfinite(contacts.contact_x.values)))

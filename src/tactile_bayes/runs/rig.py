@@ -47,30 +47,7 @@ def calibrate_rig_into(
     probability: float = 0.95,
     **options: Any,
 ) -> RigRun:
-    """Calibrate a rig by records of one gauge, one after the other, and write the result.
-
-    Parameters
-    ----------
-    out : path-like
-        Folder for rig.toml, rig.nc (the posterior of the last record), summary.txt (which begins with the verdicts) and
-        summary.csv; created if missing. Files of these names in it are replaced.
-    records : sequence of xr.Dataset
-        Records of the gauge, at least one.
-    contour, rig, options
-        Arguments and options of `calibrate_rig`.
-    probability : float
-        Probability of the intervals in the summary, in (0, 1).
-
-    Returns
-    -------
-    RigRun
-        The rig after the last record, and the files.
-
-    Raises
-    ------
-    RecordError, ParameterError, InferenceError
-        As in `calibrate_rig`.
-    """
+    """Calibrate a rig by records of one gauge, one after the other, and write the result."""
     check_probability("probability", probability)
     messages = list[str]()
     for number, measured in enumerate(records, start=1):

@@ -72,44 +72,7 @@ def sensitivity_into(
     progress: Callable[[int], object] | None = None,
     **options: Any,
 ) -> SensitivityRun:
-    """Analyse the effects of the sensor's errors, and write the results to a folder.
-
-    Parameters
-    ----------
-    out : path-like
-        Folder for sensitivity.nc, words.txt, amplification.png, information.png, noise_shares.png and
-        required_noise.png; created if missing. Files of these names in it are replaced. A material adds rods.nc and
-        required_rod.png. A study is written to a subfolder study: cells.json (the checkpoint from which a stopped run
-        resumes), study.nc and study.png.
-    material : Material, optional
-        Material of the rod; if given, the rod that suits the load cell is sought among lengths and diameters around
-        the present ones.
-    study : mapping, optional
-        Arguments of `error_map` except `out`; if given, the study is made after the rest has been written.
-    progress : callable, optional
-        Called with the number of steps done, of `steps_of(material)`; a study has a progress of its own.
-    options
-        Options of `sensitivity`.
-
-    Returns
-    -------
-    SensitivityRun
-
-    Raises
-    ------
-    ParameterError, ReachError
-        As in `sensitivity` and `error_map`.
-    StudyError, TaskError
-        As in `error_map`.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     run = sensitivity_into(folder, rng=1, parts=["information"])
-    ...     sorted(path.name for path in run.files.values())
-    ['information.png', 'sensitivity.nc', 'words.txt']
-    """
+    """Analyse the effects of the sensor's errors, and write the results to a folder."""
     rig = rig_of(options.get("rig"))
     if material is not None and (rig.rod is None or rig.load_cell is None):
         raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")

@@ -71,15 +71,7 @@ class WatchUpdate(NamedTuple):
 
 @contextmanager
 def open_watch(out: str | os.PathLike[str], **options: Any) -> Iterator[Watch]:
-    """Open a folder for a `Watch`, and lock it.
-
-    Raises
-    ------
-    ParameterError
-        As in `Watch`.
-    InferenceError
-        If another run is at work there.
-    """
+    """Open a folder for a `Watch`, and lock it."""
     watch = Watch(out, **options)
     with alone_in(watch.folder.path, InferenceError):
         yield watch
@@ -185,13 +177,7 @@ class Watch:
         return 0 if record is None else record.sizes["sample"]
 
     def resume(self, record: xr.Dataset, sha256: str) -> WatchUpdate | None:
-        """Resume the stream in the folder; arguments are those of `take`. Return its answer, None if there is none.
-
-        Raises
-        ------
-        InferenceError
-            As in `Stream.resume`.
-        """
+        """Resume the stream in the folder; arguments are those of `take`. Return its answer, None if there is none."""
         began = perf_counter()
         if not self.state.is_file():
             return None
@@ -208,26 +194,7 @@ class Watch:
         self._stream, self._every = None, 1
 
     def take(self, record: xr.Dataset, sha256: str) -> WatchUpdate | None:
-        """Take the samples that are new into account, and write the stream and its posterior.
-
-        Parameters
-        ----------
-        record : xr.Dataset
-            All samples so far. If they do not begin with those before, or do not continue them in order, all are
-            taken again.
-        sha256 : str
-            Digest of the file.
-
-        Returns
-        -------
-        WatchUpdate or None
-            None if there are no new samples.
-
-        Raises
-        ------
-        RecordError, ParameterError, InferenceError, ReachError
-            As in `Stream.update`. The stream is then as before.
-        """
+        """Take the samples that are new into account, and write the stream and its posterior."""
         began, had = perf_counter(), self.samples
         every = self._stride(record)
         record = _thinned(record, every)
@@ -246,13 +213,7 @@ class Watch:
         return self._update(stream, 0, began, sha256, restarted=restarted)
 
     def finish(self) -> ContourRun:
-        """Write all files of a run for the last answer.
-
-        Raises
-        ------
-        InferenceError
-            If there is none.
-        """
+        """Write all files of a run for the last answer."""
         if self._answer is None:
             raise InferenceError("there is no answer yet: no samples have been taken into account")
         posterior, record = self._answer

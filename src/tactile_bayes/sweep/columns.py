@@ -34,22 +34,7 @@ class ManyUnits(NamedTuple):
 
 
 def sweep_samples(paths: Paths, units: ManyUnits, index: Index) -> dict[str, NDArray[Any]]:
-    """Loads and contacts at the drive angles with which paths were traced.
-
-    Parameters
-    ----------
-    paths : Paths
-        A path for each sweep.
-    units : ManyUnits
-        Units of their rods.
-    index : ndarray of int
-        Indices of sweeps, of any shape.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (*index.shape, k)
-        `SAMPLE_COLUMNS`, and "contact_phase" as numbers (`NONE`, `TIP`, `TANGENTIAL`).
-    """
+    """Loads and contacts at the drive angles with which paths were traced. Returns shape (*index.shape, k)."""
     states, each = paths.sampled_states(index), index[..., None]
     found = to_lab_frame(paths.sweep_frame, each, states, units.of(each))
     for name in CHANNELS:

@@ -24,23 +24,7 @@ class RodUnits(Protocol):
 
 
 def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
-    """Convert states to the laboratory frame, with units.
-
-    Parameters
-    ----------
-    sweep_frame : SweepFrame
-    index : ndarray, broadcastable to shape (...)
-        Indices of the contours.
-    states : States
-        Dimensionless states, shape (...).
-    rod : RodUnits
-        Units of the rod, or of each state's rod; lengths are those of the sweep frame.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (...)
-        Columns by the names of a record; phases as numbers.
-    """
+    """Convert states to the laboratory frame, with units. Shapes: index (...) → (...)."""
     mirrored = sweep_frame.mirrored[index]
     sign = np.where(mirrored, -1.0, 1.0)
     length = sweep_frame.length_at(index)

@@ -305,13 +305,7 @@ def scan(
 
 
 def acting(rig: Rig | None) -> tuple[Rod, float, float]:
-    """Return the rod, the friction and the compliance [rad/(EI/L)] that known deviations give a rig.
-
-    Raises
-    ------
-    ParameterError
-        If a number is known that no sweep has.
-    """
+    """Return the rod, the friction and the compliance [rad/(EI/L)] that known deviations give a rig."""
     rig = rig_of(rig)
     rod, known = rig.known_rod, rig.known
     for name, correction in _NOT_SWEPT.items():

@@ -50,18 +50,7 @@ def fit_of(
     most: float,
     progress: Callable[[int, int], object] = lambda done, count: None,
 ) -> Fit:
-    """Return the shares of samples that fit no contact above the pivot, and a correction where one exceeds `most`.
-
-    Parameters
-    ----------
-    found : Corrected
-        A record with all load channels, and its load cell, with noise of finite variance on each channel.
-    most : float
-        Share above which corrections are tried: other signs, another frame, exchanged forces, friction, another zero or
-        sense of the drive angle.
-    progress : callable
-        Called with the number of corrections that were tried, and their total.
-    """
+    """Return the shares of samples that fit no contact above the pivot, and a correction where one exceeds `most`."""
     record, cell = found.record, found.load_cell
     contacts = contacts_of(found, "constrained")
     share, below, loaded = _shares(contacts)

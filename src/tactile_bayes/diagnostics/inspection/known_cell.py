@@ -16,29 +16,7 @@ CellSource = Literal["given", "data sheet", "unloaded samples", "nothing", "too 
 
 
 def known_cell(measured: xr.Dataset, given: LoadCell | None = None) -> tuple[LoadCell | None, CellSource]:
-    """Return the given load cell, or the record's data sheet, or an estimate from unloaded samples, and its source.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A record.
-    given : LoadCell, optional
-        The sensor, in the record's units.
-
-    Returns
-    -------
-    load_cell : LoadCell or None
-        None for a record without noise, and for one with fewer than 3 unloaded samples.
-    source : {"given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"}
-        "nothing" means unloaded samples without noise, as in an ideal record.
-
-    Examples
-    --------
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> known_cell(scan(paper_profile("II", q=0.5)).record)
-    (None, 'nothing')
-    """
+    """Return the given load cell, or the record's data sheet, or an estimate from unloaded samples, and its source."""
     if given is not None:
         return given, "given"
     stated = LoadCell.from_record(measured)

@@ -70,13 +70,7 @@ def inspection_messages(
 
 
 def quantity(value: float, unit: str) -> str:
-    """Return a value with its unit as text, to three digits, in SI with a prefix.
-
-    Examples
-    --------
-    >>> quantity(0.0125, "N"), quantity(0.0125, "1"), quantity(0.0, "N m")
-    ('12.5 mN', '0.0125', '0 N m')
-    """
+    """Return a value with its unit as text, to three digits, in SI with a prefix."""
     if unit == "1":
         return f"{value:.3g}"
     size, prefix = prefix_of(value)
@@ -84,13 +78,7 @@ def quantity(value: float, unit: str) -> str:
 
 
 def prefix_of(value: float) -> tuple[float, str]:
-    """Return the size of the prefix that suits a value in SI, and the prefix.
-
-    Examples
-    --------
-    >>> prefix_of(-0.0125)
-    (0.001, 'm')
-    """
+    """Return the size of the prefix that suits a value in SI, and the prefix."""
     if not abs(value) > 0.0:  # zero or NaN
         return _PREFIXES[0]
     return next((pair for pair in _PREFIXES if abs(value) >= pair[0]), _PREFIXES[-1])

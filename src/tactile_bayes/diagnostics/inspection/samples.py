@@ -42,21 +42,11 @@ _USUAL = 0.2
 def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step: float, *, false_alarm: float) -> Flags:
     """Flag readings far from their unloaded stretch, or, in contact, from both neighbours on either side.
 
-    Parameters
-    ----------
-    reading : ndarray, shape (n_samples,)
-    sweeps, stretches : list of ndarray
-        Rows of each sweep, and of each of its unloaded stretches.
-    step : float
-        Resolution of the reading, 0 if unlimited; the median deviation may miss half of it, which is added.
-    false_alarm : float
-        Probability that any sample is flagged in white normal noise.
-
-    Notes
-    -----
     The deviation of an unloaded reading from the median, over the median absolute deviation, is compared with a
     quantile of Student's t with the effective degrees of freedom of that estimate. A loaded reading must, in addition,
     lie outside of its four neighbours by twice their range: no slope, kink or snap-off does that.
+
+    Shapes: reading (n_samples,).
     """
     flags = np.zeros(reading.size, dtype=bool)
     residual, spread = centred(reading, stretches)

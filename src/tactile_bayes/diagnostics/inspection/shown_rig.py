@@ -26,13 +26,6 @@ def shown_rig(found: Inspection, rig: Rig) -> Rig:
 
     That is the noise, and zeros that are clearly off and stay where they are: they are added to the columns of the
     file.
-
-    Parameters
-    ----------
-    found : Inspection
-        Inspection of a record that was read with this rig.
-    rig : Rig
-        The rig as it is stated.
     """
     columns = {name: column_entry(found.record[name], added=-zero) for name, zero in _zeros(found)}
     columns = {name: text for name, text in columns.items() if text}
