@@ -59,6 +59,21 @@ def test_it_writes_where_it_is_told_and_the_same_page(folder, tmp_path):
     assert out.read_bytes() == (folder / "report.html").read_bytes()
 
 
+def test_a_contour_is_laid_over_it_and_drawn_beside_the_page(folder, tmp_path):
+    """The file stays as it is where the figure would replace it."""
+    points = tmp_path / "drawn.csv"
+    points.write_text("x,y\n" + "".join(f"{x / 10},0.5\n" for x in range(-5, 6)), encoding="utf-8")
+    result = call(folder, "--overlay", points, "--out", tmp_path / "page.html", "--json")
+    figure = tmp_path / "overlay.png"
+    assert json.loads(result.stdout)["overlay"] == str(figure)
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert "drawn.csv" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    points.replace(figure)
+    before = figure.read_bytes()
+    assert call(folder, "--overlay", figure, "--out", tmp_path / "page.html").exit_code != 0
+    assert figure.read_bytes() == before
+
+
 def test_json_for_scripts(folder, tmp_path, monkeypatch):
     out = tmp_path / "page.html"
 

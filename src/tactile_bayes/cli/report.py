@@ -10,6 +10,7 @@ import typer
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Output, Reads, Writes
 from tactile_bayes.cli.task_bar import step_bar
+from tactile_bayes.runs.names import OVERLAY
 
 __all__ = ["report"]
 
@@ -52,6 +53,8 @@ def report(
         from tactile_bayes.report import write_report
 
         path = write_report(run, out, compare=compare, overlay=overlay, progress=show)
-    size = path.stat().st_size
+    size, figure = path.stat().st_size, path.with_name(OVERLAY)
+    is_one = len(run) == 1 and (run[0] / "posterior.nc").exists()
+    drawn = {"overlay": figure} if overlay is not None and is_one else {}
     words = str(path) if output.quiet else f"{path} ({size / 1e3:.0f} kB): open it in a browser; it needs no network."
-    return Answer([words], lambda: {"report": path, "bytes": size})
+    return Answer([words, drawn] if drawn else [words], lambda: {"report": path, "bytes": size, **drawn})

@@ -2,18 +2,44 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.report.drawing import Plot
 from tactile_bayes.report.wording import Shown, Table, percent, shown_as
+from tactile_bayes.tasks import write_atomically
 from tactile_bayes.uncertainty.overlay import Distance, Overlay, overlay_distance
 
-__all__ = ["DISTANCE_HEADS", "distance_cells", "note_of", "overlay_table", "put_overlay", "put_overlay_band"]
+__all__ = [
+    "DISTANCE_HEADS",
+    "distance_cells",
+    "draw_overlay",
+    "note_of",
+    "overlay_table",
+    "put_overlay",
+    "put_overlay_band",
+]
 
 DISTANCE_HEADS = ["rms distance{}", "largest{}", "inside the band"]
 """Heads of `distance_cells`, with places for the unit."""
+
+
+def draw_overlay(name: str, band: xr.Dataset, contacts: xr.Dataset | None, overlay: Overlay, path: Path) -> None:
+    """Write a figure of a run's band and another contour: above as they are, below the heights over that contour."""
+    from tactile_bayes.plotting import overlaid
+    from tactile_bayes.plotting.style import own_style, save_figure
+    from tactile_bayes.runs.folder import panels
+
+    points = {} if contacts is None else {name: contacts}
+    with own_style():
+        (above,), (below,) = panels(2, 1, 7.0, 7.0)
+        overlaid({name: band}, contacts=points, overlay=overlay, ax=above)
+        overlaid({name: band}, overlay=overlay, enlarged=True, ax=below)
+        with write_atomically(path) as temporary:
+            save_figure(above.figure, temporary, "png")
 
 
 def put_overlay(plot: Plot, overlay: Overlay) -> None:

@@ -16,9 +16,10 @@ from markupsafe import Markup
 from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.report.findings import FINDING_STEPS, findings_of
+from tactile_bayes.report.overlay import draw_overlay
 from tactile_bayes.report.page import page_of
 from tactile_bayes.report.runs_page import folders_of, runs_page_of
-from tactile_bayes.runs.names import MANY
+from tactile_bayes.runs.names import MANY, OVERLAY
 from tactile_bayes.tasks import refuse_replacing, write_atomically
 
 __all__ = ["rendered", "write_report"]
@@ -53,7 +54,8 @@ def write_report(
         default `run`, if it holds a comparison that states its record. For one run alone.
     overlay : path-like, optional
         Folder of another run, or points of a contour in the laboratory frame of the record, CSV or DXF
-        (`tactile_bayes.record.read_points`): it is drawn over the contour, and its distance is in a table.
+        (`tactile_bayes.record.read_points`): it is drawn over the contour, and its distance is in a table. Of one run,
+        overlay.png beside the page shows both.
     progress : callable, optional
         Called with the number of steps done and their total.
 
@@ -89,12 +91,15 @@ def write_report(
     sources = [each / name for each in (*runs, *folders) for name in ("posterior.nc", "trust.nc", MANY[1])]
     sources += [(compared or folders[0]) / "comparison.nc"]
     sources += [] if other is None else [other / "posterior.nc" if other.is_dir() else other]
-    refuse_replacing([path], [source for source in sources if source.exists()])
+    figure = path.with_name(OVERLAY)
+    refuse_replacing([path, figure] if other is not None else [path], [source for source in sources if source.exists()])
     count = (FINDING_STEPS if one is not None else len(runs)) + 1
     report = progress or (lambda done, count: None)
     if one is not None:
         findings = findings_of(one, compared, lambda done: report(done, count), other)
         text = _rendered(page_of(findings, one.resolve().name))
+        if findings.overlay is not None:
+            draw_overlay(one.resolve().name, findings.band, findings.contacts, findings.overlay, figure)
     else:
         name = ", ".join(folder.resolve().name for folder in folders)
         text = rendered("runs.html.jinja", **runs_page_of(runs, path, name, other, lambda done: report(done, count)))

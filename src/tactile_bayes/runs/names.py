@@ -13,6 +13,7 @@ __all__ = [
     "INSPECTION",
     "MANY",
     "OF_POSTERIOR",
+    "OVERLAY",
     "RECONSTRUCTION",
     "RIG",
     "SENSITIVITY",
@@ -37,7 +38,8 @@ INFERENCE = (
     "pairs.png",
 )
 TRUST = ("trust.nc", "trust.txt", "assumptions.png")
-OF_POSTERIOR = ("report.html", *TRUST, "trust/replicates.json", "trust/alternatives.json")
+OVERLAY = "overlay.png"
+OF_POSTERIOR = ("report.html", OVERLAY, *TRUST, "trust/replicates.json", "trust/alternatives.json")
 """Files of other commands that belong to the posterior of a folder."""
 
 WATCH_PAGE = "watch.html"
