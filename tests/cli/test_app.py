@@ -299,7 +299,7 @@ def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, opt
     [
         ('missing = ["force_z"]', "'force_z' is no channel; the channels are holding_moment, force_x, force_y"),
         ('missing = ["force_x"]', "column 'force_x' has values, but is declared missing"),
-        ('force = "Fx"', "[file] has no entry 'force': did you mean 'force_"),
+        ('force = "Fx"', "there is no key 'file.force': did you mean 'force_"),
         ('force_x = "Fx[mN]"', "there is no column 'Fx', which is given for 'force_x' (columns: sweep, "),
         ('force_x = "force_x[mm]"', "column 'force_x' is in [N], but [mm] is given for it"),
         ("split_sweeps = true", "column 'sweep' is there already: do without split_sweeps, or remove the column"),

@@ -393,8 +393,10 @@ def _rod_and_sweep_calls() -> dict[str, Call]:
 def _record_calls(folder: Path) -> dict[str, Call]:
     file = folder / "good.csv"
     tb.write_record(ideal(), file)
-    posterior_file = folder / "posterior.nc"
+    posterior_file, points = folder / "posterior.nc", folder / "points.csv"
     tb.write_result(posterior(), posterior_file)
+    points.write_text("x,y\n-0.3,0.6\n0.3,0.6\n", encoding="utf-8")
+    line = tb.contours.Polyline([[(-0.3, 0.6), (0.3, 0.6)]])
     columns = {
         name: measured()[name].values for name in ("sweep", "direction", "drive_angle", "holding_moment", "force_x")
     }
@@ -404,6 +406,17 @@ def _record_calls(folder: Path) -> dict[str, Call]:
         ),
         "read_record": Call(tb.read_record, {"path": file, "rig": None}),
         "write_record": Call(tb.write_record, {"record": ideal(), "path": folder / "out.csv"}),
+        "read_points": Call(tb.record.read_points, {"path": points}),
+        "read_overlay": Call(
+            tb.uncertainty.read_overlay, {"path": points, "posterior": posterior(), "probability": 0.9}
+        ),
+        "Overlay": Call(
+            tb.uncertainty.Overlay, {"name": "line", "polyline": line, "band": band(), "is_unit_assumed": False}
+        ),
+        "Overlay.of_band": Call(tb.uncertainty.Overlay.of_band, {"name": "band", "band": band()}),
+        "overlay_distance": Call(
+            tb.uncertainty.overlay_distance, {"band": band(), "overlay": tb.uncertainty.Overlay("line", line)}
+        ),
         "in_frame": Call(tb.record.in_frame, {"record": measured(), "frame": "turning"}),
         "inspect_record": Call(
             tb.inspect_record,

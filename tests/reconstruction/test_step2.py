@@ -276,9 +276,9 @@ def test_a_rod_in_si_does_not_fit_a_dimensionless_record(swept):
 
 def test_a_carried_rod_that_slides_the_other_way_is_found():
     """Its flank slides against the sense of its side; the posterior of contacts has the same sense."""
-    drive = tb.Motion([-1.2, 1.2], [-0.36735194, 0.06182908], [0.52707784, 1.35185622])
+    drive = tb.Motion([-1.2, 1.2], [-0.36735194, 0.06182908], [0.52707784, 1.35185622], drive_step=0.08)
     rig = Rig(load_cell=LoadCell(force_noise=1e-4, moment_noise=1e-4), unknown={"friction": 0.0343})
-    record = tb.scan(Parabola(0.15874053, 0.28976189, 0.19207482), rig, drive=drive, drive_step=0.08).record
+    record = tb.scan(Parabola(0.15874053, 0.28976189, 0.19207482), rig, drive=drive).record
     lying = np.flatnonzero(record.truth_contact_phase.values == "tangential")
     assert lying.size
     measured = rig.load_cell.measure(record, rng=1)

@@ -97,7 +97,7 @@ def test_a_scan_that_is_read_is_what_inference_expects(name, length):
     rod, cell, contour, bases, known = scaled(length or 1.0, 1.0 if length is None else 2e-4)
     said = {**NOTHING, **(known if name == "all" else {name: known[name]})}
     rig = Rig(rod if length else replace(ROD), cell, said)
-    swept = scan(contour, rig, base=bases, drive_step=0.1)
+    swept = scan(contour, rig, drive=[Rotation(base, drive_step=0.1) for base in bases])
     record = rig.measure(swept.record, rng=1)
     assert record.attrs["units"] == ("SI" if length else "dimensionless")
     np.testing.assert_allclose(bases_of(record), bases, rtol=0, atol=1e-15)
@@ -158,7 +158,9 @@ def test_a_plan_has_known_numbers():
     rod, cell, contour, bases, known = scaled(0.1, 2e-4)
     noises = {"force_noise": 0.05 * rod.force_unit, "moment_noise": 0.02 * rod.moment_unit}
     said = {**NOTHING, **{n: v for n, v in known.items() if n not in ("noise_scale",)}}
-    plan = Plan(contour, Rig(rod, replace(cell, **noises), said), base=bases, drive_step=0.1)
+    plan = Plan(
+        contour, Rig(rod, replace(cell, **noises), said), drive=[Rotation(base, drive_step=0.1) for base in bases]
+    )
     should = expected(plan.record, plan.rig, contour)
     readings = np.stack([plan.record[channel].values for channel in CHANNELS], axis=1)
     largest = np.abs(should).max(axis=0)

@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.calibration.ranks import expected_shares, simultaneous_band
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import AxesArray, check_dataset, check_drawing, check_panels, new_panels, write_instead
 from tactile_bayes.plotting.labels import number, percent
@@ -232,6 +231,8 @@ def _ranks_of(name: str, ranks: Any, top: int, p_value: float, level: float) -> 
     if not ranks.size:
         return _Ranks(name, 0, p_value, nothing, nothing, nothing, "")
     shares = np.cumsum(np.bincount(ranks, minlength=top + 1))[:top] / ranks.size
+    from tactile_bayes.calibration.ranks import expected_shares, simultaneous_band  # loads the sampler
+
     low, high = simultaneous_band(ranks.size, top, _BAND)
     leaves = bool(np.any((shares < low) | (shares > high)))
     # At the last rank both distribution functions are 1.

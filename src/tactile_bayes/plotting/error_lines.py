@@ -69,7 +69,7 @@ def error_map(
     --------
     >>> from matplotlib.figure import Figure
     >>> from tactile_bayes.planning import error_map as error_map_of
-    >>> study = error_map_of(["II"], noise_factors=[0.1, 1.0], replicates=1, rng=1, workers=1)
+    >>> study = error_map_of(["II"], over={"noise_factor": [0.1, 1.0]}, replicates=1, rng=1, workers=1)
     >>> error_map(study, ax=Figure().subplots()).get_ylabel()
     'RMS error across the contour [$L$]'
     """

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.comparison.verdict import NONE_FITS
 from tactile_bayes.plotting.axes import AxesArray, check_dataset, check_panels, new_panels
 from tactile_bayes.plotting.labels import number, show_numbers
 from tactile_bayes.plotting.legends import legend
@@ -174,6 +173,8 @@ def _write_verdict(panels: AxesArray, comparison: xr.Dataset) -> None:
     """Write the verdict above the panels, from the left edge of the first one."""
     words, style, letters = str(comparison.attrs["verdict"]), {"fontsize": "medium"}, 10.5
     if not comparison["fits"].any():
+        from tactile_bayes.comparison.verdict import NONE_FITS  # loads the sampler
+
         words, letters = NONE_FITS, 6.5
         style = {"fontsize": "x-large", "fontweight": "bold", "color": _WARNING}
     width = float(panels[0].figure.get_figwidth())

@@ -17,10 +17,11 @@ from tactile_bayes.plotting.labels import LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entries
 from tactile_bayes.plotting.maps import finish_map
 from tactile_bayes.plotting.marks import BASES, TRUTH
-from tactile_bayes.uncertainty.overlay import Overlay
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from tactile_bayes.uncertainty.overlay import Overlay
 
 __all__ = ["overlaid"]
 
@@ -65,6 +66,8 @@ def overlaid(
     >>> overlaid({"one": band, "two": band + 0.05}, enlarged=True).get_ylabel()
     '$y$ − one [$L$]'
     """
+    from tactile_bayes.uncertainty.overlay import Overlay  # loads the sampler
+
     check_drawing(ax)
     check_switch("enlarged", enlarged)
     check_optional("overlay", overlay, Overlay, "give what read_overlay returned")

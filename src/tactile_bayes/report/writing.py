@@ -98,7 +98,7 @@ def write_report(
     if one is not None:
         findings = findings_of(one, compared, lambda done: report(done, count), other)
         text = _rendered(page_of(findings, one.resolve().name))
-        if findings.overlay is not None:
+        if other is not None and findings.overlay is not None:
             draw_overlay(one.resolve().name, findings.band, findings.contacts, findings.overlay, figure)
     else:
         name = ", ".join(folder.resolve().name for folder in folders)

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_kind, check_optional, check_path, check_switch
+from tactile_bayes.checks import check_kind, check_optional, check_path, check_probability, check_switch
 from tactile_bayes.contours.polyline import Polyline
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import read_result
@@ -107,6 +107,7 @@ def read_overlay(path: str | os.PathLike[str], posterior: xr.DataTree, probabili
         If the folder holds no run.
     """
     given = check_path("path", path, "give the folder of a run, or a file, like 'points.csv' or 'part.dxf'")
+    check_probability("probability", probability)
     check_kind("posterior", posterior, xr.DataTree, "give what infer_contour returned")
     unit = length_unit(posterior)["units"]
     if not given.is_dir():
