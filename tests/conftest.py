@@ -5,6 +5,7 @@ import os
 import re
 import signal
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from tactile_bayes.sweep import Translation, scan
 
 os.environ["MPLBACKEND"] = "Agg"  # figures need no screen
 
-settings.register_profile("few", max_examples=15, derandomize=True)
+settings.register_profile("few", max_examples=8, derandomize=True)
 
 
 def pytest_configure(config):
@@ -52,13 +53,18 @@ SAMPLING = re.compile(
 )
 """Calls that take a second or more."""
 
-OWN_EXAMPLES = ("inference.contour.infer_contour", "planning.design.design")
+OWN_EXAMPLES = "inference.contour.infer_contour"
+
+LONG = frozenset(Path(__file__).with_name("long_cases.txt").read_text(encoding="utf-8").splitlines()[1:])
+"""Tests and cases that take a second or more, beside which others alike are quick."""
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Examples of docstrings that sample a posterior or plan are slow, but for those of two functions themselves."""
+    """Long cases are slow, and so are examples of docstrings that sample a posterior or plan, but for one."""
     for item in items:
+        if item.nodeid in LONG:
+            item.add_marker("slow")
         if isinstance(item, pytest.DoctestItem) and not item.name.endswith(OWN_EXAMPLES):
             source = "".join(example.source for example in item.dtest.examples)
             if SAMPLING.search(source):
