@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -164,7 +165,10 @@ def test_known_errors_of_a_rig_are_those_of_its_load_cell(ideal, tmp_path, rig_f
     )
     told("measure", ideal[0], "--rig", rig, "--out", tmp_path / "m.csv")
     cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.0, 0.3, 0.0), lever=(0.0, 0.01))
-    assert tb.LoadCell.from_record(tb.read_record(tmp_path / "m.csv")) == cell
+    record, read = tb.read_record(tmp_path / "m.csv"), cell.measure(tb.read_record(ideal[0]), rng=1)
+    assert tb.LoadCell.from_record(record) == replace(cell, bias=(0.0, 0.0, 0.0), lever=(0.0, 0.0))
+    for name in ("holding_moment", "force_x", "force_y"):
+        np.testing.assert_allclose(record[name], read[name], rtol=0, atol=1e-12)
 
 
 def test_a_record_that_states_no_load_cell_is_taken_to_be_ideal(ideal, tmp_path):
@@ -244,3 +248,21 @@ def test_a_record_is_not_measured_twice(ideal, tmp_path):
     result = call("measure", tmp_path / "m.csv", *noise, "--out", tmp_path / "mm.csv")
     assert_refused(result, "m.csv has been measured already (its header states a load cell)")
     assert not (tmp_path / "mm.csv").exists()
+
+
+def test_a_measured_scan_states_the_data_sheets_and_deviates_once(tmp_path, rig_file):
+    """As `Rig.measure`: a rod that is stiffer than stated makes larger loads, and the file does not say so."""
+    text = "[rod]\nlength = 0.2\nflexural_rigidity = 0.0024\n[load_cell]\nforce_noise = 1e-6\nmoment_noise = 1e-6\n"
+    rig = rig_file(text + "[unknown]\nrigidity_scale = 1.1\nlever_x = 1e-3\n")
+    ideal, file = tmp_path / "ideal.csv", tmp_path / "measured.csv"
+    assert call("scan", "--rig", rig, "--drive-step", "6", "--out", ideal).exit_code == 0
+    assert call("measure", ideal, "--rig", rig, "--out", file).exit_code == 0
+    stated, exact, record = tb.Rig.read(rig), tb.read_record(ideal), tb.read_record(file)
+    assert record.attrs["rod_flexural_rigidity"] == 0.0024
+    assert {n for n in record.attrs if n.startswith("load_cell_")} == {
+        "load_cell_frame", "load_cell_force_noise", "load_cell_moment_noise",
+    }  # fmt: skip
+    np.testing.assert_allclose(record.force_y, exact.force_y, rtol=0, atol=1e-5)
+    again = stated.measure(exact, rng=1)
+    np.testing.assert_allclose(record.holding_moment, again.holding_moment, rtol=0, atol=1e-15)
+    assert call("reconstruct", file, "--rig", rig, "--out", tmp_path / "contacts").exit_code == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,15 +34,17 @@ def measure(
 ) -> Answer:
     """Measure an ideal record with a real load cell: noise, bias, drift, gain, lever, range, resolution and encoder.
 
-    The cell is that of rig.toml, [load_cell], with the errors that are known, [unknown]. A record whose header states a
-    load cell is refused, since it would have noise twice; a record without one is assumed to be ideal.
+    The cell is that of rig.toml, [load_cell], with the errors that are known, [unknown]; the file states the data
+    sheets alone, as one from a laboratory does. A record whose header states a load cell is refused, since it would
+    have noise twice; a record without one is assumed to be ideal.
     """
     refuse_other_suffix(out)
     from tactile_bayes.errors import ParameterError
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.record import write_record
     from tactile_bayes.rig import read_record
-    from tactile_bayes.rig.corrected import corrected
+    from tactile_bayes.rig.parameters import GROUPS
+    from tactile_bayes.rig.stated import cell_with
 
     stated = rig.stated
     cell = noise.in_place_of(stated.load_cell) or LoadCell()
@@ -52,14 +55,14 @@ def measure(
                 f"{record} has been measured already (its header states a load cell), and would have noise twice: "
                 "give the ideal record, as scan writes it"
             )
-        cell = corrected(ideal, cell, stated.known).load_cell
-        if not cell.entries():
+        drifts = [stated.known.get(name, 0.0) for name in GROUPS["drift"]]
+        if not cell_with(cell, stated.known).entries() and not any(drifts):
             raise ParameterError(
                 "this load cell is ideal, and changes nothing: state a flaw of it under [load_cell] of rig.toml, or "
                 "give --force-noise 0.05 --moment-noise 0.02"
             )
         show(1, 2)
-        measured = cell.measure(ideal, rng=seed)
+        measured = replace(stated, load_cell=cell).measure(ideal, rng=seed)
         if not keep_truth:
             measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
         out.parent.mkdir(parents=True, exist_ok=True)

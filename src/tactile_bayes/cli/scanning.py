@@ -57,12 +57,13 @@ def scan(
     if figure is not None:
         refuse_other_suffix(figure, (".png", ".pdf", ".svg"), "a figure")
     with step_bar(output.is_silent) as show:
+        from tactile_bayes.mechanics.rods.rod import Rod
         from tactile_bayes.record import write_record
         from tactile_bayes.sweep import scan as sweep
 
         stated = rig.stated
         rod = stated.known_rod
-        made = sweep(choice.contour(rod), stated, drive=drive.drives(base, direction))
+        made = sweep(choice.contour(stated.rod or Rod()), stated, drive=drive.drives(base, direction))
         show(1, 3 if figure else 2)
         out.parent.mkdir(parents=True, exist_ok=True)
         write_record(made.record, out)

@@ -231,7 +231,9 @@ def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
     wanted = readings[-1].column or text
     near = nearest(wanted, names)
     hint = f"did you mean {near!r}?" if near else "write NAME[UNIT], with a minus before it for the opposite sign"
-    if target in CONSTANTS:
+    if target in names:
+        hint = f"the file has a column {target!r} already: leave this entry of [file] out for it"
+    elif target in CONSTANTS:
         hint += f" (or one value for all samples, like {_example(column)})"
     raise source.error(
         f"there is no column {wanted!r}{look_alikes(wanted)}, which is given for {target!r} (columns: "

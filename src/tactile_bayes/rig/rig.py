@@ -17,6 +17,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng
+from tactile_bayes.record import rod_of, validate
 from tactile_bayes.rig.drawn import drawn_numbers
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.measured import measured_by
@@ -202,7 +203,8 @@ class Rig:
 
         The deviations that are numbers act: lever, gains, curve, zeros and drifts of the load cell, the factor on its
         noise, and offset and backlash of the encoder. The record states rod, load cell and pivots of the data sheets,
-        as one from a laboratory does, and the truth in columns that begin with "truth_".
+        as one from a laboratory does (the rod of the record, if the rig has none), and the truth in columns that begin
+        with "truth_".
 
         Parameters
         ----------
@@ -228,7 +230,10 @@ class Rig:
         >>> record.attrs["units"], record.attrs["load_cell_force_noise"]
         ('dimensionless', 0.05)
         """
-        return measured_by(self.rod, self.load_cell or LoadCell(), self.known, record, rng)
+        rod = self.rod
+        if rod is None and (of_record := rod_of(validate(record))) != self.known_rod:
+            rod = of_record
+        return measured_by(rod, self.load_cell or LoadCell(), self.known, record, rng)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Rig:

@@ -217,8 +217,10 @@ def scan(
     rig : Rig, optional
         Its rod, by default the dimensionless one, with the deviations that are known; a rod with a diameter touches
         with its surface. What is not known is as stated, without friction, which is at most 0.84. Errors of load cell
-        and encoder change no load: `Rig.measure` applies them. With friction, a rod that turns about a
-        pivot and is curved toward the object sticks at first, which is not modelled: these samples are left out
+        and encoder change no load: `Rig.measure` applies them. The record states the rod with these deviations, so that
+        one without a length whose stiffness or length deviates makes it SI, of a rod of about 1 m; `Rig.measure` states
+        the data sheets again, and `LoadCell.measure` does not. With friction, a rod that turns about a pivot and is
+        curved toward the object sticks at first, which is not modelled: these samples are left out
         (`SweepEvents.slides_from`).
     drive : Rotation, Translation or Motion, or a sequence of them, optional
         Path of the base. The sweeps of several drives (a support that is moved, or an array of whiskers) are numbered
