@@ -87,7 +87,7 @@ def test_it_follows_a_file_and_ends_with_the_answer_of_a_run(path, lines, follow
     assert said[2].startswith("100 samples, 40 new")
     assert said[4].startswith("130 samples, 30 new")
     assert said[6] == "Ended after 130 samples: no new rows for 0 s."
-    assert said[8].startswith("All is well: the particles have lost their places")
+    assert said[8].startswith("All is well: the particles no longer depend on where they began")
     folder = path.parent / "run"
     assert {"stream.nc", "posterior.nc", "band.csv", "summary.txt", "watch.html"} <= set(os.listdir(folder))
     posterior = read_result(folder / "posterior.nc")

@@ -146,7 +146,7 @@ def verdicts(
     against += _cut_off_message(posterior)
     if check is not None and check.attrs["suggestion"]:
         against.append(check.attrs["suggestion"])
-    drawn = "particles have lost their places" if is_streamed(posterior.attrs) else "ensembles agree"
+    drawn = "particles no longer depend on where they began" if is_streamed(posterior.attrs) else "ensembles agree"
     if not_checked and posterior.attrs["converged"]:
         but = "" if against else f"The {drawn}, but this does not say that the result is right. "
         against.append(f"{but}The record was NOT CHECKED against the predictions of the posterior: {not_checked}.")
