@@ -195,7 +195,8 @@ def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
         pieces = read_points(path).in_unit("m", str(path))
         if len(pieces) > 1:
             raise ParameterError(f"{path} has {len(pieces)} curves: give the rod's shape as one")
-        return Rod.from_shape(*pieces[0].T, numbers.pop("flexural_rigidity"), **numbers)
+        x, y = pieces[0].T
+        return Rod.from_shape(x, y, numbers.pop("flexural_rigidity"), **numbers)
     if ("length" in numbers) != ("flexural_rigidity" in numbers):
         raise ParameterError(
             "[rod] needs length and flexural_rigidity (or youngs_modulus and diameter) together; without them the rig "
