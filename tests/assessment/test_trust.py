@@ -30,6 +30,19 @@ def test_a_record_of_the_model_holds_and_says_so():
     assert found["lower"].equals(band["lower"].drop_attrs(deep=False)) or np.allclose(found["lower"], band["lower"])
 
 
+def test_a_posterior_that_has_not_converged_is_judged_without_replicates_and_assumptions(monkeypatch, tmp_path):
+    for name in ("posterior_calibration", "band_by_assumption"):
+        monkeypatch.setattr(f"tactile_bayes.assessment.trust.{name}", None)
+    tree = posterior().copy()
+    tree.attrs = {**tree.attrs, "converged": 0}
+    found = trust(tree, rng=1, out=tmp_path)
+    assert found.attrs["conclusion"] == "do not rely on it"
+    assert "the ensembles have not converged" in found.attrs["summary"]
+    assert "left out" in found.attrs["words"].splitlines()[-1]
+    assert found.attrs["replicates"] == 0
+    assert not {"assumption", "claim"} & set(found.dims)
+
+
 @pytest.mark.slow
 def test_a_wrong_family_is_not_to_be_relied_on():
     record = CELL.measure(swept(tb.contours.paper_profile("III", q=0.5)), rng=2)

@@ -11,8 +11,13 @@ from helpers import commands
 from helpers.report_pages import Page, analysed_quickly, coarse_record
 from tactile_bayes.cli import report as report_command
 from tactile_bayes.cli.command import Output
+from tactile_bayes.inference.result import read_result
 from tactile_bayes.record import write_record
+from tactile_bayes.report.overlay import Laid
+from tactile_bayes.report.writing import Written
 from tactile_bayes.rig import Rig
+from tactile_bayes.uncertainty import contour_band, overlay_distance, read_overlay
+from tactile_bayes.uncertainty.summary import reach
 
 call = partial(commands.call, "report")
 
@@ -65,7 +70,17 @@ def test_a_contour_is_laid_over_it_and_drawn_beside_the_page(folder, tmp_path):
     points.write_text("x,y\n" + "".join(f"{x / 10},0.5\n" for x in range(-5, 6)), encoding="utf-8")
     result = call(folder, "--overlay", points, "--out", tmp_path / "page.html", "--json")
     figure = tmp_path / "overlay.png"
-    assert json.loads(result.stdout)["overlay"] == str(figure)
+    said = json.loads(result.stdout)["overlay"]
+    assert said["figure"] == str(figure)
+    posterior = read_result(folder / "posterior.nc")
+    band = contour_band(posterior, reach(posterior), 0.95)
+    exact = overlay_distance(band, read_overlay(points, posterior))
+    assert said["distances"][folder.name] == pytest.approx(exact._asdict())
+    assert said["unit"] == band["x"].attrs["units"]
+    lines = call(folder, "--overlay", points, "--out", tmp_path / "page.html").stdout.splitlines()
+    assert lines[1].startswith(f"{folder.name} from drawn.csv: rms distance ")
+    assert lines[1].endswith("inside the band")
+    assert f"{1e3 * exact.largest:.3g} [mm]" in lines[1]
     assert figure.read_bytes().startswith(b"\x89PNG")
     assert "drawn.csv" in (tmp_path / "page.html").read_text(encoding="utf-8")
     points.replace(figure)
@@ -77,12 +92,12 @@ def test_a_contour_is_laid_over_it_and_drawn_beside_the_page(folder, tmp_path):
 def test_json_for_scripts(folder, tmp_path, monkeypatch):
     out = tmp_path / "page.html"
 
-    def write(run, path, **options):
+    def write(run, path, *options):
         assert run == [folder]
         path.write_text("a page", encoding="utf-8")
-        return path
+        return Written(path, Laid("", {}), None)
 
-    monkeypatch.setattr("tactile_bayes.report.write_report", write)
+    monkeypatch.setattr("tactile_bayes.report.writing.report_into", write)
     result = call(folder, "--out", out, "--json")
     assert json.loads(result.stdout) == {"report": str(out), "bytes": out.stat().st_size}
     assert get_type_hints(report_command.report)["output"] is Output

@@ -197,6 +197,21 @@ def test_a_shape_is_found_beside_the_file(tmp_path, monkeypatch):
         read(folder / "rig.toml", '[rod]\nshape = "other.csv"\nflexural_rigidity = 1e-5\n')
 
 
+@pytest.mark.parametrize("unit", ["mm", "cm"])
+def test_a_shape_has_the_unit_in_its_names(tmp_path, unit):
+    scale = {"mm": 1e-3, "cm": 1e-2}[unit]
+    points = np.column_stack([0.1 * S, 0.02 * S**2])
+    lines = "".join(f"{x!r},{y!r}\n" for x, y in (points / scale).tolist())
+    (tmp_path / "shape.csv").write_text(f"x [{unit}],y [{unit}]\n{lines}", encoding="utf-8")
+    text = '[rod]\nshape = "shape.csv"\nflexural_rigidity = 1e-5\n'
+    found = read(tmp_path / "rig.toml", text).rod
+    assert found.length == pytest.approx(RODS["traced"].length, rel=1e-12)
+    assert not found.is_dimensionless
+    (tmp_path / "shape.csv").write_text(f"x [L],y [L]\n{lines}", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"shape\.csv is in rod lengths"):
+        read(tmp_path / "rig.toml", text)
+
+
 def test_a_rig_without_a_rod_in_metres_has_no_units(tmp_path):
     plain = read(
         tmp_path / "rig.toml", '[load_cell]\nforce_noise = 0.05\nmoment_noise = 0.02\n[unknown]\nbacklash = "1 deg"'

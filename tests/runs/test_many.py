@@ -1,13 +1,18 @@
 """Many records of one rig: a folder of a run for each, and one table of all."""
 
+import shutil
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import xarray as xr
 
 from helpers.refusals import refused
 from helpers.report_pages import FEW, coarse_record
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.record import write_record
+from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs import contour, many
 from tactile_bayes.runs.contour import analyse
@@ -67,19 +72,81 @@ def test_what_is_done_is_not_made_again_and_records_may_be_added(made, records, 
     again = many.infer_contours(records, STATED, out=out, **OPTIONS)
     assert seen == ["broken.csv"]  # what failed is tried again
     assert again["median"].sel(record="one").equals(table["median"].sel(record="one"))
+
+
+def _files(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    ("rig", "other", "said"),
+    [
+        (STATED, {"rng": 4}, "seed is"),
+        (Rig(unknown={"lever": 0.0}), {}, "rig is"),
+        (STATED, {"family": "circle"}, "family is"),
+        (STATED, {"probability": 0.9}, "probability is 0.95 there and 0.9 here"),
+        (STATED, {"settings": replace(FEW, max_steps=FEW.max_steps + 1)}, "settings is"),
+    ],
+)
+def test_a_run_that_was_made_otherwise_is_not_replaced(made, records, rig, other, said):
+    _, out = made
+    before = _files(out)
+    with refused(ParameterError, str(out / "one"), said, "--out", "remove"):
+        many.infer_contours(records / "one.csv", rig, out=out, **(OPTIONS | other))
+    assert _files(out) == before
+
+
+@pytest.fixture
+def added(made, tmp_path):
+    """A copy of the runs, and a new record with the name of one of them."""
+    out = shutil.copytree(made[1], tmp_path / "runs")
+    (tmp_path / "later").mkdir()
+    write_record(coarse_record().isel(sample=slice(2, None)), tmp_path / "later" / "one.csv")
+    return out, tmp_path / "later" / "one.csv"
+
+
+def test_a_later_call_adds_to_the_table_and_renames_nothing(made, records, added, monkeypatch):
+    out, later = added
+    row = {"error": "", "seconds": 1.0, "verdict": "All is well."}
+    seen = []
+    monkeypatch.setattr(many, "_analysed", lambda task: seen.append(task.out.name) or row)
+    table = many.infer_contours(later, STATED, out=out, **OPTIONS)
+    assert seen == ["later-one"]
+    assert sorted(table.record.values) == ["broken", "later-one", "one", "two"]
+    kept = table.sel(record=["one", "two"])
+    for name in ("median", "verdict", "seconds", "band_width"):
+        assert np.array_equal(kept[name].values, made[0].sel(record=["one", "two"])[name].values)
+    assert read_netcdf(out / "runs.nc", xr.open_dataset, ValueError).equals(table)
+    assert len((out / "runs.csv").read_text(encoding="utf-8").splitlines()) == 5
     seen.clear()
-    many.infer_contours(records / "one.csv", STATED, out=out, **(OPTIONS | {"rng": 4}))
-    many.infer_contours(records / "one.csv", Rig(unknown={"lever": 0.0}), out=out, **OPTIONS)
-    assert seen == ["one.csv", "one.csv"]
+    again = many.infer_contours([records / "one.csv", later], STATED, out=out, **OPTIONS)
+    assert seen == ["later-one"]  # its run has not been written
+    assert sorted(again.record.values) == sorted(table.record.values)
 
 
-def test_names_that_are_the_same_take_those_of_their_folders(records, tmp_path):
+def test_a_run_that_was_made_alone_keeps_its_folder(made, added, records, monkeypatch):
+    out, _ = added
+    (out / "one" / many.ROW).unlink()
+    seen = []
+    monkeypatch.setattr(many, "_analysed", lambda task: seen.append(task.out.name) or {"error": "x", "seconds": 0.0})
+    many.infer_contours(records / "one.csv", STATED, out=out, **OPTIONS)
+    assert seen == [f"{records.name}-one"]
+
+
+def test_a_table_that_is_none_is_refused(records, tmp_path):
+    (tmp_path / "runs.nc").write_bytes(b"no table")
+    with refused(ParameterError, "runs.nc", "remove it"):
+        many.infer_contours(records / "one.csv", STATED, out=tmp_path, **OPTIONS)
+
+
+def test_names_that_are_the_same_take_those_of_their_folders(records, made, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "one.csv").write_bytes((records / "one.csv").read_bytes())
-    assert many._names([tmp_path / "a" / "one.csv", tmp_path / "b" / "one.csv"]) == ["a-one", "b-one"]
+    assert many._names([tmp_path / "a" / "one.csv", tmp_path / "b" / "one.csv"], tmp_path) == ["a-one", "b-one"]
+    assert many._names([tmp_path / "a" / "one.csv", tmp_path / "b" / "one.csv"], made[1]) == ["one", "b-one"]
     with refused(ParameterError, "a-one", "rename"):
-        many._names([tmp_path / "a" / "one.csv", tmp_path / "a" / "one.csv"])
+        many._names([tmp_path / "a" / "one.csv", tmp_path / "a" / "one.csv"], tmp_path)
 
 
 def test_a_record_is_not_replaced(records):

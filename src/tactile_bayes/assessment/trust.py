@@ -16,7 +16,7 @@ from tactile_bayes.assessment.posterior_calibration import posterior_calibration
 from tactile_bayes.assessment.prior_sensitivity import prior_sensitivity
 from tactile_bayes.assessment.sampling_error import sampling_error
 from tactile_bayes.assessment.split_prediction import split_prediction
-from tactile_bayes.assessment.wording import conclusion, sentences
+from tactile_bayes.assessment.wording import UNCONVERGED, conclusion, sentences
 from tactile_bayes.checks import (
     check_path,
     check_probability,
@@ -71,7 +71,8 @@ def trust(
     sampler, and says how often the intervals hold for objects and rigs like this one. *What does the prior do?* Prior
     and likelihood are raised to a power near one. *Which assumption matters?* The band is computed again with each
     nuisance parameter added or fixed, and with each other family. *How exact is the sampling?* The Monte-Carlo error of
-    the band.
+    the band. Of a posterior that has not converged there are neither replicates nor other assumptions: they would say
+    nothing of the record.
 
     Parameters
     ----------
@@ -160,6 +161,9 @@ def trust(
     experiment = experiment_of(posterior, family, rig)
     if not experiment.events:
         raise InferenceError("the posterior leaves unloaded samples out (events=False): infer it with them")
+    is_converged = bool(posterior.attrs.get("converged", 1))
+    if not is_converged:
+        replicates, assumptions = 0, False
     x = reach(posterior)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         found = sampling_error(posterior, x, chance)
@@ -207,12 +211,12 @@ def trust(
             workers=of_all(replicates),
         )
         found = found.merge(other).assign(_moved(other, regions))
-    attrs = posterior.attrs
-    concluded, summary = conclusion(found, check, parts, calibrated, attrs)
+    concluded, summary = conclusion(found, check, parts, calibrated, is_converged)
+    said = sentences(found, parts, calibrated, mute=experiment.contours.roughness)
     found.attrs = {
         "conclusion": concluded,
         "summary": summary,
-        "words": "\n".join(sentences(found, parts, calibrated, mute=experiment.contours.roughness)),
+        "words": "\n".join(said if is_converged else [*said, UNCONVERGED]),
         "probability": chance,
         "seed": seed_words(seed),
         "replicates": replicates,

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import Any
+from collections.abc import Collection
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.assessment.sampling_error import WANTED_SHARE
 
-__all__ = ["NOT", "conclusion", "sentences"]
+__all__ = ["NOT", "UNCONVERGED", "conclusion", "sentences"]
 
 _HOLDS = "holds"
 _PRIOR = "holds, but the prior sets the gap"
 NOT = "do not rely on it"
+
+UNCONVERGED = (
+    "The posterior has not converged, so that replicates and other assumptions are left out: infer it again for longer."
+)
 
 _LARGEST = 2.0
 """Change of a parameter, in standard deviations, from which it is named."""
@@ -31,7 +34,7 @@ def conclusion(
     check: xr.Dataset,
     parts: xr.Dataset,
     calibrated: xr.Dataset | None,
-    attrs: Mapping[Any, Any],
+    is_converged: bool,
 ) -> tuple[str, str]:
     """Return the conclusion, and a sentence with its reasons."""
     share = f"{found.attrs['probability']:.3g}"
@@ -44,7 +47,7 @@ def conclusion(
         reasons.append(_worst_part(parts))
     if calibrated is not None and calibrated.attrs["conclusion"] == "not calibrated":
         reasons.append("intervals do not hold for records like this one, so that sampler or likelihood is at fault")
-    if not attrs.get("converged", 1):
+    if not is_converged:
         reasons.append("the ensembles have not converged")
     if reasons:
         return NOT, f"Do not rely on the band, because {'; '.join(reasons)}."

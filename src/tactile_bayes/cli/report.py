@@ -10,7 +10,6 @@ import typer
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Output, Reads, Writes
 from tactile_bayes.cli.task_bar import step_bar
-from tactile_bayes.runs.names import OVERLAY
 
 __all__ = ["report"]
 
@@ -50,11 +49,21 @@ def report(
     Of several runs the page shows the results side by side, and the contours over each other.
     """
     with step_bar(output.is_silent) as show:
-        from tactile_bayes.report import write_report
+        from tactile_bayes.report.writing import report_into
 
-        path = write_report(run, out, compare=compare, overlay=overlay, progress=show)
-    size, figure = path.stat().st_size, path.with_name(OVERLAY)
-    is_one = len(run) == 1 and (run[0] / "posterior.nc").exists()
-    drawn = {"overlay": figure} if overlay is not None and is_one else {}
-    words = str(path) if output.quiet else f"{path} ({size / 1e3:.0f} kB): open it in a browser; it needs no network."
-    return Answer([words, drawn] if drawn else [words], lambda: {"report": path, "bytes": size, **drawn})
+        made = report_into(run, out, compare, overlay, show)
+    path, laid, drawn = made.path, made.laid, {} if made.figure is None else {"overlay": made.figure}
+    size = path.stat().st_size
+    words = [str(path)]
+    if not output.quiet:
+        words = [f"{path} ({size / 1e3:.0f} kB): open it in a browser; it needs no network."]
+        words += [] if overlay is None else laid.words(overlay.resolve().name)
+    found = {
+        "unit": laid.unit,
+        "distances": {name: distance._asdict() for name, distance in laid.distances.items()},
+        **({} if made.figure is None else {"figure": made.figure}),
+    }
+    return Answer(
+        [*words, drawn] if drawn else words,
+        lambda: {"report": path, "bytes": size, **({} if overlay is None else {"overlay": found})},
+    )

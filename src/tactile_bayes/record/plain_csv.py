@@ -15,8 +15,8 @@ from tactile_bayes.record.cell import number_in
 __all__ = ["columns_in"]
 
 
-def columns_in(path: Path, names: Sequence[str], what: str = "point") -> list[Floats]:
-    """Return columns of numbers of a CSV file, a line for each point or pose, or refuse it."""
+def columns_in(path: Path, names: Sequence[str], what: str) -> list[Floats]:
+    """Return columns of numbers of a CSV file, a line for each of what they are, or refuse it."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.DictReader(line for line in file if not line.startswith("#")))

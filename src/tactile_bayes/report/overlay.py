@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -15,6 +17,7 @@ from tactile_bayes.uncertainty.overlay import Distance, Overlay, overlay_distanc
 
 __all__ = [
     "DISTANCE_HEADS",
+    "Laid",
     "distance_cells",
     "draw_overlay",
     "note_of",
@@ -25,6 +28,31 @@ __all__ = [
 
 DISTANCE_HEADS = ["rms distance{}", "largest{}", "inside the band"]
 """Heads of `distance_cells`, with places for the unit."""
+
+
+class Laid(NamedTuple):
+    """Distances of runs from a contour laid over them."""
+
+    unit: str
+    """"m", or "1" for rod lengths."""
+    distances: dict[str, Distance]
+
+    @classmethod
+    def over(cls, bands: Mapping[str, xr.Dataset], overlay: Overlay) -> Laid:
+        """Return the distances of runs by their names and bands."""
+        unit = str(next(iter(bands.values()))["x"].attrs["units"])
+        return cls(unit, {name: overlay_distance(band, overlay) for name, band in bands.items()})
+
+    def words(self, of: str) -> list[str]:
+        """Return a sentence on each run; the name is that of the overlay."""
+        return [f"{name} from {of}: {self._said(found)}" for name, found in self.distances.items()]
+
+    def _said(self, found: Distance) -> str:
+        if np.isnan(found.rms):
+            return "nothing of the contour is covered, check unit and frame"
+        fine = shown_as("contact_x", {"units": self.unit}, [found.largest])
+        rms, largest, inside = distance_cells(found, fine)
+        return f"rms distance {rms}, largest {largest}{fine.bracketed}, {inside} inside the band"
 
 
 def draw_overlay(name: str, band: xr.Dataset, contacts: xr.Dataset | None, overlay: Overlay, path: Path) -> None:

@@ -22,7 +22,7 @@ from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import record_of
 from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.report.findings import contour_posterior, probability_of
-from tactile_bayes.report.overlay import DISTANCE_HEADS, distance_cells, note_of
+from tactile_bayes.report.overlay import DISTANCE_HEADS, Laid, distance_cells, note_of
 from tactile_bayes.report.runs_figure import runs_figure
 from tactile_bayes.report.wording import Table, percent, shown_as, spread
 from tactile_bayes.runs.folder import posterior_in
@@ -91,8 +91,8 @@ def folders_of(runs: Sequence[Path]) -> dict[Path, str]:
 
 def runs_page_of(
     runs: Mapping[Path, str], out: Path, name: str, overlay: Path | None, progress: Callable[[int], object]
-) -> dict[str, Any]:
-    """Return the values of the template's variables."""
+) -> tuple[dict[str, Any], Laid]:
+    """Return the values of the template's variables, and the distances from the overlay."""
     names, errors, found = _names(list(runs)), dict(runs), dict[Path, _Found]()
     for count, (folder, error) in enumerate(runs.items(), start=1):
         try:
@@ -112,7 +112,7 @@ def runs_page_of(
     contacts = {names[folder]: each.contacts for folder, each in found.items() if each.contacts is not None}
     shares = dict.fromkeys(percent(probability_of(each.posterior)) for each in found.values())
     failed = len(runs) - len(found)
-    return {
+    values = {
         "name": name,
         "count": f"{len(runs)} runs" + (f", {failed} of them without a result" if failed else ""),
         "share": " or ".join(shares),
@@ -121,6 +121,7 @@ def runs_page_of(
         "notes": [] if other is None else note_of(other, first.band),
         "table": _table(names, errors, found, out, reference),
     }
+    return values, Laid("", {}) if other is None else Laid.over(bands, other)
 
 
 def _reference(bands: Mapping[str, xr.Dataset]) -> Overlay:

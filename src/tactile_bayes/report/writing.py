@@ -9,22 +9,30 @@ import os
 from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
 from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.report.findings import FINDING_STEPS, findings_of
-from tactile_bayes.report.overlay import draw_overlay
+from tactile_bayes.report.overlay import Laid, draw_overlay
 from tactile_bayes.report.page import page_of
 from tactile_bayes.report.runs_page import folders_of, runs_page_of
 from tactile_bayes.runs.names import MANY, OVERLAY
 from tactile_bayes.tasks import refuse_replacing, write_atomically
 
-__all__ = ["rendered", "write_report"]
+__all__ = ["Written", "rendered", "report_into", "write_report"]
 
 _ESCAPES = {code: f"\\u{code:04x}" for code in (ord("<"), ord(">"), ord("&"), 0x2028, 0x2029)}
+
+
+class Written(NamedTuple):
+    """A page that was written, the distances of its runs from the overlay, and a figure of both."""
+
+    path: Path
+    laid: Laid
+    figure: Path | None
 
 
 def write_report(
@@ -74,6 +82,17 @@ def write_report(
     OSError
         If the page cannot be written.
     """
+    return report_into(run, out, compare, overlay, progress).path
+
+
+def report_into(
+    run: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str] | None,
+    compare: str | os.PathLike[str] | None,
+    overlay: str | os.PathLike[str] | None,
+    progress: Callable[[int, int], object] | None,
+) -> Written:
+    """Write the page of `write_report`, and return what a command says of it."""
     given = [run] if isinstance(run, str | os.PathLike) or not isinstance(run, Sequence) else list(run)
     folders = [check_path("run", each, "give the folder of a run, of several, or a list of them") for each in given]
     if not folders:
@@ -91,7 +110,7 @@ def write_report(
     sources = [each / name for each in (*runs, *folders) for name in ("posterior.nc", "trust.nc", MANY[1])]
     sources += [(compared or folders[0]) / "comparison.nc"]
     sources += [] if other is None else [other / "posterior.nc" if other.is_dir() else other]
-    figure = path.with_name(OVERLAY)
+    figure, laid = path.with_name(OVERLAY), Laid("", {})
     refuse_replacing([path, figure] if other is not None else [path], [source for source in sources if source.exists()])
     count = (FINDING_STEPS if one is not None else len(runs)) + 1
     report = progress or (lambda done, count: None)
@@ -100,13 +119,15 @@ def write_report(
         text = _rendered(page_of(findings, one.resolve().name))
         if other is not None and findings.overlay is not None:
             draw_overlay(one.resolve().name, findings.band, findings.contacts, findings.overlay, figure)
+            laid = Laid.over({one.resolve().name: findings.band}, findings.overlay)
     else:
         name = ", ".join(folder.resolve().name for folder in folders)
-        text = rendered("runs.html.jinja", **runs_page_of(runs, path, name, other, lambda done: report(done, count)))
+        values, laid = runs_page_of(runs, path, name, other, lambda done: report(done, count))
+        text = rendered("runs.html.jinja", **values)
     with write_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     report(count, count)
-    return path
+    return Written(path, laid, figure if other is not None and one is not None else None)
 
 
 def _rendered(page: dict[str, Any]) -> str:

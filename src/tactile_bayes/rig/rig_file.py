@@ -19,7 +19,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import SEVERAL
 from tactile_bayes.mechanics.rods.along import Along
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.record.plain_csv import columns_in
+from tactile_bayes.record.points import read_points
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED
 from tactile_bayes.record.spelling import refuse_unknown_keys
@@ -188,10 +188,14 @@ def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
             )
         numbers["flexural_rigidity"] = modulus * math.pi * numbers["diameter"] ** 4 / 64.0
     if "shape" in said:
-        check_kind("rod.shape", said["shape"], str, "give the path of a CSV file with columns x and y [m]")
+        check_kind("rod.shape", said["shape"], str, "give the path of a CSV file with columns x and y")
         if "flexural_rigidity" not in numbers:
             raise ParameterError("[rod] states a shape, and no flexural_rigidity (or youngs_modulus and diameter)")
-        x, y = columns_in(folder / said["shape"], ("x", "y"))
+        path = folder / said["shape"]
+        pieces = read_points(path).in_unit("m", str(path))
+        if len(pieces) > 1:
+            raise ParameterError(f"{path} has {len(pieces)} curves: give the rod's shape as one")
+        x, y = pieces[0].T
         return Rod.from_shape(x, y, numbers.pop("flexural_rigidity"), **numbers)
     if ("length" in numbers) != ("flexural_rigidity" in numbers):
         raise ParameterError(

@@ -23,11 +23,12 @@ from tactile_bayes.inference.ensembles import SamplerSettings, settings_of
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.record.bag import is_bag
+from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.rig import read_record
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.runs.contour import analyse
 from tactile_bayes.runs.folder import Folder
-from tactile_bayes.runs.names import MANY
+from tactile_bayes.runs.names import INFERENCE, MANY
 from tactile_bayes.tasks import (
     TaskProgress,
     Workers,
@@ -38,6 +39,7 @@ from tactile_bayes.tasks import (
     write_atomically,
 )
 from tactile_bayes.tasks.documents import read_json
+from tactile_bayes.tasks.results_store import differences
 
 __all__ = ["ROW", "infer_contours", "records_in"]
 
@@ -88,7 +90,8 @@ def infer_contours(
 
     Each record is inferred as by `infer_contour`, with the same seed. A record that fails is a row with the reason. A
     run that is complete and was made from the same record, rig, family, seed and settings is not made again, so that a
-    stopped call goes on where it was, and records may be added.
+    stopped call goes on where it was, and records may be added: the table has the runs of earlier calls as well. No run
+    is replaced.
 
     Parameters
     ----------
@@ -97,8 +100,8 @@ def infer_contours(
     rig : Rig, optional
         The rig, and how it writes its files.
     out : path-like
-        Folder for a folder of each record, by the name of its file, and for runs.csv and runs.nc, the table; created if
-        missing.
+        Folder for a folder of each record, by the name of its file, with that of the file's folder before it if a run
+        of another record has this name; and for runs.csv and runs.nc, the table; created if missing.
     family, rng, settings
         As in `infer_contour`.
     probability : float
@@ -116,14 +119,15 @@ def infer_contours(
     Raises
     ------
     ParameterError
-        If an argument is not valid, there are no records, or a run would replace one of them.
+        If an argument is not valid, there are no records, or a run would replace one of them; or if the folder holds a
+        run of one of the records that was made with another rig, family, seed, settings, probability or version.
     TaskError
         As in `run_tasks`.
     """
     paths, folder = records_in(records), check_path("out", out, "give the path of a folder")
     check_probability("probability", probability)
     workers = workers_of(workers)
-    names = _names(paths)
+    names, failed = _names(paths, folder), _failures_in(folder)
     refuse_replacing((folder / name for name in MANY), paths)
     made = (rig_of(rig), family_of(family), seed_sequence(rng), settings_of(settings), probability)
     tasks = [_Task(path, folder / name, *made) for path, name in zip(paths, names, strict=True)]
@@ -135,7 +139,7 @@ def infer_contours(
             if workers.progress is not None:
                 done = len(tasks) - len(left) + count
                 workers.progress(TaskProgress(done, len(tasks), count, time.monotonic() - began))
-    table = _table({name: rows[name] for name in names})
+    table = _table({**_rows_in(folder, failed), **{name: rows[name] for name in names}})
     with Folder(folder, MANY) as written:
         written.write_netcdf("table", "runs.nc", table)
         with written.file("table as text", "runs.csv") as temporary:
@@ -164,24 +168,64 @@ def records_in(records: str | os.PathLike[str] | Iterable[str | os.PathLike[str]
     return found
 
 
-def _names(paths: Sequence[Path]) -> list[str]:
-    """Return a name for each record: that of its file, with its folder where several have the same."""
-    stems = Counter(path.stem for path in paths)
-    names = [path.stem if stems[path.stem] == 1 else f"{path.resolve().parent.name}-{path.stem}" for path in paths]
-    if twice := [name for name, count in Counter(names).items() if count > 1]:
-        raise ParameterError(f"several records are called {twice[0]}: rename one, since each has a folder of its name")
+def _names(paths: Sequence[Path], folder: Path) -> list[str]:
+    """Return a name for each record: that of its run in the folder, or a free one."""
+    stems, names = Counter(path.stem for path in paths), list[str]()
+    for path in paths:
+        record = _digest(path) if path.exists() else ""
+        own = [path.stem, f"{path.resolve().parent.name}-{path.stem}"]
+        stored = [_stored(folder / name) for name in own]
+        done = [name for name, run in zip(own, stored, strict=True) if run and run["identity"]["record"] == record]
+        free = [name for name in own[stems[path.stem] > 1 :] if not (folder / name / INFERENCE[0]).exists()]
+        name = next((name for name in (*done, *free) if name not in names), None)
+        if name is None:
+            raise ParameterError(
+                f"other records are called {own[0]} and {own[1]}, or {path} is given twice: rename one, since each has "
+                "a folder of its name"
+            )
+        names.append(name)
     return names
+
+
+def _stored(run: Path) -> dict[str, Any] | None:
+    """Return identity and row of a run that is complete; None if there is none."""
+    try:
+        stored = read_json((run / ROW).read_bytes(), ROW)
+        is_whole = isinstance(stored["identity"]["record"], str) and isinstance(stored["row"]["seconds"], int | float)
+    except (OSError, ParameterError, KeyError, TypeError):
+        return None
+    return dict(stored) if is_whole and (run / INFERENCE[0]).is_file() else None
 
 
 def _kept(task: _Task) -> dict[str, Any] | None:
     """Return the row of a run that is complete and the same; None if it is to be made."""
-    try:
-        stored = read_json((task.out / ROW).read_bytes(), ROW)
-        same = stored["identity"] == task.identity
-    except (OSError, ParameterError, KeyError, TypeError):
+    stored = _stored(task.out)
+    if stored is None:
         return None
-    row: dict[str, Any] | None = stored.get("row") if same and (task.out / "summary.txt").is_file() else None
+    if differ := differences(stored["identity"], task.identity):
+        raise ParameterError(
+            f"{task.out} was made otherwise: {differ}; give another folder (--out), or remove this one to make it again"
+        )
+    row: dict[str, Any] = stored["row"]
     return row
+
+
+def _rows_in(folder: Path, failed: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Return the rows of the runs of a folder, and those of records that have failed and have no run since."""
+    found = {path.parent.name: _stored(path.parent) for path in sorted(folder.glob(f"*/{ROW}"))}
+    return {**failed, **{name: stored["row"] for name, stored in found.items() if stored is not None}}
+
+
+def _failures_in(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return the rows of the table of a folder that have the reason of a failure."""
+    path, correction = folder / MANY[1], "remove it, the runs beside it stay"
+    if not path.exists():
+        return {}
+    table = read_netcdf(path, xr.open_dataset, lambda what: ParameterError(f"{path} {what}: {correction}"))
+    if not {"record", "error", "seconds"} <= set(table.variables):
+        raise ParameterError(f"{path} is no table of runs: give another folder, or {correction}")
+    columns = (table[name].values.tolist() for name in ("record", "error", "seconds"))
+    return {name: {"error": error, "seconds": took} for name, error, took in zip(*columns, strict=True) if error}
 
 
 def _analysed(task: _Task) -> dict[str, Any]:

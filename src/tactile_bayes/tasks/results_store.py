@@ -121,13 +121,17 @@ def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]
         raise
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise kind.error(f"{file} holds no {kind.what} that can be read ({error}): {correction}") from error
-    differ = [name for name in {**there, **identity} if there.get(name) != identity.get(name)]
-    if outcomes and differ:
-        parts = ((name, *_differing(there.get(name), identity.get(name))) for name in differ[:3])
-        named = ", ".join(f"{name} is {had} there and {has} here" for name, had, has in parts)
-        more = f" and {len(differ) - 3} more" if len(differ) > 3 else ""
-        raise kind.error(f"{file.parent} holds {kind.what} of another experiment: {named}{more}; {correction}")
+    if outcomes and (differ := differences(there, identity)):
+        raise kind.error(f"{file.parent} holds {kind.what} of another experiment: {differ}; {correction}")
     return outcomes
+
+
+def differences(there: Mapping[str, str], here: Mapping[str, str]) -> str:
+    """Return in words what differs between the identities of a stored thing and of the one asked for; "" if nothing."""
+    differ = [name for name in {**there, **here} if there.get(name) != here.get(name)]
+    parts = ((name, *_differing(there.get(name), here.get(name))) for name in differ[:3])
+    named = ", ".join(f"{name} is {had} there and {has} here" for name, had, has in parts)
+    return named + (f" and {len(differ) - 3} more" if len(differ) > 3 else "")
 
 
 def _storable(value: Any) -> Any:
