@@ -58,7 +58,7 @@ def test_a_number_is_known_and_a_distribution_unknown():
     ("name", "said", "words"),
     [
         ("cube", {}, "cube"),
-        ("circle", {"a": 0.5}, "a, which is no parameter: there are r, q, x_c"),
+        ("circle", {"a": 0.5}, "a is no parameter of Family('circle'): there are r, q, x_c"),
         ("circle", {"r": "wide"}, "prior of r"),
         ("circle", {"r": -0.1}, "r is -0.1"),
         ("circle", {"r": 0}, "r is 0"),
