@@ -278,6 +278,8 @@ def check_distribution(parameter: str, distribution: Any) -> None:
     """Refuse what is no distribution, or has no density."""
     if not isinstance(distribution, Distribution) or isinstance(distribution, stats.rv_continuous):
         correction = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+        if isinstance(distribution, Mapping):
+            correction += "; tables like this one are for rig.toml, which Rig.read reads"
         raise ParameterError(f"the prior of {parameter} is {shown(distribution)}: {correction}")
     flaw = _flaw_of(distribution)
     if flaw:
@@ -318,10 +320,7 @@ def refuse_unknown_names(given: Mapping[str, Any], names: Collection[str], whose
     """Refuse distributions by names that are no parameters."""
     unknown = sorted(set(given) - set(names))
     if unknown:
-        raise ParameterError(
-            f"there is a prior {whose}of {', '.join(unknown)}, which is no parameter: there are "
-            f"{', '.join(names)}{more}"
-        )
+        raise ParameterError(f"{', '.join(unknown)} is no parameter{whose}: there are {', '.join(names)}{more}")
 
 
 def numbers_of(distribution: Any) -> dict[str, Any]:

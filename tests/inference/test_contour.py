@@ -513,7 +513,7 @@ def test_the_time_bounds_the_search_too(family, seconds, monkeypatch):
         keep=lambda tree: drawn.append(clock.now),
     )
     assert result["sample_stats"].attrs["steps_run"] == 1
-    assert result.attrs["message"].startswith("not converged, the time allowed ran out after 1 steps")
+    assert result.attrs["message"].startswith("not converged, the time allowed ran out after 1 step: too few draws")
     assert drawn[0] < seconds + 25.0
     clock.now = 0.0
     free = replace(settings, max_steps=1, max_seconds=None)

@@ -58,13 +58,13 @@ def test_a_number_is_known_and_a_distribution_unknown():
     ("name", "said", "words"),
     [
         ("cube", {}, "cube"),
-        ("circle", {"a": 0.5}, "a, which is no parameter: there are r, q, x_c"),
+        ("circle", {"a": 0.5}, r"a is no parameter of Family\('circle'\): there are r, q, x_c"),
         ("circle", {"r": "wide"}, "prior of r"),
         ("circle", {"r": -0.1}, "r is -0.1"),
         ("circle", {"r": 0}, "r is 0"),
         ("circle", {"r": float("nan")}, "r is nan"),
         ("circle", {"r": stats.norm(0.5, 0.0)}, "give the number, 0.5"),
-        ("circle", {"r": 0.1, "q": 0.5, "x_c": 0.0}, "no unknown parameter"),
+        ("circle", {"r": 0.1, "q": 0.5, "x_c": 0.0}, "leaves nothing unknown"),
         ("shape-free", {"q": 0.5}, "cannot be known"),
     ],
 )

@@ -118,7 +118,7 @@ def test_a_unit_that_is_assumed_and_an_overlay_elsewhere_are_said(runs, tmp_path
 
 def test_what_cannot_be_reported_is_refused(runs, points, tmp_path):
     one, two = runs / "one", runs / "t<wo"
-    with refused(ParameterError, "give out"):
+    with refused(ParameterError, "say --out"):
         write_report([one, two])
     with refused(ParameterError, "no runs"):
         write_report([])

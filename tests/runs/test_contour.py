@@ -195,7 +195,7 @@ def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
     few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
     run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=few, rng=1)
     assert not run.posterior.attrs["converged"]
-    assert "not converged, the steps allowed ran out after 1 steps" in run.posterior.attrs["message"]
+    assert "not converged, the steps allowed ran out after 1 step: too few draws" in run.posterior.attrs["message"]
 
 
 @pytest.mark.parametrize("probability", [0.0, 1.0, 95.0, float("nan")])

@@ -70,7 +70,7 @@ def trust(
     records predicted from them, and both inferred again (posterior simulation-based calibration): this sees a wrong
     sampler, and says how often the intervals hold for objects and rigs like this one. *What does the prior do?* Prior
     and likelihood are raised to a power near one. *Which assumption matters?* The band is computed again with each
-    nuisance parameter added or fixed, and with each other family. *How exact is the sampling?* The Monte-Carlo error of
+    unknown of the rig added or fixed, and with each other family. *How exact is the sampling?* The Monte-Carlo error of
     the band. Of a posterior that has not converged there are neither replicates nor other assumptions: they would say
     nothing of the record.
 

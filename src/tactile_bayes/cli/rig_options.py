@@ -47,7 +47,8 @@ class RigFile:
         Path | None,
         typer.Option(
             help="rig.toml, the rig: rod, load cell, names and units in its files, and what is unknown of it; "
-            "calibrate-rig and inspect write one. By default as the record states, with the doubts of a real rig.",
+            "calibrate-rig and inspect write one. By default as the record states, if there is one, with the doubts of "
+            "a real rig.",
             dir_okay=False,
         ),
         _ReadsRig(),

@@ -41,7 +41,7 @@ def trust(
         bool,
         typer.Option(
             "--assumptions/--no-assumptions",
-            help="Compute the band again with each nuisance added or fixed, and with each other shape.",
+            help="Compute the band again with each unknown of the rig added or fixed, and with each other shape.",
         ),
     ] = True,
     probability: Annotated[

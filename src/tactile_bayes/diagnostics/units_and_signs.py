@@ -51,7 +51,8 @@ def check_units_and_signs(measured: xr.Dataset, load_cell: LoadCell | None = Non
     -----
     The lever arm of the contact force is at most L, so that |m0| ≤ f L with or without friction. In tangential contact
     √f s1 ≤ 2 K(1/2), so that f ≤ 13.8/s1² in EI/L². The object lies above the pivot, so that fAy > 0. These bounds
-    follow from the closed solution of the rod in elliptic integrals, see `tactile_bayes.elastica`.
+    follow from the closed solution of the rod in elliptic integrals, see
+    `tactile_bayes.mechanics.elastica`.
 
     Examples
     --------

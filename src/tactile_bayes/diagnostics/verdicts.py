@@ -91,7 +91,7 @@ def verdicts(
         loads that such a rod cannot have (`check_units_and_signs`); a zero that is off, or that moved; a record unlike
         the predictions of the posterior (`check_record`); reasons not to rely on the band (`trust`); ensembles that
         have not converged; noise twice as large as stated, or half; loads of a sample that contradict one another;
-        nuisance parameters that are nearly impossible under their prior; smooth residuals, which a discrepancy can
+        unknowns of the rig that are nearly impossible under their prior; smooth residuals, which a discrepancy can
         describe; parameters that are cut off where the model has no path of the rod; a check that was not made, with
         the reason. The last, which are no faults, say that the prior sets the gap, and name parameters that the record
         hardly determines.

@@ -69,7 +69,7 @@ class Family:
 
     def __init__(self, name: str, /, **said: Any) -> None:
         family = family_named(name)
-        refuse_unknown_names(said, family.parameters, f"in Family({name!r}) ")
+        refuse_unknown_names(said, family.parameters, f" of Family({name!r})")
         known, priors = {}, {}
         for parameter, value in said.items():
             number = as_number(value)
@@ -86,7 +86,7 @@ class Family:
                 f"{', '.join(known)} cannot be known in Family({name!r}), which any shape may have: give distributions"
             )
         if len(known) == len(family.parameters):
-            raise ParameterError(f"Family({name!r}) has no unknown parameter: give at least one distribution, or none")
+            raise ParameterError(f"Family({name!r}) leaves nothing unknown: leave a number out, or give a distribution")
         self.name, self.priors, self.known = family.name, MappingProxyType(priors), MappingProxyType(known)
 
     def __repr__(self) -> str:

@@ -47,7 +47,7 @@ def error_map(
     Parameters
     ----------
     found : xr.Dataset
-        From `tactile_bayes.error_map`.
+        From `tactile_bayes.planning.error_map`.
     quantity : {"across", "along", "touched", "gap"}
         Errors of contacts across the contour or along it, or widths of bands where it is touched or in the gap.
     reconstruction : {"raw", "constrained"}

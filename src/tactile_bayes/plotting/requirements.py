@@ -107,7 +107,7 @@ def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     found : xr.Dataset
-        From `tactile_bayes.required_rod`.
+        From `tactile_bayes.planning.required_rod`.
     ax : Axes, optional
         Axes to draw in.
 

@@ -6,6 +6,7 @@ import math
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.record.parsing import parsed_column
@@ -58,21 +59,13 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
     for name in ("sweep", "direction"):
         if name in table.columns:
             raise source.column_error(name, "is there already: do without split_sweeps, or remove the column")
-    if "drive_angle" not in table.columns:  # refused later, with other missing columns
-        return table
-    angle = parsed_column("drive_angle", table.columns["drive_angle"][0], source)
-    bad = ~np.isfinite(angle)
-    if bad.any():
-        sample = int(np.argmax(bad))
-        raise source.cell_error(
-            np.flatnonzero(bad),
-            "drive_angle",
-            f"the value is {float(angle[sample])!r}: give a finite number, or remove the row",
-        )
+    if "drive_angle" not in table.columns:  # refused later, with the others that are missing
+        return _with_sweeps(table, np.zeros(table.samples, dtype=np.int64), np.full(table.samples, "forward"))
+    angle = _finite("drive_angle", table)
     base = np.zeros((angle.size, 2))
     for column, name in enumerate(("base_x", "base_y")):
         if name in table.columns:
-            base[:, column] = parsed_column(name, table.columns[name][0], source)
+            base[:, column] = _finite(name, table)
     moved = np.append(False, np.any(base[1:] != base[:-1], axis=1))
     _refuse_wrapped(angle, moved, source)
     sweep, direction = np.zeros(angle.size, dtype=np.int64), np.empty(angle.size, dtype="U8")
@@ -80,14 +73,27 @@ def split_at_turns(table: Table, length: float = 1.0) -> Table:
     for stretch, is_carried in _stretches(angle, moved):
         if not is_carried:
             sweeps += _turned_sweeps(stretch, angle, moved, source)
-        elif np.isfinite(base).all():
+        else:
             sweeps += _carried_sweeps(stretch, angle, base, length, source)
-        else:  # refused later, with its row
-            return table
     for number, (begin, end, is_forward) in enumerate(sweeps):
         sweep[begin:end] = number
         direction[begin:end] = "forward" if is_forward else "backward"
-    return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, source)
+    return _with_sweeps(table, sweep, direction)
+
+
+def _finite(name: str, table: Table) -> Floats:
+    """Return the numbers of a column, all of them finite."""
+    values: Floats = parsed_column(name, table.columns[name][0], table.source)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        what = f"the value is {float(values[bad[0]])!r}: give a finite number, or remove the row"
+        raise table.source.cell_error(bad, name, what)
+    return values
+
+
+def _with_sweeps(table: Table, sweep: NDArray[np.int64], direction: NDArray[np.str_]) -> Table:
+    """Return a table with sweeps and directions."""
+    return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, table.source)
 
 
 def _stretches(angle: Floats, moved: Flags) -> list[tuple[slice, bool]]:

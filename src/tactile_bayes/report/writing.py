@@ -98,7 +98,7 @@ def report_into(
     if not folders:
         raise ParameterError("there are no runs: give the folder of one")
     if out is None and len(folders) > 1:
-        raise ParameterError("the page of several folders has no place of its own: give out, like 'report.html'")
+        raise ParameterError("the page of several folders has no place of its own: say --out (out), like 'report.html'")
     path = folders[0] / "report.html" if out is None else check_path("out", out, "give a path, like 'report.html'")
     check_function("progress", progress)
     compared = None if compare is None else check_path("compare", compare)

@@ -45,7 +45,7 @@ def read_record(path: str | os.PathLike[str], rig: Rig | None = None) -> xr.Data
     Parameters
     ----------
     path : path-like
-        A file with suffix .csv or .nc.
+        A file with suffix .csv or .nc, or a bag: a file with suffix .mcap, .bag or .db3, or a folder of ROS 2.
     rig : Rig, optional
         The rig that wrote the file. Its `file` states how, see `tactile_bayes.rig.FileFormat`; its rod and the frame of
         its load cell are those of a file that states none. A rod without a length gives the shape of the one that the
@@ -62,7 +62,7 @@ def read_record(path: str | os.PathLike[str], rig: Rig | None = None) -> xr.Data
         If the content is not a record, see `validate` (the message names line and column); if the file is SI and no rod
         is stated; if it states another rod or another frame than the rig; if a column has the unit of another quantity,
         or its source does not exist; if the file to be split has sweeps already, or its drive angle jumps by about a
-        turn; if the path is a folder, a pipe or a device, or has another suffix.
+        turn; if the path is a folder that is no bag, a pipe or a device, or has another suffix.
     FileNotFoundError
         If there is no such file.
     ParameterError

@@ -72,8 +72,9 @@ _LARGEST = 1 << 20
 
 _HEAD = """\
 # A rig, for the option --rig of tactile-bayes and for tactile_bayes.Rig.read: what its data sheets state, how its files
-# are written, and what is unknown. Numbers are in SI units, or texts with a unit, like "200 mm"; a number is known, a
-# distribution is unknown. `tactile-bayes rig --parameters` lists what may be unknown.
+# are written, and what is unknown. A number is known, a distribution is unknown; `tactile-bayes rig --parameters` lists
+# what may be unknown. Numbers are in SI units, or texts with a unit, like "200 mm", if [rod] states a length and a
+# flexural rigidity; else they are in units of the rod: lengths in L, moments in EI/L, forces in EI/L².
 """
 
 

@@ -245,7 +245,7 @@ def _analysed(task: _Task) -> dict[str, Any]:
             record_file=task.path,
         )
     except (TactileBayesError, OSError) as error:
-        return {"error": str(error), "seconds": time.monotonic() - began}
+        return {"error": _reason(error), "seconds": time.monotonic() - began}
     numbers = run.summary
     width = float("nan") if run.band is None else float((run.band.upper - run.band.lower).median())
     row = {
@@ -264,6 +264,13 @@ def _analysed(task: _Task) -> dict[str, Any]:
     with errors_of(task.out / ROW), write_atomically(task.out / ROW) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return row
+
+
+def _reason(error: Exception) -> str:
+    """Return why a record failed, in words."""
+    if isinstance(error, FileNotFoundError) and error.filename:
+        return f"there is no file {os.fspath(error.filename)}: correct its path"
+    return str(error)
 
 
 def _digest(path: Path) -> str:

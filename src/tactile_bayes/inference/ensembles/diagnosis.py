@@ -66,6 +66,8 @@ class Diagnosis:
 
     def message(self, names: Sequence[str]) -> str:
         i, j = self.worst_r_hat, self.worst_ess
+        if np.isnan(self.r_hat[i]) or np.isnan(self.ess[j]):
+            return "too few draws for R̂ and effective sample sizes"
         return (
             f"largest R̂ {self.r_hat[i]:.4f} ({names[i]}), smallest effective sample size {self.ess[j]:.0f} ({names[j]})"
         )

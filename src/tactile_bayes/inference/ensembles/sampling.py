@@ -232,7 +232,7 @@ def _draws(
     stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
     lost = int(np.count_nonzero(lost_walkers(half.values)))
     modes = () if converged else modes_of(half.samples, half.values, names)
-    message = f"{ending} after {state.steps} steps: {diagnosis.message(names)}"
+    message = f"{ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {diagnosis.message(names)}"
     if not converged:
         message += f"; criteria: R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
     if modes:

@@ -99,7 +99,7 @@ class RecordLikelihood:
         if self.encoder.count > 1 and (load_cell.drift or any(load_cell.bias_uncertainty)):
             raise ParameterError(
                 "drive_angle_noise or drive_angle_resolution together with drift or bias_uncertainty have no closed "
-                "form: leave one of the two out (a bias can be inferred instead, as a nuisance parameter)"
+                "form: leave one of the two out (a bias can be inferred instead, as an unknown of the rig)"
             )
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
         self.noise = self.load_cell.noise

@@ -64,8 +64,8 @@ class Rod:
         Flexural rigidity along the rod over that at the base, as a function or arrays like the rest curvature; by
         default constant. A taper comes on top of it, and alone changes the diameter.
     rest_curvature_deviation : float
-        Standard deviation of the mean rest curvature [1/m], if it was measured (`from_shape`): that of the nuisance
-        parameter `rest_curvature` in its default prior.
+        Standard deviation of the mean rest curvature [1/m], if it was measured (`from_shape`): that of the unknown
+        `rest_curvature` in its default prior.
     stem : float
         Length of a rigid, straight piece between the pivot and the rod, in the direction of its base [m], as of a
         clamp that sits on a hinge; at most that of the rod. Drive angle, moment and forces are those at the pivot, and
