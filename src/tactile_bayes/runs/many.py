@@ -139,7 +139,8 @@ def infer_contours(
             if workers.progress is not None:
                 done = len(tasks) - len(left) + count
                 workers.progress(TaskProgress(done, len(tasks), count, time.monotonic() - began))
-    table = _table({**_rows_in(folder, failed), **{name: rows[name] for name in names}})
+    others = {name: row for name, row in _rows_in(folder, failed).items() if name not in rows}
+    table = _table({**others, **{name: rows[name] for name in names}})
     with Folder(folder, MANY) as written:
         written.write_netcdf("table", "runs.nc", table)
         with written.file("table as text", "runs.csv") as temporary:
