@@ -389,7 +389,7 @@ def test_samples_without_load_tell_where_contact_begins_and_ends():
     [("a", stats.norm, ["frozen"]), ("gain", stats.norm(1.0, 0.1), ["a, q, x_c"])],
 )
 def test_a_prior_that_is_none_is_refused(name, prior, named):
-    with refused(ParameterError, f"of {name}", *named):
+    with refused(ParameterError, name, *named):
         Family("parabola", **{name: prior})
 
 

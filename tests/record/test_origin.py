@@ -385,7 +385,7 @@ SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
             {"holding_moment": None},
             "there is no column 'holding_moment' (columns: Zeit [s], Hub, Richtung, Winkel [°], Fx (mN), Fy, a / b, "
             "a [b]): add it, or say what stands for it, Rig(file={'holding_moment': 'NAME[UNIT]'}), or "
-            'holding_moment = "NAME[UNIT]" under [file] of rig.toml, or declare the channel missing',
+            'holding_moment = "NAME[UNIT]" under [file] of rig.toml',
         ),
     ],
 )
