@@ -31,9 +31,9 @@ __all__ = [
     "distribution_of_table",
     "frozen",
     "in_words",
-    "is_finite_number",
     "log_density_of",
     "numbers_of",
+    "open_share",
     "refuse_unknown_names",
     "stated_text",
     "support_of",
@@ -104,7 +104,7 @@ KINDS = {
         "normal, mean {}, standard deviation {}",
         lambda mean, deviation: stats.norm(mean, deviation),
         lambda n: (n["loc"], n["scale"]),
-        lambda mean, deviation, share: mean + deviation * ndtri(_open(share)),
+        lambda mean, deviation, share: mean + deviation * ndtri(open_share(share)),
     ),
     "log_normal": Kind(
         2,
@@ -113,7 +113,7 @@ KINDS = {
         "log-normal, median {}, standard deviation of the logarithm {}",
         lambda median, deviation: stats.lognorm(s=deviation, scale=median),
         lambda n: None if n["loc"] else (n["scale"], n["s"]),
-        lambda median, deviation, share: median * np.exp(deviation * ndtri(_open(share))),
+        lambda median, deviation, share: median * np.exp(deviation * ndtri(open_share(share))),
     ),
     "half_normal": Kind(
         1,
@@ -214,13 +214,7 @@ def stated_text(attrs: Mapping[Any, Any], entry: str) -> str:
     return text
 
 
-def is_finite_number(value: Any) -> bool:
-    """Return True for a finite real number."""
-    number = as_number(value)
-    return number is not None and math.isfinite(number)
-
-
-def _open(share: Floats) -> Floats:
+def open_share(share: Floats) -> Floats:
     """Bound probabilities away from 0, where a normal quantile would be infinite."""
     return np.maximum(share, 2.0**-54)
 

@@ -110,7 +110,7 @@ def _said(rig: Rig) -> dict[str, str]:
     """Return what is said of each parameter, as text: a number, a distribution, or that it has its default one."""
     from tactile_bayes.distributions import in_words
 
-    calibrated = () if rig.calibration is None else tuple(rig.calibration.priors)
+    calibrated = {} if rig.calibration is None else rig.calibration.priors
     said = {
         name: f"known, {value:g}"
         if isinstance(value, float)
@@ -120,8 +120,7 @@ def _said(rig: Rig) -> dict[str, str]:
         for name, value in rig.said.items()
         if name not in calibrated
     }
-    found = {} if rig.calibration is None else rig.calibration.priors
-    return said | {name: f"calibrated, {in_words(prior)}" for name, prior in found.items()}
+    return said | {name: f"calibrated, {in_words(prior)}" for name, prior in calibrated.items()}
 
 
 def _words(rig: Rig, said: dict[str, str]) -> Iterator[Any]:

@@ -14,7 +14,7 @@ from tactile_bayes.datasets.variations import Variation, variation_of
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig.drawn import calibrated_at, unknown_of
-from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, parameter_named
+from tactile_bayes.rig.parameters import GROUPS, NEUTRAL, parameter_named
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.rig.rig_file import number_in, unit_of_unknown
 from tactile_bayes.rig.rig_prior import RigPrior
@@ -133,13 +133,12 @@ def _stated(values: Mapping[str, Floats], count: int) -> Stated:
         return values.get(key, np.full(count, default))
 
     length, rigidity = column("rod.length", 1.0), column("rod.flexural_rigidity", 1.0)
-    neutral = {name: each.neutral for name, each in PARAMETERS.items() if each.neutral is not None}
     of_rod = {name: column(f"rod.{name}") for name in ("rest_curvature", "taper", "stem")}
     curve = {name: column(f"load_cell.{name}") for name in GROUPS["moment_curve"]}
     gains = [np.abs(column(f"load_cell.gain_{name}_{name}", 1.0)) for name in CHANNELS]
     return Stated(
         ManyUnits(length, rigidity / length, rigidity / length**2),
-        {**neutral, **of_rod, **curve, "length": length},
+        {**NEUTRAL, **of_rod, **curve, "length": length},
         [np.where(gain > 0.0, gain, 1.0) for gain in gains],
         column("rod.rest_curvature_deviation"),
     )

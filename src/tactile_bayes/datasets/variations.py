@@ -11,7 +11,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import as_number, shown
-from tactile_bayes.distributions import KINDS, Distribution, distribution_of_table, in_words, support_of
+from tactile_bayes.distributions import KINDS, Distribution, distribution_of_table, in_words, open_share, support_of
 from tactile_bayes.errors import SpecificationError
 
 __all__ = ["Variation", "variation_of"]
@@ -96,7 +96,7 @@ class Variation:
         if self.kind == "constant":
             return np.full(share.shape, self.numbers[0])
         if self.kind == "scipy":
-            return np.asarray(self.of.ppf(np.maximum(share, 2.0**-54)))
+            return np.asarray(self.of.ppf(open_share(share)))
         return np.asarray(KINDS[self.kind].at(*self.numbers, share))
 
 

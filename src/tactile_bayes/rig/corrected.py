@@ -16,6 +16,7 @@ from tactile_bayes.record import CHANNELS, base_of_sample, rod_of, to_si, with_r
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import rod_with
 from tactile_bayes.rig.stated import cell_with
+from tactile_bayes.rig.unknown import pivot_shifts
 
 __all__ = ["Corrected", "corrected"]
 
@@ -46,7 +47,6 @@ class Corrected(NamedTuple):
 
 def corrected(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]) -> Corrected:
     """Return a record and its rig with deviations from what is stated corrected; other parameters have no effect."""
-
     averaged = AveragedCell.of(load_cell, measured["block_readings"].values) if are_blocks(measured) else load_cell
     cell = cell_with(averaged, rig)
     stiffer = rig.get("rigidity_scale", 1.0)
@@ -58,12 +58,9 @@ def corrected(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float
     drifts = zip(CHANNELS, (rig.get(name, 0.0) for name in GROUPS["drift"]), strict=True)
     columns = {name: measured[name] - drift * fraction for name, drift in drifts if drift}
     bases, of_sample = base_of_sample(measured)
-    for number in range(1, len(bases) + 1):
-        at_pivot = of_sample == number - 1
-        for name in ("base_x", "base_y"):
-            shift = rig.get(f"base_{number}_{name[-1]}", 0.0)
-            if shift:
-                columns[name] = columns.get(name, measured[name]) + shift * at_pivot
+    for name, shifts in zip(("base_x", "base_y"), pivot_shifts(rig, len(bases)).T, strict=True):
+        if shifts.any():
+            columns[name] = measured[name] + shifts[of_sample]
     record = measured.assign({name: values.assign_attrs(measured[name].attrs) for name, values in columns.items()})
     rod = rod_of(measured)
     if "length" in rig:
@@ -72,6 +69,6 @@ def corrected(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float
         with_rod(record, rod_with(rod, rig)),
         cell,
         rig.get("friction", 0.0),
-        rig.get("suspension_compliance", 0.0) * rig.get("rigidity_scale", 1.0),
+        rig.get("suspension_compliance", 0.0) * stiffer,
         str(measured.attrs["units"]),
     )

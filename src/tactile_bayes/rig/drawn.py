@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Protocol
 
-import numpy as np
 from scipy.special import ndtri
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
+from tactile_bayes.distributions import open_share
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -66,7 +66,7 @@ def refuse_undrawn(said: Mapping[str, Unknown]) -> None:
 
 def calibrated_at(found: RigPrior, shares: Floats) -> dict[str, Floats]:
     """Return values of parameters by a calibration, each of shape (n,), from independent shares (n, parameters)."""
-    points = found.at(ndtri(np.maximum(shares, 2.0**-54)))
+    points = found.at(ndtri(open_share(shares)))
     return dict(zip(found.priors, points.T, strict=True))
 
 

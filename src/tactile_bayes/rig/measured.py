@@ -19,7 +19,7 @@ from tactile_bayes.record.attributes import without_rod
 from tactile_bayes.record.construction import completed_record, table_of_columns
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.stated import cell_with
-from tactile_bayes.rig.unknown import of_pivots
+from tactile_bayes.rig.unknown import pivot_shifts
 
 __all__ = ["measured_by"]
 
@@ -36,11 +36,9 @@ def measured_by(
     made = measured(built, record, generator(rng), elapsed_in(record)[:, None] * drift)
     columns: dict[str, Any] = {str(name): made[name].values for name in made.data_vars}
     pivots, of_sample = base_of_sample(made)
-    shifted: dict[str, Any] = {**of_pivots(known, len(pivots))}
-    for axis in "xy":
-        shifts = np.array([shifted.get(f"base_{k}_{axis}", 0.0) for k in range(1, len(pivots) + 1)])
+    for name, shifts in zip(("base_x", "base_y"), pivot_shifts(known, len(pivots)).T, strict=True):
         if shifts.any():
-            columns[f"base_{axis}"] = columns[f"base_{axis}"] - shifts[of_sample]
+            columns[name] = columns[name] - shifts[of_sample]
     attrs = {n: v for n, v in without_rod(made.attrs).items() if not str(n).startswith(("load_cell_", "units"))}
     attrs |= {f"load_cell_{name}": value for name, value in stated.entries().items() if name != "frame"}
     missing = [name for name in CHANNELS if name not in present_channels(made)]

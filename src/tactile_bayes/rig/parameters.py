@@ -14,7 +14,17 @@ import numpy as np
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
 
-__all__ = ["BASE", "GROUPS", "MAY_VANISH", "PARAMETERS", "STANDARD", "Parameter", "members", "parameter_named"]
+__all__ = [
+    "BASE",
+    "GROUPS",
+    "MAY_VANISH",
+    "NEUTRAL",
+    "PARAMETERS",
+    "STANDARD",
+    "Parameter",
+    "members",
+    "parameter_named",
+]
 
 BASE = re.compile(r"base_(\d+)_([xy])")
 """Shift of a pivot of the record, counted from 1, along an axis."""
@@ -238,6 +248,9 @@ _ROWS = (
 
 PARAMETERS = {row.name: row for row in _ROWS}
 """All parameters by name, except the shifts of pivots, of which there are as many as pivots."""
+
+NEUTRAL = {name: row.neutral for name, row in PARAMETERS.items() if row.neutral is not None}
+"""Values of parameters that change nothing, where there are such."""
 
 GROUPS = {
     **{what: tuple(f"{channel}_{what}" for channel in _CHANNELS) for what in ("bias", "drift", "gain")},

@@ -10,16 +10,13 @@ import numpy as np
 from scipy import stats
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.distributions import Distribution
+from tactile_bayes.distributions import Distribution, open_share
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
-from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, PARAMETERS, parameter_named
+from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, NEUTRAL, parameter_named
 
 __all__ = ["Stated", "cell_with", "stated_values", "unit_of", "within_bounds"]
-
-_LEAST_SHARE = 2.0**-54
-"""Least probability, below which a normal quantile would be infinite."""
 
 
 class Units(Protocol):
@@ -43,9 +40,8 @@ def unit_of(name: str, rod: Units) -> Any:
 
 def stated_values(rod: Rod, cell: LoadCell) -> dict[str, float]:
     """Return the parameters of a rig that is as stated, except shifts of pivots, which are 0, and noises."""
-    neutral = {name: parameter.neutral for name, parameter in PARAMETERS.items() if parameter.neutral is not None}
     of_rod = {"rest_curvature": rod.mean_rest_curvature, "taper": rod.taper, "stem": rod.stem, "length": rod.length}
-    return {**neutral, **of_rod, **dict(zip(GROUPS["moment_curve"], cell.moment_curve, strict=True))}
+    return {**NEUTRAL, **of_rod, **dict(zip(GROUPS["moment_curve"], cell.moment_curve, strict=True))}
 
 
 class Stated(NamedTuple):
@@ -95,7 +91,7 @@ def within_bounds(name: str, distribution: Distribution, share: Floats) -> Float
         raise ParameterError(
             f"the distribution of {name} lies beyond what it can be, {parameter.low:.4g} to {parameter.high:.4g}"
         )
-    found = distribution.ppf(low + np.maximum(share, _LEAST_SHARE) * (high - low))
+    found = distribution.ppf(low + open_share(share) * (high - low))
     return np.clip(found, parameter.low, parameter.high)
 
 

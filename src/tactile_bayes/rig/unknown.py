@@ -9,13 +9,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number, check_kind, check_mapping, shown
 from tactile_bayes.distributions import Distribution, check_distribution, frozen
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, STANDARD, members, parameter_named
 
-__all__ = ["DEFAULT", "NOTHING", "Unknown", "checked_unknown", "expanded", "of_pivots"]
+__all__ = ["DEFAULT", "NOTHING", "Unknown", "checked_unknown", "expanded", "of_pivots", "pivot_shifts"]
 
 Unknown = float | Distribution | Literal["default"]
 """What is said of a parameter: a number if it is known, a distribution, or "default" for its default distribution."""
@@ -47,6 +48,12 @@ def of_pivots(said: Mapping[str, Unknown], pivots: int) -> dict[str, Unknown]:
         else:
             every[name] = value
     return {n: v for n, v in every.items() if (shift := BASE.fullmatch(n)) is None or int(shift[1]) <= pivots}
+
+
+def pivot_shifts(known: Mapping[str, float], pivots: int) -> Floats:
+    """Return the shifts of pivots against the stated ones, by numbers that are known, shape (pivots, 2)."""
+    said = of_pivots(known, pivots)
+    return np.array([[said.get(f"base_{k}_{axis}", 0.0) for axis in "xy"] for k in range(1, pivots + 1)], dtype=float)
 
 
 def checked_unknown(unknown: Any) -> dict[str, Unknown]:

@@ -25,7 +25,7 @@ from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig import make_record
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import Rig, rig_of
-from tactile_bayes.rig.unknown import of_pivots
+from tactile_bayes.rig.unknown import pivot_shifts
 from tactile_bayes.sweep.drive import Carried, Direction, Drive, Motion, Rotation, Translation, drives_of
 from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
@@ -319,11 +319,11 @@ def acting(rig: Rig | None) -> tuple[Rod, float, float]:
 def _shifted(drives: list[Drive], rig: Rig) -> list[Drive]:
     """Return drives about pivots, or from places, that are shifted against the stated ones."""
     begins = [one.base if isinstance(one, Rotation) else tuple(one.poses[0, :2].tolist()) for one in drives]
-    numbers = {place: number for number, place in enumerate(dict.fromkeys(begins), start=1)}
-    known: dict[str, Any] = {**of_pivots(rig.known, len(numbers))}
+    numbers = {place: number for number, place in enumerate(dict.fromkeys(begins))}
+    shifts = pivot_shifts(rig.known, len(numbers)).tolist()
     found: list[Drive] = []
     for one, place in zip(drives, begins, strict=True):
-        x, y = (float(known.get(f"base_{numbers[place]}_{axis}", 0.0)) for axis in "xy")
+        x, y = shifts[numbers[place]]
         if not (x or y):
             found.append(one)
         elif isinstance(one, Motion):
