@@ -14,7 +14,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples, reconstruct
 from tactile_bayes.record import in_frame
-from tactile_bayes.rig import Rig, make_record
+from tactile_bayes.rig import NOTHING, Rig, make_record
 from tactile_bayes.sweep import scan
 
 NUMBERS = ("contact_x", "contact_y", "contact_arclength", "slope_angle")
@@ -287,3 +287,11 @@ def test_a_carried_rod_that_slides_the_other_way_is_found():
     for found in (contacts, drawn):
         off = np.hypot(found.contact_x - record.truth_contact_x, found.contact_y - record.truth_contact_y)
         assert float(off[lying].max()) < 2e-3
+
+
+def test_a_number_for_all_pivots_is_one_for_each_of_them():
+    record = scan(CONTOUR, base=[(0.0, 0.0), (0.2, 0.0)], drive_step=0.1).record
+    every, each = ({**NOTHING, "base": 0.01}, {**NOTHING, "base_2_x": 0.01, "base_2_y": 0.01})
+    found, same = (reconstruct(record, rig=Rig(unknown=unknown)) for unknown in (every, each))
+    assert found.equals(same)
+    assert not found.equals(reconstruct(record, rig=Rig(unknown=NOTHING)))
