@@ -63,8 +63,7 @@ class Family:
     """
 
     name: str
-    priors: Mapping[str, Distribution]
-    """Distributions that are given, by parameter."""
+    priors: Mapping[str, Distribution]  # distributions that are given, by parameter
     known: Mapping[str, float]
 
     def __init__(self, name: str, /, **said: Any) -> None:

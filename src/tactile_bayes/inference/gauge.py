@@ -18,18 +18,7 @@ __all__ = ["Gauge"]
 
 @dataclass(frozen=True)
 class Gauge(ContourFamily):
-    """Family whose only contour is a known one.
-
-    Parameters
-    ----------
-    known : Contour
-        A single contour, in the record's unit of length.
-
-    Raises
-    ------
-    ParameterError
-        If it is no contour, or holds several, or none with parameters.
-    """
+    """Family whose only contour is a known one, in the record's unit of length."""
 
     known: Contour
 

@@ -49,28 +49,17 @@ __all__ = ["default_priors", "infer_point_load"]
 _GEOMETRY = ("clamp_axial", "clamp_lateral", "clamp_angle", "compliance")
 _UNITS = {"clamp_axial": "mm", "clamp_lateral": "mm", "clamp_angle": "rad", "compliance": "mm"}
 _POWERS = 4
-_VAGUE = 100.0
-"""Prior sd of a sensor coefficient, in full scales of the reading per power of 3/reach."""
-
-_GUESSES = 400
-"""Number of draws of the prior among which the search for a start begins."""
-
-_REFINED = 4
-"""Number of the best of them that are refined."""
-
-_INITIAL_NOISE = 0.01
-"""Noise over range of the readings at the beginning of the search."""
-
+_VAGUE = 100.0  # prior sd of a sensor coefficient, in full scales of the reading per power of 3/reach
+_GUESSES = 400  # number of draws of the prior among which the search for a start begins
+_REFINED = 4  # number of the best of them that are refined
+_INITIAL_NOISE = 0.01  # noise over range of the readings at the beginning of the search
+# Scatter of the walkers' starts over the sd of the normal approximation; halved until enough of them are possible.
 _INFLATION = 2.0
-"""Scatter of the walkers' starts over the sd of the normal approximation; halved until enough of them are possible."""
-
 _LEAST_INFLATION = 1e-3
-
+# Log-probability per parameter by which a start may be below the centre, so that no minor mode captures it.
 _DROP = 10.0
-"""Log-probability per parameter by which a start may be below the centre, so that no minor mode captures it."""
-
+# Most of an evaluation does not depend on the number of points, so many walkers are cheap.
 _SETTINGS = SamplerSettings(walkers=64)
-"""Most of an evaluation does not depend on the number of points, so many walkers are cheap."""
 
 
 def _reach(axial: Floats, lateral: Floats) -> float:
@@ -110,8 +99,7 @@ class _Model:
     axial: Floats
     lateral: Floats
     reading: Floats
-    unit_curvature: float
-    """3/reach, the unit of the curvature in the powers of the sensor curve."""
+    unit_curvature: float  # 3/reach, the unit of the curvature in the powers of the sensor curve
     coefficient_sd: float
     priors: Mapping[str, Any]
     known: Mapping[str, float]

@@ -25,8 +25,9 @@ from tactile_bayes.inference.contact_posterior.draws import (
     Method,
     draw_contacts,
 )
-from tactile_bayes.inference.contact_posterior.importance import LARGEST_K, LEAST_DRAWS
+from tactile_bayes.inference.contact_posterior.importance import LEAST_DRAWS
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.importance import LARGEST_K
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.shortening import thinned
 from tactile_bayes.load_cell import LoadCell, LoneSamples
@@ -40,12 +41,8 @@ from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["infer_contacts"]
 
-_MIN_MISFIT_PROBABILITY = 1e-4
-"""Probability of a misfit below which the message reports that the loads do not fit."""
-
-_MOST_DRAWS = 10**6
-"""Largest number of draws for each sample."""
-
+_MIN_MISFIT_PROBABILITY = 1e-4  # probability of a misfit below which the message reports that the loads do not fit
+_MOST_DRAWS = 10**6  # largest number of draws for each sample
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 
 

@@ -11,37 +11,25 @@ from tactile_bayes.arrays import Floats, Index
 
 __all__ = ["ContactProposal", "Proposed"]
 
+# Widths of the normal densities of a branch, in standard deviations of the posterior's approximation.
 _WIDTHS = np.array([1.15, 3.0])
-"""Widths of the normal densities of a branch, in standard deviations of the posterior's approximation."""
-
 _SHARES = np.array([0.75, 0.25])
-
+# Largest distance of a mean beyond the edge, in standard deviations, so that probabilities stay positive.
 _MAX_DISTANCE = 30.0
-"""Largest distance of a mean beyond the edge, in standard deviations, so that probabilities stay positive."""
 
 
 class Proposed(NamedTuple):
     """Points (way, force[, drive angle]) with the logarithm of their proposal density."""
 
-    points: Floats
-    """Shape (draws, n, 2 or 3)."""
-    log_density: Floats
-    """Shape (draws, n)."""
+    points: Floats  # shape (draws, n, 2 or 3)
+    log_density: Floats  # shape (draws, n)
 
 
 class ContactProposal:
-    """A mixture distribution for each of n samples.
+    """A mixture distribution for each of n samples, of normal densities on each branch.
 
-    Parameters
-    ----------
-    mean : ndarray, shape (branches, n, k)
-        Mean of way, force and, if k is 3, drive angle, on each branch.
-    covariance : ndarray, shape (branches, n, k, k)
-        Covariance of the same.
-    share : ndarray, shape (branches, n)
-        Share of each branch; 0 if it has no approximation.
-    ways : ndarray, shape (branches, 2)
-        Least and largest way on each branch.
+    Shapes: mean (branches, n, k) of way, force and, if k is 3, drive angle, covariance (branches, n, k, k), share
+    (branches, n), 0 without an approximation, ways (branches, 2), the least and the largest.
     """
 
     def __init__(self, mean: Floats, covariance: Floats, share: Floats, ways: Floats) -> None:

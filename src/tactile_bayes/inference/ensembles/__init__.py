@@ -22,38 +22,9 @@ With a checkpoint, every block of steps is on disk before the next begins. A blo
 the walkers and the states of their random numbers, so that a killed run makes the same draws as an uninterrupted one.
 """
 
-from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithms, Plain, Proposing, in_coordinates
 from tactile_bayes.inference.ensembles.draws import Draws
-from tactile_bayes.inference.ensembles.mixture import Mixture
-from tactile_bayes.inference.ensembles.modes import Mode
-from tactile_bayes.inference.ensembles.moves import whitened_moves
-from tactile_bayes.inference.ensembles.pilot import learn_coordinates, standardise
-from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
-from tactile_bayes.inference.ensembles.straightened import Straightened
 from tactile_bayes.inference.ensembles.walkers import scatter_walkers
 
-__all__ = [
-    "ANYTHING",
-    "Coordinates",
-    "Draws",
-    "Ends",
-    "Logarithms",
-    "Mixture",
-    "Mode",
-    "Plain",
-    "Progress",
-    "Proposal",
-    "Proposing",
-    "SamplerSettings",
-    "Straightened",
-    "approximate",
-    "in_coordinates",
-    "learn_coordinates",
-    "sample",
-    "scatter_walkers",
-    "settings_of",
-    "standardise",
-    "whitened_moves",
-]
+__all__ = ["Draws", "Progress", "SamplerSettings", "sample", "scatter_walkers", "settings_of"]

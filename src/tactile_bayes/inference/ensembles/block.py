@@ -9,29 +9,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.moves import Moves, step_ensembles
-from tactile_bayes.inference.ensembles.target import LogProbability
 from tactile_bayes.inference.ensembles.walkers import RandomState
 
 __all__ = ["Block", "make_block", "next_diagnosis"]
 
 
-_GROWTH = 1.25
-"""Ratio of the steps at two successive diagnoses: all diagnoses together then cost five times the last."""
+_GROWTH = 1.25  # ratio of the steps at two successive diagnoses: all diagnoses together then cost five times the last
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
     """Consecutive steps of all ensembles, and the random states with which they continue."""
 
-    samples: Floats
-    """Shape (chain, step, walker, parameter)."""
-    log_probability: Floats
-    """Shape (chain, step, walker)."""
+    samples: Floats  # shape (chain, step, walker, parameter)
+    log_probability: Floats  # shape (chain, step, walker)
+    # Random state of each ensemble after the last step; with that step's samples it determines the next step.
     random_states: tuple[RandomState, ...]
-    """Random state of each ensemble after the last step; with that step's samples it determines the next step."""
-    whole: bool = True
-    """False if an interrupt ended the block; the ensembles then do not continue."""
+    whole: bool = True  # false if an interrupt ended the block; the ensembles then do not continue
 
     @property
     def steps(self) -> int:

@@ -25,13 +25,10 @@ __all__ = ["Checkpoint", "open_checkpoint"]
 
 
 _DESCRIPTION = "checkpoint.json"
-
 _KIND = "ensembles of tactile-bayes"
-
 _FORMAT = 1
-
+# First step of a block, counted from 0, and the step after its last.
 _BLOCK = re.compile(r"block-(\d{8,})-(\d{8,})\.npz")
-"""First step of a block, counted from 0, and the step after its last."""
 
 
 class Checkpoint:

@@ -13,12 +13,8 @@ from tactile_bayes.arrays import Flags, Floats
 __all__ = ["Diagnosis", "autocorrelation_time", "lost_walkers", "walker_major"]
 
 
-_TAIL = (0.05, 0.95)
-"""Quantiles that define the effective sample size of the tails."""
-
-
-_LOST_BELOW = 10.0
-"""Distance of a lost walker's largest log-probability below the median of all walkers."""
+_TAIL = (0.05, 0.95)  # quantiles that define the effective sample size of the tails
+_LOST_BELOW = 10.0  # distance of a lost walker's largest log-probability below the median of all walkers
 
 
 def lost_walkers(values: Floats) -> Flags:
@@ -33,8 +29,7 @@ def lost_walkers(values: Floats) -> Flags:
     return np.asarray(values.max(axis=1) < np.median(values) - _LOST_BELOW)
 
 
-_WINDOW = 5.0
-"""Window of the sum of autocorrelations, in autocorrelation times, as in emcee."""
+_WINDOW = 5.0  # window of the sum of autocorrelations, in autocorrelation times, as in emcee
 
 
 class Diagnosis:

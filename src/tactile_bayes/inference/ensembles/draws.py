@@ -15,42 +15,28 @@ __all__ = ["Draws"]
 class Draws:
     """Draws from a posterior, with their convergence diagnostics."""
 
-    samples: Floats
-    """Shape (chain, draw, parameter): a chain is an ensemble, with its draws walker-major."""
-    log_probability: Floats
-    """Shape (chain, draw)."""
+    samples: Floats  # shape (chain, draw, parameter): a chain is an ensemble, with its draws walker-major
+    log_probability: Floats  # shape (chain, draw)
     names: tuple[str, ...]
     walkers: int
-    steps_kept: int
-    """Number of steps of each walker in `samples`: every `every`-th of the second half of its steps."""
+    steps_kept: int  # number of steps of each walker in `samples`: every `every`-th of the second half of its steps
     steps_run: int
+    # Rank-normalised R̂ of each parameter across ensembles, each split in early and late steps to detect drift.
     r_hat: Floats
-    """Rank-normalised R̂ of each parameter across ensembles, each split in early and late steps to detect drift."""
-    ess_bulk: Floats
-    """Effective sample size of the bulk, per parameter."""
-    ess_tail: Floats
-    """The smaller effective sample size of the 5 % and 95 % quantiles, per parameter."""
-    acceptance: Floats
-    """Share of accepted proposals, per ensemble, over the steps kept."""
+    ess_bulk: Floats  # effective sample size of the bulk, per parameter
+    ess_tail: Floats  # the smaller effective sample size of the 5 % and 95 % quantiles, per parameter
+    acceptance: Floats  # share of accepted proposals, per ensemble, over the steps kept
+    # emcee's integrated autocorrelation time [steps] per parameter, mean over ensembles. It is infinite if a walker is
+    # stuck. emcee subtracts each walker's own mean, so that the estimate is too small over few autocorrelation times.
     autocorrelation_time: Floats
-    """emcee's integrated autocorrelation time [steps] per parameter, mean over ensembles.
-
-    It is infinite if a walker is stuck. emcee subtracts each walker's own mean, so that the estimate is too small over
-    few autocorrelation times.
-    """
+    # Number of points at which the log-probability was computed, including earlier calls with a checkpoint.
     evaluations: int
-    """Number of points at which the log-probability was computed, including earlier calls with a checkpoint."""
-    seconds: float
-    """Sampling time [s], including the steps of earlier calls with a checkpoint."""
+    seconds: float  # sampling time [s], including the steps of earlier calls with a checkpoint
     converged: bool
-    message: str
-    """Reason for the end of the run, with the worst diagnostics."""
-    stuck: int
-    """Number of walkers that did not move in all the steps kept."""
-    modes: tuple[Mode, ...] = ()
-    """Modes of the ensembles, if each ensemble is stationary but they disagree; else empty."""
-    every: int = 1
-    """Thinning: 1, or a power of two if the second half of the steps would take too much memory."""
+    message: str  # reason for the end of the run, with the worst diagnostics
+    stuck: int  # number of walkers that did not move in all the steps kept
+    modes: tuple[Mode, ...] = ()  # modes of the ensembles, if each ensemble is stationary but they disagree; else empty
+    every: int = 1  # thinning: 1, or a power of two if the second half of the steps would take too much memory
 
     def refuse_interrupted(self, what: str) -> None:
         """Raise the interrupt that ended the run, for callers that cannot use a part of it."""

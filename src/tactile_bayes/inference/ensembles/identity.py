@@ -10,18 +10,16 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.ensembles.coordinates import Coordinates
+from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.numerics.random_numbers import Seed, whole_seed
 
 __all__ = ["changes", "identity_of_run"]
 
 
+# Entries that follow from the others, if those are complete.
 _START, _COORDINATES = _CONSEQUENCES = ("starting points", "coordinates of the walkers")
-"""Entries that follow from the others, if those are complete."""
-
-_MAX_CHARACTERS = 60
-"""Largest number of characters of an entry in an error message."""
+_MAX_CHARACTERS = 60  # largest number of characters of an entry in an error message
 
 
 def identity_of_run(

@@ -13,29 +13,20 @@ from tactile_bayes.arrays import Flags, Floats
 __all__ = ["Mode", "modes_message", "modes_of"]
 
 
+# Distance of two ensembles' means, over the larger of their standard deviations, from which they are separate.
 _MIN_DISTANCE = 5.0
-"""Distance of two ensembles' means, over the larger of their standard deviations, from which they are separate."""
-
-_MAX_R_HAT = 1.1
-"""R̂ of an ensemble's early against its late steps below which it is stationary."""
-
-_MIN_DRAWS_PER_WALKER = 2.0
-"""Smallest number of effective draws per walker of a stationary ensemble."""
-
-_MAX_NAMED = 3
-"""Largest number of parameters that the message names for a mode."""
+_MAX_R_HAT = 1.1  # R̂ of an ensemble's early against its late steps below which it is stationary
+_MIN_DRAWS_PER_WALKER = 2.0  # smallest number of effective draws per walker of a stationary ensemble
+_MAX_NAMED = 3  # largest number of parameters that the message names for a mode
 
 
 @dataclass(frozen=True)
 class Mode:
     """Mode that holds some of the ensembles."""
 
-    ensembles: tuple[int, ...]
-    """Numbers of the ensembles, counted from 0."""
-    values: Mapping[str, float]
-    """Median of each parameter that separates the modes, the clearest first."""
-    log_probability: float
-    """Mean log-probability over the draws of the mode."""
+    ensembles: tuple[int, ...]  # numbers of the ensembles, counted from 0
+    values: Mapping[str, float]  # median of each parameter that separates the modes, the clearest first
+    log_probability: float  # mean log-probability over the draws of the mode
 
 
 def modes_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> tuple[Mode, ...]:

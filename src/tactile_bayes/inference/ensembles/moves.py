@@ -9,23 +9,26 @@ import emcee
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.ensembles.mixture import Mixture
-from tactile_bayes.inference.ensembles.proposal import Proposal
-from tactile_bayes.inference.ensembles.target import LogProbability
+from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
 
-__all__ = ["FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "step_ensembles", "whitened_moves"]
+__all__ = [
+    "FittedMove",
+    "FixedMove",
+    "Moves",
+    "NormalMove",
+    "moves_in",
+    "standard_moves",
+    "step_ensembles",
+    "whitened_moves",
+]
 
-Moves = Sequence[tuple[Any, float]]
-"""Moves of an ensemble, with their shares. They keep nothing from step to step."""
-
+Moves = Sequence[tuple[Any, float]]  # moves of an ensemble, with their shares. They keep nothing from step to step.
+# Smallest share of the new normal draw in a step of `NormalMove`, and the probability that it is all of the step.
 _MIN_NEW_SHARE, _WHOLLY_NEW = 0.2, 0.5
-"""Smallest share of the new normal draw in a step of `NormalMove`, and the probability that it is all of the step."""
-
-_SHORT_SCALE = 0.25
-"""Scale of short differences over the usual scale, for targets along bent ridges or between bounds."""
-
+_SHORT_SCALE = 0.25  # scale of short differences over the usual scale, for targets along bent ridges or between bounds
+# Largest share of proposals from a fixed distribution, and the efficiency from which it applies.
 _MAX_FIXED_SHARE, _EFFICIENT = 0.8, 0.5
-"""Largest share of proposals from a fixed distribution, and the efficiency from which it applies."""
 
 
 def step_ensembles(
@@ -135,6 +138,11 @@ class NormalMove(emcee.moves.RedBlueMove):
         proposed = sample.copy()
         proposed[:, self._columns] = there
         return proposed, 0.5 * np.sum(there**2 - moving**2, axis=1)
+
+
+def moves_in(coordinates: Coordinates) -> Moves:
+    """Return the moves of an ensemble in coordinates, with their shares."""
+    return standard_moves(coordinates.proposal) if coordinates.bent is None else whitened_moves(coordinates.bent)
 
 
 def standard_moves(proposal: Mixture | None = None) -> Moves:

@@ -8,33 +8,26 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.ensembles.block import Block
-from tactile_bayes.inference.ensembles.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, lost_walkers
 
 __all__ = ["RunState", "StoredSteps"]
 
 
+# Largest count of stored numbers of all ensembles, beyond which steps are thinned: 32 MB, and 6 s for a diagnosis.
 _MAX_STORED = 4_000_000
-"""Largest count of stored numbers of all ensembles, beyond which steps are thinned: 32 MB, and 6 s for a diagnosis."""
-
-_MAX_LOST = 0.1
-"""Largest share of the walkers of an ensemble that are taken back."""
+_MAX_LOST = 0.1  # largest share of the walkers of an ensemble that are taken back
 
 
 class StoredSteps(NamedTuple):
     """Consecutive steps, some of them stored."""
 
-    first: int
-    """Number of the first step, counted from 1."""
-    numbers: Index
-    """Numbers of the stored steps."""
-    samples: Floats
-    """Samples of the stored steps, shape (chain, step, walker, parameter)."""
-    values: Floats
-    """Their log-probability, shape (chain, step, walker)."""
-    moved: Flags
-    """True if a walker moved in a step, for all steps, shape (chain, step, walker)."""
+    first: int  # number of the first step, counted from 1
+    numbers: Index  # numbers of the stored steps
+    samples: Floats  # samples of the stored steps, shape (chain, step, walker, parameter)
+    values: Floats  # their log-probability, shape (chain, step, walker)
+    moved: Flags  # True if a walker moved in a step, for all steps, shape (chain, step, walker)
 
     def since(self, steps: int, every: int) -> StoredSteps:
         """Return the part after so many steps of the run, with every `every`-th step."""
@@ -48,19 +41,14 @@ class StoredSteps(NamedTuple):
 class RunState:
     """State of a run: its last step, from which it continues, and the second half of its steps."""
 
-    coordinates: Coordinates
-    """Coordinates in which the parameters are sampled."""
-    last: Block
-    """Last block, whose last step determines the next one."""
-    steps: int
-    """Number of steps of each ensemble."""
+    coordinates: Coordinates  # coordinates in which the parameters are sampled
+    last: Block  # last block, whose last step determines the next one
+    steps: int  # number of steps of each ensemble
+    # Thinning: a power of two that follows from the number of steps and the shape alone, so that a resumed run stores
+    # the same steps as an uninterrupted one.
     every: int
-    """Thinning: a power of two that follows from the number of steps and the shape alone, so that a resumed run stores
-    the same steps as an uninterrupted one."""
-    half: StoredSteps
-    """Second half of the steps at the last diagnosis, as parameters."""
-    recent: tuple[StoredSteps, ...] = ()
-    """Blocks since then, in the coordinates."""
+    half: StoredSteps  # second half of the steps at the last diagnosis, as parameters
+    recent: tuple[StoredSteps, ...] = ()  # blocks since then, in the coordinates
 
     @classmethod
     def begin(cls, coordinates: Coordinates, start: Block, steps: int = 0, planned: int = 0) -> RunState:

@@ -14,31 +14,28 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
+from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.block import Block, make_block, next_diagnosis
 from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, open_checkpoint
-from tactile_bayes.inference.ensembles.coordinates import Coordinates, Plain, in_coordinates
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time, lost_walkers, walker_major
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.identity import identity_of_run
 from tactile_bayes.inference.ensembles.modes import modes_message, modes_of
+from tactile_bayes.inference.ensembles.moves import moves_in
 from tactile_bayes.inference.ensembles.run_state import RunState
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
-from tactile_bayes.inference.ensembles.target import CheckedTarget, LogProbability
-from tactile_bayes.inference.ensembles.walkers import checked_start, first_random_state
+from tactile_bayes.inference.ensembles.walkers import CheckedTarget, checked_start, first_random_state
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 
 __all__ = ["Progress", "sample"]
 
 
+# Smallest mean number of effective draws per walker: the discarded half then exceeds five autocorrelation times.
 _DRAWS_PER_WALKER = 5
-"""Smallest mean number of effective draws per walker: the discarded half then exceeds five autocorrelation times."""
-
 _CONVERGED = "converged"
-
 _OUT_OF_STEPS = "not converged, the steps allowed ran out"
-
 _OUT_OF_TIME = "not converged, the time allowed ran out"
-
 _INTERRUPTED = "not converged, interrupted"
 
 
@@ -46,15 +43,11 @@ _INTERRUPTED = "not converged, interrupted"
 class Progress:
     """State of a run at a diagnosis."""
 
-    steps: int
-    """Number of steps that each ensemble has made."""
+    steps: int  # number of steps that each ensemble has made
     max_steps: int
-    r_hat: float
-    """Largest R̂ of all parameters."""
-    ess: float
-    """Smallest effective sample size of all parameters, bulk or tail."""
-    seconds: float
-    """Time since the start [s], including the steps of earlier calls with a checkpoint."""
+    r_hat: float  # largest R̂ of all parameters
+    ess: float  # smallest effective sample size of all parameters, bulk or tail
+    seconds: float  # time since the start [s], including the steps of earlier calls with a checkpoint
 
 
 def sample(
@@ -75,65 +68,14 @@ def sample(
     half of the steps so far is diagnosed: rank-normalised R̂ across ensembles, each split in early and late steps, and
     effective sample size in bulk and tails (Vehtari et al. 2021, doi 10.1214/20-BA1221). The run stops when every
     parameter satisfies the settings, the walkers have given five effective draws each on average, and none is lost
-    where nothing is probable. A few that are lost are taken back to where others of their ensemble were.
+    where nothing is probable. A few that are lost are taken back to where others of their ensemble were. `start`,
+    (ensembles, walkers, parameters), is in the coordinates; it should be wider than the posterior, or R̂ cannot
+    distinguish a part of it from the whole.
 
-    Parameters
-    ----------
-    log_probability : callable
-        Function from an array (n, parameters) to (n,): log of the target density up to a constant, −inf outside its
-        support.
-    start : array_like, shape (ensembles, walkers, parameters)
-        Starting point of each walker, in the coordinates, each with a finite log-probability. Start wider than the
-        posterior, or R̂ cannot distinguish a part of it from the whole; `scatter_walkers` helps.
-    names : sequence of str
-        Names of the parameters, for messages.
-    seed : int or numpy.random.SeedSequence
-        Seed of all random numbers; the same seed gives the same draws.
-    settings : SamplerSettings, optional
-        Size of the ensembles and criteria for stopping.
-    progress : callable, optional
-        Called with a `Progress` after each diagnosis.
-    checkpoint : path-like, optional
-        Folder, created if missing, in which every block of steps is stored (see Notes).
-    identity : mapping of str to str, optional
-        All that determines the log-probability, for the checkpoint: hash of the data, model, priors and the like. The
-        arguments of `sample` are added to it.
-    coordinates : Coordinates, optional
-        Coordinates in which the parameters are sampled; by default the parameters. Diagnoses and results are of the
-        parameters.
-
-    Returns
-    -------
-    Draws
-        `converged` is True if the settings were satisfied. A KeyboardInterrupt ends the run, and the draws made so far
-        are returned, with `converged` False; before the first step the interrupt is raised.
-
-    Raises
-    ------
-    ParameterError
-        If shapes do not agree or there are too few walkers.
-    InferenceError
-        If walkers start outside the support or in a plane, or the log-probability is NaN or +inf somewhere; if the
-        checkpoint belongs to another run, has another format, is damaged or in use, or the folder holds other files.
-    OSError
-        If a block cannot be written; the blocks before it remain.
-
-    Notes
-    -----
-    A run with a checkpoint may be killed at any moment. Called again with the same arguments it resumes after the last
-    finished block of at most `block_steps` steps, and its draws are, bit by bit, those of an uninterrupted run, if the
-    log-probability is reproducible. A run that has ended is not made again: its draws come from the checkpoint, and the
-    log-probability is not evaluated. Of the settings, `max_steps`, `max_seconds`, `min_ess` and `max_r_hat` may change
-    from call to call, so that a run which ran out of steps or time can resume with more of them. Stored steps are never
-    dropped: with a smaller `max_steps` all of them are returned. Steps of a block that an interrupt cuts short are
-    returned, but not stored.
-
-    Examples
-    --------
-    >>> start = np.random.default_rng(1).normal(size=(4, 32, 1))
-    >>> draws = sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], seed=2)
-    >>> draws.converged, draws.samples.shape[0]
-    (True, 4)
+    A KeyboardInterrupt after the first step ends the run with the draws so far. A run with a checkpoint may be killed
+    at any moment: called again it resumes after the last finished block, and its draws are, bit by bit, those of an
+    uninterrupted run; one that has ended is not made again. `identity` states what determines the log-probability. Of
+    the settings, `max_steps`, `max_seconds`, `min_ess` and `max_r_hat` may change from call to call.
     """
     began = time.monotonic()
     settings = SamplerSettings() if settings is None else settings
@@ -143,7 +85,7 @@ def sample(
     points = checked_start(start, names, settings)
     chains, walkers, _ = points.shape
     target = CheckedTarget(log_probability, names)
-    coordinates = coordinates or Plain()
+    coordinates = coordinates or Coordinates()
     density = in_coordinates(target, coordinates)
     settings = replace(settings, min_ess=max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers))
     deadline = math.inf if settings.max_seconds is None else began + settings.max_seconds
@@ -166,7 +108,7 @@ def sample(
                 due = min(due, settings.max_steps)
                 while state.steps < due and not (late or ending):
                     steps = min(settings.block_steps, due - state.steps)
-                    block = make_block(density, coordinates.moves(), state.last, steps, deadline)
+                    block = make_block(density, moves_in(coordinates), state.last, steps, deadline)
                     diagnosis = None
                     state = state.append(block)
                     if not block.whole:

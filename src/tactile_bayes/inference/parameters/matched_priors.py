@@ -18,18 +18,12 @@ from tactile_bayes.inference.parameters.priors import own_priors
 
 __all__ = ["matched_priors", "mean_log_radius", "widened"]
 
+# Slope angles over which a flank's radius of curvature is averaged [rad].
 _SLOPES = np.linspace(0.0, 0.25 * np.pi, 9, endpoint=False) + np.pi / 72.0
-"""Slope angles over which a flank's radius of curvature is averaged [rad]."""
-
+# Median [rod lengths] of the geometric mean of a flank's radius of curvature, and standard deviation of its logarithm.
 _MEDIAN, _SPREAD = 0.5, 1.0
-"""Median [rod lengths] of the geometric mean of a flank's radius of curvature, and standard deviation of its
-logarithm."""
-
-_DRAWS = 2048
-"""Number of quasi-random draws from a prior."""
-
-_NARROWEST, _WIDEST = 0.05, 3.0
-"""Range of factors on standard deviations in which the matching one is sought."""
+_DRAWS = 2048  # number of quasi-random draws from a prior
+_NARROWEST, _WIDEST = 0.05, 3.0  # range of factors on standard deviations in which the matching one is sought
 
 
 def matched_priors(family: str, length: float) -> dict[str, Distribution]:
@@ -38,7 +32,7 @@ def matched_priors(family: str, length: float) -> dict[str, Distribution]:
     The default priors are the same for all parameters of a kind, so that an ellipse, which has two sizes, is expected
     to be wider and rounder than a circle. Here, sizes have priors for which the geometric mean of the radius of
     curvature between slopes of 0° and 45° on one side has its median at half the rod's length, and its logarithm a
-    standard deviation of 1. Exponents, amplitude and length scale keep their default priors.
+    standard deviation of 1.
     """
     return {
         f"{side}{parameter}": prior

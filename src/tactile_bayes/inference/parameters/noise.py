@@ -21,21 +21,17 @@ if TYPE_CHECKING:
 __all__ = ["Noise", "noise_of"]
 
 
-_LOUDEST = 10.0
-"""Largest noise in the default prior of an unknown one [EI/L, EI/L²]."""
+_LOUDEST = 10.0  # largest noise in the default prior of an unknown one [EI/L, EI/L²]
 
 
 class Noise(NamedTuple):
     """Parameters of a load cell's noise, with their priors."""
 
-    cell: LoadCell
-    """Load cell in the record's units, whose noise the parameters scale."""
+    cell: LoadCell  # load cell in the record's units, whose noise the parameters scale
+    # Names of the parameters: of the white noise, and then of the discrepancy, if it is inferred.
     names: tuple[str, ...]
-    """Names of the parameters: of the white noise, and then of the discrepancy, if it is inferred."""
-    channels: tuple[tuple[str, ...], ...]
-    """Channels that each parameter of the white noise scales."""
-    priors: dict[str, Distribution]
-    """Default priors by name, in the record's units."""
+    channels: tuple[tuple[str, ...], ...]  # channels that each parameter of the white noise scales
+    priors: dict[str, Distribution]  # default priors by name, in the record's units
 
     @property
     def of_white(self) -> tuple[str, ...]:

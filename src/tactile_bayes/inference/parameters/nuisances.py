@@ -39,57 +39,32 @@ __all__ = [
 ]
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
-
 BIASES, DRIFTS, GAINS, LEVERS, CURVE = (GROUPS[what] for what in ("bias", "drift", "gain", "lever", "moment_curve"))
-
-_SAME_DIRECTION = 1e-3
-"""Range of drive angles [rad] within which a rod keeps its direction."""
-
+_SAME_DIRECTION = 1e-3  # range of drive angles [rad] within which a rod keeps its direction
+# Parameters of the noise, which are none of the forward model.
 _OF_NOISE = ("discrepancy_scale", "discrepancy_length", "noise_scale", "moment_noise", "force_noise")
-"""Parameters of the noise, which are none of the forward model."""
-
 _RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
+# Parameters that change the path or the reading of the drive angle, and their names in `RigValues`.
 _RIG["backlash"] = "drive_angle_backlash"
-"""Parameters that change the path or the reading of the drive angle, and their names in `RigValues`."""
-
+# Parameters that change only what the load cell senses, not the path.
 _SENSED = (*BIASES, *DRIFTS, *GAINS, *LEVERS, *CURVE)
-"""Parameters that change only what the load cell senses, not the path."""
 
 
 @dataclass(frozen=True)
 class Nuisances:
-    """Parameters of a rig that are inferred beside those of a contour.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the parameters.
-    priors : mapping of str to frozen scipy.stats distribution
-        Default priors by name, in the record's units.
-    rod : Rod
-        The stated rod.
-    known : mapping of str to float
-        Known parameters that are not as stated, in the record's units.
-    elapsed : ndarray, shape (samples,)
-        Position of each sample in the record, linear from the first (−½) to the last (½), for drift.
-    joint : RigPrior, optional
-        Joint prior of the parameters that a calibration of the rig has found; their `priors` are its marginals.
-    curve : (float, float)
-        Stated curve of the moment [L/EI, (L/EI)²], where it is not inferred.
-    pivots : int
-        Number of pivots of the record.
-    """
+    """Parameters of a rig that are inferred beside those of a contour."""
 
     names: tuple[str, ...]
-    priors: Mapping[str, Distribution]
-    rod: Rod
-    known: Mapping[str, float] = field(default_factory=dict)
+    priors: Mapping[str, Distribution]  # in the record's units
+    rod: Rod  # as stated
+    known: Mapping[str, float] = field(default_factory=dict)  # not as stated, in the record's units
+    # Of each sample, linear from the first (−½) to the last (½).
     elapsed: Floats = field(default_factory=lambda: np.zeros(1))
-    joint: RigPrior | None = None
-    curve: tuple[float, float] = (0.0, 0.0)
+    joint: RigPrior | None = None  # prior that a calibration found; `priors` are its marginals
+    curve: tuple[float, float] = (0.0, 0.0)  # stated one of the moment [L/EI, (L/EI)²]
     pivots: int = 1
+    # Unit of each parameter in dimensionless calculations, in the record's units.
     units: Mapping[str, float] = field(init=False)
-    """Unit of each parameter in dimensionless calculations, in the record's units."""
 
     def __post_init__(self) -> None:
         units = {name: unit_of(name, self.rod) for name in PARAMETERS}

@@ -12,26 +12,19 @@ from scipy.special import logsumexp
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
+from tactile_bayes.inference.coordinates.flank import FlankCoordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import (
-    ANYTHING,
-    Coordinates,
-    Ends,
-    Mixture,
-    Proposal,
-    Proposing,
-    SamplerSettings,
-    approximate,
-    in_coordinates,
-    learn_coordinates,
-    scatter_walkers,
-    standardise,
-)
+from tactile_bayes.inference.densities import ANYTHING, Ends, Mixture, Proposal
+from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
+from tactile_bayes.inference.importance import approximate
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
+from tactile_bayes.inference.starts.cloud import Cloud, gather
 from tactile_bayes.inference.starts.contour_optimum import (
     ContourOptimum,
     contact_fit,
@@ -39,65 +32,39 @@ from tactile_bayes.inference.starts.contour_optimum import (
     optima_of,
     optimum_of,
 )
-from tactile_bayes.inference.starts.flank_coordinates import FlankCoordinates
-from tactile_bayes.inference.starts.start import Cloud, gather
+from tactile_bayes.inference.starts.pilot import learn_coordinates, standardise
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
-__all__ = ["Walk", "walk_of"]
+__all__ = ["Walk", "flank_at_contacts", "walk_of"]
 
+# Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
+# noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable.
 _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
-"""Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
-noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable."""
-
-_MANY_SAMPLES = 100
-"""Number of loaded samples from which an optimum that explains the record is taken for the only one."""
-
-_MAX_SEARCHES = 9
-"""Number of searches after which no other begins, unless none of them explains a record of few loaded samples."""
-
+_MANY_SAMPLES = 100  # loaded ones, from which an optimum that explains the record is taken for the only one
+_MAX_SEARCHES = 9  # after which no other begins, unless none of them explains a record of few loaded samples
+# Searches that end in known modes, after which no other mode is expected: for a record of many loaded samples, and for
+# any record if the posterior is nearly normal around the last mode found.
 _REPEATS, _REPEATS_FEW_SAMPLES = 2, 4
-"""Number of searches that end in known modes, after which no other mode is expected: for a record of many loaded
-samples, and for any record if the posterior is nearly normal around the last mode found."""
-
-_EFFICIENT = 0.35
-"""Efficiency of a proposal above which the posterior is nearly normal around it."""
-
+_EFFICIENT = 0.35  # efficiency of a proposal above which the posterior is nearly normal around it
+# Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred: a
+# ridge that bends beyond the draws of the importance sampling looks straight.
 _FLANK_EFFICIENCY = 0.4
-"""Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred:
-a ridge that bends beyond the draws of the importance sampling looks straight."""
-
-_PILOT_WALKERS = 6
-"""Largest number of walkers per parameter in the pilot run that learns coordinates."""
-
-_SCALE_DRAWS = 500
-"""Number of draws from which the prior scale of a coordinate, or the extent of a proposal, is estimated."""
-
-_MAX_EXCESS_COST = 100.0
-"""Cost above the smallest one from which an optimum is disregarded."""
-
-_MODE_RADIUS = 3.0
-"""Distance from a mode, over that of typical points of its proposal, below which an optimum belongs to it."""
-
-_MAX_LOG_MASS_RATIO = 9.0
-"""Logarithm of the ratio of two masses from which the smaller mode is left out: one draw in ten thousand."""
-
-_LIKELIEST = 3
-"""Number of draws of the prior from which a mode is sought, if the record's contact points do not lead to one."""
-
-_POOR_MISFIT = 2.0
-"""Mean square of the standardised residuals above which a further search is made."""
+_PILOT_WALKERS = 6  # per parameter in the pilot run that learns coordinates, at most
+_SCALE_DRAWS = 500  # from which the prior scale of a coordinate, or the extent of a proposal, is estimated
+_MAX_EXCESS_COST = 100.0  # above the smallest cost, from which an optimum is disregarded
+_MODE_RADIUS = 3.0  # distance from a mode, over that of typical points of its proposal, within which an optimum is its
+_MAX_LOG_MASS_RATIO = 9.0  # from which the smaller mode is left out: one draw in ten thousand
+_LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
+_POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
 
 
 class Walk(NamedTuple):
     """Starting points of the walkers, and the coordinates in which they are sampled."""
 
-    start: Floats
-    """Shape (ensemble, walker, coordinate)."""
+    start: Floats  # (ensemble, walker, coordinate)
     coordinates: Coordinates
-    log_evidence: float = -np.inf
-    """Coarse log-evidence of the model, up to a constant of the number of parameters."""
-    beyond: str = ""
-    """Parameters that fit the record far better beyond the ends of their priors, as text."""
+    log_evidence: float = -np.inf  # coarse one of the model, up to a constant of the number of parameters
+    beyond: str = ""  # parameters that fit the record far better beyond the ends of their priors, as text
 
 
 def walk_of(
@@ -219,14 +186,8 @@ class _Mode(NamedTuple):
     optimum: ContourOptimum
     cloud: Cloud
     proposal: Proposal
-    coordinates: Proposing
-    """Coordinates of the cloud and the proposal."""
-    usual: _Mode | None = None
-    """The mode in the model's own coordinates, if those are others."""
-
-    @property
-    def flank(self) -> FlankCoordinates | None:
-        return self.coordinates if isinstance(self.coordinates, FlankCoordinates) else None
+    coordinates: Coordinates  # of the cloud and the proposal
+    usual: _Mode | None = None  # the mode in the model's own coordinates, if those are others
 
 
 def _scattered(
@@ -273,7 +234,7 @@ def _scattered(
     return Walk(coordinates.of(start), coordinates, log_evidence, modes[0].optimum.beyond)
 
 
-def _prior_scale(model: ContourModel, coordinates: Proposing, rng: np.random.Generator) -> Floats:
+def _prior_scale(model: ContourModel, coordinates: Coordinates, rng: np.random.Generator) -> Floats:
     """Return half the width of the central two thirds of each coordinate's prior."""
     draws = np.stack([model.priors[name].rvs(_SCALE_DRAWS, random_state=rng) for name in model.names], axis=1)
     low, high = np.nanquantile(coordinates.of(draws), [0.16, 0.84], axis=0)
@@ -333,9 +294,9 @@ def _mode(
     usual = _mode_in(model, optimum, model.coordinates, optimum.covariance, rng, deadline, model.walked_ends)
     if usual.proposal.efficiency > _EFFICIENT or deadline.has_passed:
         return usual
-    flanks = [*(mode.flank for mode in found), FlankCoordinates.at_contacts(model, optimum.point)]
-    for flank in dict.fromkeys(flanks):  # each once, since modes share them
-        if flank is None:
+    flanks = dict.fromkeys([*(mode.coordinates for mode in found), flank_at_contacts(model, optimum.point)])
+    for flank in flanks:  # each once, since modes share them
+        if not isinstance(flank, FlankCoordinates):
             continue
         covariance = flank.covariance(optimum.point, optimum.covariance)
         if not np.isfinite(covariance).all():  # the vertex is too near, or on the other side
@@ -347,10 +308,20 @@ def _mode(
     return usual
 
 
+def flank_at_contacts(model: ContourModel, point: Floats) -> FlankCoordinates | None:
+    """Return coordinates of a flank at the middle of the contacts predicted at a point, shape (parameters,)."""
+    if not FlankCoordinates.describe(model.family.name):
+        return None
+    at = point[None]
+    events = events_of(model.likelihood, model.contours(at), model.rig(at), exact=False)
+    x = float(np.mean([events["first_contact_x"], events["snap_off_contact_x"]]))
+    return FlankCoordinates.at(model.family.name, model.names, model.coordinates, point, x)
+
+
 def _mode_in(
     model: ContourModel,
     optimum: ContourOptimum,
-    coordinates: Proposing,
+    coordinates: Coordinates,
     covariance: Floats,
     rng: np.random.Generator,
     deadline: Deadline,

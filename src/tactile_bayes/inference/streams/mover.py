@@ -10,44 +10,30 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.ensembles.mixture import Mixture
+from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
 from tactile_bayes.inference.ensembles.moves import FittedMove, step_ensembles
-from tactile_bayes.inference.ensembles.proposal import Proposal
-from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = ["Mover"]
 
+# Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28
+# samples of a double sweep were accepted, 0.20 of those of 4 parts, 0.29 of 12, and 0.05 of a single distribution.
 _PARTS = 8
-"""Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28
-samples of a double sweep were accepted, 0.20 of those of 4 parts, 0.29 of 12, and 0.05 of a single distribution."""
-
+# Shares of accepted proposals below which a mixture takes the place of a single distribution, and above which a single
+# one is tried again.
 _POOR, _GOOD = 0.3, 0.45
-"""Shares of accepted proposals below which a mixture takes the place of a single distribution, and above which a single
-one is tried again."""
-
+# Shares of steps by differences of particles, and where hardly any proposal of a fitted distribution is accepted.
 _DIFFERENCES, _MOSTLY_DIFFERENCES = 0.1, 0.5
-"""Shares of steps by differences of particles, and where hardly any proposal of a fitted distribution is accepted."""
-
-_HARDLY = 0.1
-"""Share of accepted proposals below which that is so."""
-
+_HARDLY = 0.1  # share of accepted proposals below which that is so
+# Increase of the mean log-density in a step, over the standard error of that mean, of particles that are on their way
+# to where the density is larger.
 _RISING = 3.0
-"""Increase of the mean log-density in a step, over the standard error of that mean, of particles that are on their way
-to where the density is larger."""
 
 
 class Mover:
     """Moves particles by distributions fitted to half of them, now and then by differences.
 
-    Parameters
-    ----------
-    model : ContourModel
-    random : np.random.RandomState
-
-    Attributes
-    ----------
-    rises : bool
-        Whether the mean log-density rose in the last step of a fitted distribution by more than chance explains.
+    `rises` says whether the mean log-density rose in the last step of a fitted distribution by more than chance
+    explains.
     """
 
     def __init__(self, model: ContourModel, random: np.random.RandomState) -> None:

@@ -4,80 +4,39 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import logsumexp, softmax
+from scipy.special import logsumexp
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.ensembles import in_coordinates
-from tactile_bayes.inference.ensembles.proposal import effective
+from tactile_bayes.inference.coordinates.base import in_coordinates
+from tactile_bayes.inference.densities import effective_number, normalised
 from tactile_bayes.inference.streams.mover import Mover
 from tactile_bayes.inference.streams.stream_state import StreamState
 from tactile_bayes.numerics.selection import resampled
 
-__all__ = ["DECORRELATED", "LOST_ONCE", "SETTLED", "WIDER", "Particles", "effective_number"]
+__all__ = ["DECORRELATED", "LOST_ONCE", "SETTLED", "WIDER", "Particles"]
 
-_LEAST_SHARE = 0.35
-"""Effective number of particles over their number below which they are resampled and moved."""
-
+_LEAST_SHARE = 0.35  # effective number of particles over their number below which they are resampled and moved
+# Largest correlation of a parameter before and after the moves at which these end, after the last stage of an update
+# and after each before it. With 0.5 in place of 0.35, evidences were too small by a factor of 0.7.
 DECORRELATED, _BRIDGED = 0.2, 0.35
-"""Largest correlation of a parameter before and after the moves at which these end, after the last stage of an update
-and after each before it. With 0.5 in place of 0.35, evidences were too small by a factor of 0.7."""
-
+# Largest increase of the mean log-density in the moves of a stage, over its standard deviation, of particles that
+# represented a posterior before, whose moves change it by chance alone: with 1,000 particles it was 0.15 at most, and
+# 0.5 to 1.2 in the last stage of particles on their way to a posterior that was 4 to 54 deviations off.
 SETTLED = 0.4
-"""Largest increase of the mean log-density in the moves of a stage, over its standard deviation, of particles that
-represented a posterior before, whose moves change it by chance alone: with 1,000 particles it was 0.15 at most, and 0.5
-to 1.2 in the last stage of particles on their way to a posterior that was 4 to 54 deviations off."""
-
-LOST_ONCE = 1.2
-"""That increase in any stage, of particles that had lost the posterior for a while: evidences were then too small by
-7."""
-
-_MOST_STEPS, _BRIDGE_STEPS = 40, 10
-"""Largest numbers of steps after these stages; up to the first one while the log-density rises."""
-
-WIDER = (1.5, 3.0, 6.0)
-"""Factors on the noise of the alternatives with which the e-value compares the model."""
-
-_MOST_STAGES = 200
-"""Largest number of stages of an update."""
+LOST_ONCE = 1.2  # that increase in any stage, of particles that lost the posterior: evidences were then too small by 7
+_MOST_STEPS, _BRIDGE_STEPS = 40, 10  # after these stages; up to the first one while the log-density rises
+WIDER = (1.5, 3.0, 6.0)  # factors on the noise of the alternatives with which the e-value compares the model
+_MOST_STAGES = 200  # of an update
 
 
 class Particles:
-    """Particles of the record so far, from those of the record before.
+    """Weighted particles of the record so far, from those of the record before, or from the prior (None).
 
-    Parameters
-    ----------
-    model : ContourModel
-        Model of the record so far.
-    old : StreamState or None
-        The stream before; None if the particles come from the prior.
-    count : int
-        Number of particles.
-    random : np.random.Generator
-
-    Attributes
-    ----------
-    points : ndarray, shape (count, d)
-    values, log_weights : ndarray, shape (count,)
-        Logarithms of prior times likelihood, and of the weights, which are normalised.
-    log_integral : float
-        Logarithm of the integral of prior times likelihood, over contours within reach.
-    stages, steps : int
-    correlation : float
-        Largest correlation of a parameter before and after the last moves; NaN without moves.
-    shift : float
-        Largest increase of the mean log-density in the moves of a stage, over its standard deviation; 0 without moves.
-    rise : float
-        That increase in the moves of the last stage.
-    log_ratios : ndarray, shape (factors,)
-        Logarithms of the predictive density of the new samples with wider noise, over that with the model's.
-    evaluations : int
-
-    Raises
-    ------
-    InferenceError
-        If no particle explains the new samples, or they take too many stages.
+    `log_weights` are normalised, `values` and `log_integral` are logarithms of prior times likelihood and of its
+    integral over contours within reach; `correlation`, `shift`, `rise` are as in `Stream.update`; `log_ratios` are
+    predictive densities of the new samples with wider noise, over those with the model's.
     """
 
     def __init__(self, model: ContourModel, old: StreamState | None, count: int, random: np.random.Generator) -> None:
@@ -172,7 +131,7 @@ class Particles:
             target, step = _LEAST_SHARE * len(ratio), 1.0 - power
 
             def excess(part: float, ratio: Floats = ratio, target: float = target) -> float:
-                return effective_number(self.log_weights + part * ratio) - target
+                return float(effective_number(normalised(self.log_weights + part * ratio))) - target
 
             if not self.stages and excess(step) >= 0.0:
                 self._weigh(ratio)
@@ -255,11 +214,6 @@ def _between(new: Floats, old: Floats, power: float) -> Floats:
     with np.errstate(invalid="ignore"):
         values = power * new + (1.0 - power) * old
     return np.where(np.isnan(values), -np.inf, values)
-
-
-def effective_number(log_weights: Floats) -> float:
-    """Return the effective number of particles, for weights that need not be normalised."""
-    return effective(softmax(log_weights))
 
 
 def _correlation(before: Floats, after: Floats) -> float:
