@@ -6,7 +6,7 @@ import pytest
 from helpers.contour_posteriors import only, swept
 from tactile_bayes.contours import Circle
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.inference.family import Gauge
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import NOTHING, Rig

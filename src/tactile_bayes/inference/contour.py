@@ -21,8 +21,7 @@ from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, settings_of
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.inference.family import Family, Gauge
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.parameters.rig_prior import rig_prior
 from tactile_bayes.inference.result import provenance

@@ -17,7 +17,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates.base import in_coordinates
 from tactile_bayes.inference.densities import Proposal, effective_number, normalised
 from tactile_bayes.inference.importance import weighed
-from tactile_bayes.inference.parameters.matched_priors import widened
+from tactile_bayes.inference.parameters.priors import widened
 
 __all__ = ["WIDTHS", "ContourEvidence", "Evidence", "bridge_evidence", "contour_evidence"]
 

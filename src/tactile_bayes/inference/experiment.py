@@ -13,8 +13,7 @@ from tactile_bayes.checks import check_kind, check_switch
 from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.distributions import Distribution, all_in_words, in_words
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.inference.family import Family, Gauge, family_of
 from tactile_bayes.inference.parameters.discrepancy import discrepancy_priors
 from tactile_bayes.inference.parameters.noise import Noise, noise_of
 from tactile_bayes.inference.parameters.nuisances import Nuisances, nuisances_of

@@ -5,8 +5,7 @@ import pytest
 
 from tactile_bayes.inference.coordinates.base import Coordinates, Logarithms
 from tactile_bayes.inference.ensembles import SamplerSettings, run_state, sample
-from tactile_bayes.inference.ensembles.block import Block
-from tactile_bayes.inference.ensembles.run_state import RunState
+from tactile_bayes.inference.ensembles.run_state import Block, RunState
 
 
 def walked(steps):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.inference.ensembles.modes import Mode
+from tactile_bayes.inference.ensembles.diagnosis import Mode
 from tactile_bayes.numerics.selection import evenly_spread
 
 __all__ = ["Draws"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -15,15 +14,20 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability
-from tactile_bayes.inference.ensembles.block import Block, make_block, next_diagnosis
-from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, open_checkpoint
-from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time, lost_walkers, walker_major
+from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, identity_of_run, open_checkpoint
+from tactile_bayes.inference.ensembles.diagnosis import (
+    Diagnosis,
+    autocorrelation_time,
+    lost_walkers,
+    modes_message,
+    modes_of,
+    walker_major,
+)
 from tactile_bayes.inference.ensembles.draws import Draws
-from tactile_bayes.inference.ensembles.identity import identity_of_run
-from tactile_bayes.inference.ensembles.modes import modes_message, modes_of
 from tactile_bayes.inference.ensembles.moves import moves_in
-from tactile_bayes.inference.ensembles.run_state import RunState
+from tactile_bayes.inference.ensembles.run_state import Block, RunState, make_block, next_diagnosis
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.walkers import CheckedTarget, checked_start, first_random_state
 from tactile_bayes.numerics.random_numbers import Seed, spawn
@@ -84,57 +88,146 @@ def sample(
         raise ParameterError(f"names are {names!r}: give each parameter a name of its own")
     points = checked_start(start, names, settings)
     chains, walkers, _ = points.shape
-    target = CheckedTarget(log_probability, names)
-    coordinates = coordinates or Coordinates()
-    density = in_coordinates(target, coordinates)
     settings = replace(settings, min_ess=max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers))
-    deadline = math.inf if settings.max_seconds is None else began + settings.max_seconds
-    due, stored = 0, None
+    coordinates = coordinates or Coordinates()
     with ExitStack() as stack:
+        stored = None
         if checkpoint is not None:
             about = identity_of_run(identity, points, names, seed, settings, coordinates)
             stored = stack.enter_context(open_checkpoint(checkpoint, about, points.shape))
-        if stored is not None and stored.steps:
-            state = _resumed(stored, coordinates, points)
-            began, target.evaluations = began - stored.seconds, chains * walkers * (1 + state.steps)
-            due = state.steps if stored.ended_at == state.steps else 0
-        else:
-            state = RunState.begin(coordinates, _first_block(points, density, seed))
-        due = due or next_diagnosis(state.steps - 1, settings.block_steps)  # also if it was killed before a diagnosis
-
-        ending, late, diagnosis = "", False, None
-        while not ending or diagnosis is None:
+        run = _Run(CheckedTarget(log_probability, names), coordinates, settings, stored, progress, began)
+        run.begin(points, seed)
+        while not run.has_ended:
             try:
-                due = min(due, settings.max_steps)
-                while state.steps < due and not (late or ending):
-                    steps = min(settings.block_steps, due - state.steps)
-                    block = make_block(density, moves_in(coordinates), state.last, steps, deadline)
-                    diagnosis = None
-                    state = state.append(block)
-                    if not block.whole:
-                        raise KeyboardInterrupt
-                    if stored is not None:
-                        stored.write(block, time.monotonic() - began)
-                    late = time.monotonic() > deadline
-                state, diagnosis = state.diagnose()
-                if not ending:
-                    enough = diagnosis.satisfies(settings.max_r_hat, settings.min_ess)
-                    spent = _OUT_OF_TIME if late else _OUT_OF_STEPS if state.steps >= settings.max_steps else ""
-                    ending = _CONVERGED if enough and not np.any(state.lost()) else spent
-                if stored is not None and ending not in ("", _INTERRUPTED):
-                    stored.note_end()
-                if progress is not None:
-                    worst = float(diagnosis.r_hat[diagnosis.worst_r_hat]), float(diagnosis.ess[diagnosis.worst_ess])
-                    progress(Progress(state.steps, settings.max_steps, *worst, time.monotonic() - began))
-                if state.steps == next_diagnosis(state.steps - 1, settings.block_steps):  # not where a budget ended
-                    state = state.recovered()
-                due = next_diagnosis(state.steps, settings.block_steps)
+                run.advance()
+                run.diagnose()
             except KeyboardInterrupt:
-                if not state.steps:
+                if not run.steps:
                     raise
-                ending = ending or _INTERRUPTED
+                run.ending = run.ending or _INTERRUPTED
+        return run.draws()
 
-    return _draws(state, diagnosis, ending, names, settings, target.evaluations, time.monotonic() - began)
+
+class _Run:
+    """A run of ensembles: where it is, when it is diagnosed next, and why it has ended."""
+
+    state: RunState
+    diagnosis: Diagnosis | None = None  # of the state as it is
+    ending: str = ""
+    is_late: bool = False
+    due: int  # number of steps of the next diagnosis
+
+    def __init__(
+        self,
+        target: CheckedTarget,
+        coordinates: Coordinates,
+        settings: SamplerSettings,
+        stored: Checkpoint | None,
+        progress: Callable[[Progress], object] | None,
+        began: float,
+    ) -> None:
+        self.target, self.density = target, in_coordinates(target, coordinates)
+        self.coordinates, self.settings, self.stored, self.progress = coordinates, settings, stored, progress
+        self.began = began
+        self.deadline = NEVER if settings.max_seconds is None else Deadline(began + settings.max_seconds)
+
+    @property
+    def steps(self) -> int:
+        return self.state.steps
+
+    @property
+    def seconds(self) -> float:
+        return time.monotonic() - self.began
+
+    @property
+    def has_ended(self) -> bool:
+        return bool(self.ending) and self.diagnosis is not None
+
+    def begin(self, points: Floats, seed: Seed) -> None:
+        """Begin at starting points, or where the stored blocks end."""
+        due = 0
+        if self.stored is not None and self.stored.steps:
+            self.state = _resumed(self.stored, self.coordinates, points)
+            self.began -= self.stored.seconds
+            self.target.evaluations = points[..., 0].size * (1 + self.steps)
+            due = self.steps if self.stored.ended_at == self.steps else 0
+        else:
+            self.state = RunState.begin(self.coordinates, _first_block(points, self.density, seed))
+        self.due = due or next_diagnosis(self.steps - 1, self.settings.block_steps)  # also if killed before a diagnosis
+
+    def advance(self) -> None:
+        """Make the steps up to the next diagnosis, block by block, each of which is stored."""
+        self.due = min(self.due, self.settings.max_steps)
+        while self.steps < self.due and not (self.is_late or self.ending):
+            steps = min(self.settings.block_steps, self.due - self.steps)
+            block = make_block(self.density, moves_in(self.coordinates), self.state.last, steps, self.deadline)
+            self.diagnosis = None
+            self.state = self.state.append(block)
+            if not block.whole:
+                raise KeyboardInterrupt
+            if self.stored is not None:
+                self.stored.write(block, self.seconds)
+            self.is_late = self.deadline.has_passed
+
+    def diagnose(self) -> None:
+        """Diagnose the second half of the steps, and say whether the run ends, or when it is diagnosed next."""
+        settings = self.settings
+        self.state, found = self.state.diagnose()
+        self.diagnosis = found
+        if not self.ending:
+            enough = found.satisfies(settings.max_r_hat, settings.min_ess)
+            spent = _OUT_OF_TIME if self.is_late else _OUT_OF_STEPS if self.steps >= settings.max_steps else ""
+            self.ending = _CONVERGED if enough and not np.any(self.state.lost()) else spent
+        if self.stored is not None and self.ending not in ("", _INTERRUPTED):
+            self.stored.note_end()
+        if self.progress is not None:
+            worst = float(found.r_hat[found.worst_r_hat]), float(found.ess[found.worst_ess])
+            self.progress(Progress(self.steps, settings.max_steps, *worst, self.seconds))
+        if self.steps == next_diagnosis(self.steps - 1, settings.block_steps):  # not where a budget ended
+            self.state = self.state.recovered()
+        self.due = next_diagnosis(self.steps, settings.block_steps)
+
+    def draws(self) -> Draws:
+        """Return the second half of a run that has ended, with the message on its end."""
+        state, found, settings, names = self.state, self.diagnosis, self.settings, tuple(self.target.names)
+        assert found is not None
+        chains, _, walkers, _ = state.last.samples.shape
+        converged, half, moved = self.ending == _CONVERGED, state.half, state.moved
+        stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
+        lost = int(np.count_nonzero(lost_walkers(half.values)))
+        modes = () if converged else modes_of(half.samples, half.values, names)
+        message = f"{self.ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {found.message(names)}"
+        if not converged:
+            message += (
+                f"; criteria: R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
+            )
+        if modes:
+            message += f"; {modes_message(modes)}"
+        of_walkers = f"of {chains * walkers} walkers"
+        if lost:
+            message += f"; {lost} {of_walkers} are lost in improbable regions: do not use the results"
+        if stuck:
+            message += f"; {stuck} {of_walkers} did not move in the steps kept: look at their positions"
+        return Draws(
+            samples=walker_major(half.samples),
+            log_probability=walker_major(half.values),
+            names=names,
+            walkers=walkers,
+            steps_kept=half.samples.shape[1],
+            every=state.every,
+            steps_run=state.steps,
+            r_hat=found.r_hat,
+            ess_bulk=found.ess_bulk,
+            ess_tail=found.ess_tail,
+            acceptance=moved.mean(axis=(1, 2)) if moved.size else np.full(chains, np.nan),
+            autocorrelation_time=state.every * autocorrelation_time(half.samples),
+            evaluations=self.target.evaluations,
+            seconds=self.seconds,
+            converged=converged,
+            message=message,
+            stuck=stuck,
+            modes=modes,
+        )
 
 
 def _first_block(points: Floats, density: LogProbability, seed: Seed) -> Block:
@@ -157,49 +250,3 @@ def _resumed(stored: Checkpoint, coordinates: Coordinates, points: Floats) -> Ru
     for block in stored.read(since=stored.steps // 2):
         state = state.append(block)
     return state
-
-
-def _draws(
-    state: RunState,
-    diagnosis: Diagnosis,
-    ending: str,
-    names: tuple[str, ...],
-    settings: SamplerSettings,
-    evaluations: int,
-    seconds: float,
-) -> Draws:
-    """Return the second half of a run that has ended, with the message on its end."""
-    chains, _, walkers, _ = state.last.samples.shape
-    converged, half, moved = ending == _CONVERGED, state.half, state.moved
-    stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
-    lost = int(np.count_nonzero(lost_walkers(half.values)))
-    modes = () if converged else modes_of(half.samples, half.values, names)
-    message = f"{ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {diagnosis.message(names)}"
-    if not converged:
-        message += f"; criteria: R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
-    if modes:
-        message += f"; {modes_message(modes)}"
-    if lost:
-        message += f"; {lost} of {chains * walkers} walkers are lost in improbable regions: do not use the results"
-    if stuck:
-        message += f"; {stuck} of {chains * walkers} walkers did not move in the steps kept: look at their positions"
-    return Draws(
-        samples=walker_major(half.samples),
-        log_probability=walker_major(half.values),
-        names=names,
-        walkers=walkers,
-        steps_kept=half.samples.shape[1],
-        every=state.every,
-        steps_run=state.steps,
-        r_hat=diagnosis.r_hat,
-        ess_bulk=diagnosis.ess_bulk,
-        ess_tail=diagnosis.ess_tail,
-        acceptance=moved.mean(axis=(1, 2)) if moved.size else np.full(chains, np.nan),
-        autocorrelation_time=state.every * autocorrelation_time(half.samples),
-        evaluations=evaluations,
-        seconds=seconds,
-        converged=converged,
-        message=message,
-        stuck=stuck,
-        modes=modes,
-    )

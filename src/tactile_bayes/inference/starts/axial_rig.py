@@ -30,19 +30,9 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
 
     Shapes: loaded (samples,).
     """
-    names, likelihood = model.nuisances.names, model.likelihood
-    rod = likelihood.rod
-    if (
-        not names
-        or np.count_nonzero(loaded) < _SAMPLES_PER_PARAMETER * len(names)
-        or len(present_channels(model.measured)) < len(CHANNELS)
-        or carried_sweeps(model.measured)
-        or not rod.is_uniform
-        or rod.mean_rest_curvature != 0.0
-        or rod.stem > 0.0
-        or any(part in name for name in names for part in _NOT_LINEAR)
-    ):
+    if not _is_determined(model, loaded):
         return None
+    names, likelihood = model.nuisances.names, model.likelihood
     middle = np.array([float(model.priors[name].median()) for name in names])  # type: ignore[attr-defined]
     spread = np.array([float(model.priors[name].std()) for name in names])
     readings, deviation = likelihood.measured[loaded], model.deviation
@@ -83,3 +73,18 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
     which = [model.names.index(name) for name in names]
     found = np.clip(middle + spread * steps, model.ends.low[which], model.ends.high[which])
     return dict(zip(names, found.tolist(), strict=True))
+
+
+def _is_determined(model: ContourModel, loaded: Flags) -> bool:
+    """Return True if the rod and what is unknown of the rig have that redundancy, with enough loaded samples."""
+    names, rod = model.nuisances.names, model.likelihood.rod
+    return (
+        bool(names)
+        and bool(np.count_nonzero(loaded) >= _SAMPLES_PER_PARAMETER * len(names))
+        and len(present_channels(model.measured)) == len(CHANNELS)
+        and not carried_sweeps(model.measured)
+        and rod.is_uniform
+        and rod.mean_rest_curvature == 0.0
+        and rod.stem <= 0.0
+        and not any(part in name for name in names for part in _NOT_LINEAR)
+    )

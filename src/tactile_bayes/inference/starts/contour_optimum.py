@@ -24,14 +24,7 @@ from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.rig.corrected import corrected
 
-__all__ = [
-    "ContourOptimum",
-    "certainly_loaded",
-    "contact_fit",
-    "fitted_noise",
-    "optima_of",
-    "optimum_of",
-]
+__all__ = ["ContourOptimum", "certainly_loaded", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
 
 _PRIOR_DRAWS = 1000
 # Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops

@@ -247,24 +247,7 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
     There is one if it explains a record of many loaded samples; else there are all to which searches lead, except those
     of little mass.
     """
-    found: list[_Mode] = []
-    unexplained: list[ContourOptimum] = []
-    many_samples = np.count_nonzero(~model.found["unloaded"].values) >= _MANY_SAMPLES
-    repeats = 0
-    for tried, optimum in enumerate(optima_of(model, rng, deadline), start=1):
-        if not optimum.fits:
-            unexplained.append(optimum)
-        elif _is_known(optimum, found):
-            repeats += 1
-        else:
-            found.append(_mode(model, optimum, found, rng, deadline))
-        normal = bool(found) and found[-1].proposal.efficiency > _EFFICIENT
-        if many_samples and (normal or repeats == _REPEATS):
-            break
-        if normal and repeats == _REPEATS_FEW_SAMPLES:
-            break
-        if tried >= _MAX_SEARCHES and (found or many_samples):
-            break
+    found, unexplained = _explaining_modes(model, rng, deadline)
     for optimum in sorted(unexplained, key=lambda one: one.cost):
         least = min((mode.optimum.cost for mode in found), default=optimum.cost)
         late = found and deadline.has_passed
@@ -275,6 +258,36 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
     found.sort(key=lambda mode: -mode.proposal.log_mass)
     least_mass = found[0].proposal.log_mass - _MAX_LOG_MASS_RATIO
     return [mode for mode in found if mode is found[0] or mode.proposal.log_mass > least_mass]
+
+
+def _explaining_modes(
+    model: ContourModel, rng: np.random.Generator, deadline: Deadline
+) -> tuple[list[_Mode], list[ContourOptimum]]:
+    """Return the modes of optima that explain the record, as searches find them, and the other optima."""
+    found: list[_Mode] = []
+    unexplained: list[ContourOptimum] = []
+    many_samples = bool(np.count_nonzero(~model.found["unloaded"].values) >= _MANY_SAMPLES)
+    repeats = 0
+    for tried, optimum in enumerate(optima_of(model, rng, deadline), start=1):
+        if not optimum.fits:
+            unexplained.append(optimum)
+        elif _is_known(optimum, found):
+            repeats += 1
+        else:
+            found.append(_mode(model, optimum, found, rng, deadline))
+        if _are_all_found(found, repeats, tried, many_samples):
+            break
+    return found, unexplained
+
+
+def _are_all_found(found: list[_Mode], repeats: int, tried: int, many_samples: bool) -> bool:
+    """Return True if no further search is worth while, after so many, of which so many ended in known modes."""
+    normal = bool(found) and found[-1].proposal.efficiency > _EFFICIENT
+    if many_samples and (normal or repeats == _REPEATS):
+        return True
+    if normal and repeats == _REPEATS_FEW_SAMPLES:
+        return True
+    return tried >= _MAX_SEARCHES and (bool(found) or many_samples)
 
 
 def _is_known(optimum: ContourOptimum, found: list[_Mode]) -> bool:

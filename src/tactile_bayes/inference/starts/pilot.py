@@ -13,9 +13,9 @@ from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
 from tactile_bayes.inference.coordinates.straightened import Straightened
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
-from tactile_bayes.inference.ensembles.block import Block, make_block
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time
 from tactile_bayes.inference.ensembles.moves import Moves, moves_in
+from tactile_bayes.inference.ensembles.run_state import Block, make_block
 from tactile_bayes.inference.ensembles.walkers import RandomState, first_random_state
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
@@ -165,7 +165,7 @@ def _pilot(
 ) -> Block:
     """Return the steps of one ensemble; an interrupt is raised."""
     first = Block(start[None, None], density(start)[None, None], (random,))
-    block = make_block(density, moves, first, steps, deadline.moment)
+    block = make_block(density, moves, first, steps, deadline)
     if not block.whole:
         raise KeyboardInterrupt
     return block

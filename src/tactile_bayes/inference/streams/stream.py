@@ -16,19 +16,14 @@ from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import (
-    check_function,
-    check_numbers,
-    check_path,
-    check_whole_number,
-)
+from tactile_bayes.checks import check_function, check_numbers, check_path, check_whole_number
 from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import identity_of
 from tactile_bayes.inference.densities import effective_number, normalised
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings
-from tactile_bayes.inference.ensembles.identity import changes
+from tactile_bayes.inference.ensembles.checkpoint import changes
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import STREAMED, provenance
