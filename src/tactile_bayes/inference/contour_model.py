@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 import xarray as xr
+from scipy.special import chdtri
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour
@@ -31,6 +32,7 @@ from tactile_bayes.rig.parameters import MAY_VANISH
 
 __all__ = ["ContourModel"]
 
+_FALSE_ALARM = 1e-7  # probability that noise alone makes an unloaded sample look loaded
 _FEWEST_UNLOADED = 12  # least number of unloaded samples from which zero and noise of a channel are estimated
 _MOST_TRIALS = 50  # largest number of draws from the prior for each requested draw within reach
 # Number of draws from the prior before none within reach is an error, so that one requested draw is found too.
@@ -101,6 +103,15 @@ class ContourModel:
     def present(self) -> Flags:
         """True for channels that were measured, shape (3,)."""
         return ~np.isnan(self.likelihood.measured).all(axis=0)
+
+    @property
+    def certainly_loaded(self) -> Flags:
+        """True for samples whose load noise does not explain, each taken by itself, above the zero of the record."""
+        present = self.present
+        measured, zero = self.likelihood.measured[:, present], self.zero[present]
+        zero = np.where(np.isfinite(zero), zero, np.median(measured, axis=0))
+        squared_distance = np.square((measured - zero) / self.deviations[:, present]).sum(axis=1)
+        return np.asarray(squared_distance > chdtri(np.count_nonzero(present), _FALSE_ALARM))
 
     @property
     def noise_columns(self) -> list[list[int]]:

@@ -73,9 +73,9 @@ def _evaluated(
     density: ContactDensity, proposal: ContactProposal, draws: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats, Floats]:
     """Return proposals, their contacts, and the logarithms of their importance weights."""
-    proposed = proposal.draw(draws, rng)
-    found = density.at(*density.unfold(proposed.points))
-    return proposed.points, found.contact, found.log_density - proposed.log_density
+    points, log_proposal = proposal.draw(draws, rng)
+    found = density.at(*density.unfold(points))
+    return points, found.contact, found.log_density - log_proposal
 
 
 def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
 
 from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["ContactProposal", "Proposed"]
+__all__ = ["ContactProposal"]
 
 # Widths of the normal densities of a branch, in standard deviations of the posterior's approximation.
 _WIDTHS = np.array([1.15, 3.0])
 _SHARES = np.array([0.75, 0.25])
 # Largest distance of a mean beyond the edge, in standard deviations, so that probabilities stay positive.
 _MAX_DISTANCE = 30.0
-
-
-class Proposed(NamedTuple):
-    """Points (way, force[, drive angle]) with the logarithm of their proposal density."""
-
-    points: Floats  # shape (draws, n, 2 or 3)
-    log_density: Floats  # shape (draws, n)
 
 
 class ContactProposal:
@@ -42,8 +33,8 @@ class ContactProposal:
             mean[..., 0], self._low - _MAX_DISTANCE * spread, self._high + _MAX_DISTANCE * spread
         )
 
-    def draw(self, count: int, rng: np.random.Generator) -> Proposed:
-        """Draw `count` independent points for every sample, with all branches in their shares."""
+    def draw(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Draw `count` points for every sample, (count, n, k), in the shares of branches, with log-densities."""
         size, k = self._share.shape[1], self._mean.shape[-1]
         # The draws are stratified: shares are exact to one draw.
         order = (np.arange(count)[:, None] + rng.random((count, size))) / count
@@ -65,7 +56,7 @@ class ContactProposal:
             across = (points[..., 1] - middle) / root[..., 1, 1]
             middle = mean[..., 2] + root[..., 2, 0] * along + root[..., 2, 1] * across
             points[..., 2] = middle + width * root[..., 2, 2] * rng.standard_normal((count, size))
-        return Proposed(points, self._log_density(points, branch, who))
+        return points, self._log_density(points, branch, who)
 
     def _log_density(self, points: Floats, branch: Index, who: Index) -> Floats:
         mean, root = self._mean[branch, who], self._root[branch, who]

@@ -77,11 +77,6 @@ class Nuisances:
         """Names of the parameters that change the path, or where along it the samples lie."""
         return tuple(name for name in self.names if name not in _SENSED)
 
-    def unit(self, name: str) -> str:
-        """Return the SI unit of a parameter, like "N m"."""
-        parameter = parameter_named(name)
-        return "1" if parameter is None else parameter.unit
-
     def _with_known(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return values by name, shape (n,), with the known parameters that are not as stated."""
         count = len(next(iter(values.values()))) if values else 1

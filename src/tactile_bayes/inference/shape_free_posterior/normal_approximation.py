@@ -16,7 +16,6 @@ from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
-from tactile_bayes.inference.starts.contour_optimum import certainly_loaded
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.rig.parameters import MAY_VANISH
@@ -122,7 +121,7 @@ class Observer:
 
     def __init__(self, model: ContourModel) -> None:
         self.model = model
-        self.loaded = certainly_loaded(model)
+        self.loaded = model.certainly_loaded
         if not np.isfinite(model.zero[model.present]).all():  # hardly any sample is unloaded
             self.loaded = loaded_samples(model.measured, model.noise.stated_cell)
         stated = np.asarray(model.likelihood.load_cell.noise)

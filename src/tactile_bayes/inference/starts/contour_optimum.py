@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri
 
-from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates.base import Logarithms
@@ -24,7 +23,7 @@ from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.rig.corrected import corrected
 
-__all__ = ["ContourOptimum", "certainly_loaded", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
+__all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
 
 _PRIOR_DRAWS = 1000
 # Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
@@ -32,7 +31,6 @@ _PRIOR_DRAWS = 1000
 _CANDIDATES = 24
 # Distance of an event outside its bracket that counts as a residual of one, over the width of the bracket.
 _EVENT_TOLERANCE = 0.1
-_FALSE_ALARM = 1e-7  # probability that noise alone makes an unloaded sample look loaded
 # Largest distance of the logarithm of a positive parameter from its prior median during a search, in prior spreads.
 _MAX_LOG_DISTANCE = 12.0
 _MISSING_EVENT_RESIDUAL = 1000.0  # residual of an event that does not occur
@@ -94,20 +92,12 @@ def event_brackets(model: ContourModel) -> Brackets:
             width = _EVENT_TOLERANCE * (angle[after] - angle[before])
             rows.append((of_sample[before], ends, angle[before], angle[after], width))
     found = {row[0] for row in rows}
-    for segment, (before, first, last, after) in enumerate(segments.event_samples(certainly_loaded(model))):
+    for segment, (before, first, last, after) in enumerate(segments.event_samples(model.certainly_loaded)):
         if segment not in found and before >= 0 and after >= 0:  # contact is too brief for its loads to show events
             width = _EVENT_TOLERANCE * (angle[after] - angle[before]) / 2.0
             rows += [(segment, 0, -np.inf, angle[first], width), (segment, 1, angle[last], angle[after], width)]
     columns = np.array(rows, dtype=float).reshape(-1, 5).T
     return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
-
-
-def certainly_loaded(model: ContourModel) -> Flags:
-    """Return True for samples whose load noise does not explain, each taken by itself, above the zero of the record."""
-    measured, present = model.likelihood.measured[:, model.present], model.present
-    zero = np.where(np.isfinite(model.zero[present]), model.zero[present], np.median(measured, axis=0))
-    squared_distance = np.square((measured - zero) / model.deviations[:, present]).sum(axis=1)
-    return np.asarray(squared_distance > chdtri(np.count_nonzero(present), _FALSE_ALARM))
 
 
 def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
@@ -227,7 +217,7 @@ class _Search:
 
     def by_axial_rig(self) -> Optimum | None:
         """Optimum of the search from Step 2's contacts with the rig that axial forces show; None without."""
-        rig = axial_rig(self.model, certainly_loaded(self.model))
+        rig = axial_rig(self.model, self.model.certainly_loaded)
         fitted = None if rig is None else contact_fit(self.model, rig)
         if rig is None or fitted is None:
             return None
