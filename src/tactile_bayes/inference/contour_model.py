@@ -35,8 +35,7 @@ __all__ = ["ContourModel"]
 _FALSE_ALARM = 1e-7  # probability that noise alone makes an unloaded sample look loaded
 _FEWEST_UNLOADED = 12  # least number of unloaded samples from which zero and noise of a channel are estimated
 _MOST_TRIALS = 50  # largest number of draws from the prior for each requested draw within reach
-# Number of draws from the prior before none within reach is an error, so that one requested draw is found too.
-_FEWEST_TRIALS = 1000
+_FEWEST_TRIALS = 1000  # draws of the prior before none within reach is an error, so that one is found too
 
 
 class ContourModel:

@@ -29,10 +29,8 @@ from tactile_bayes.reconstruction import (
 __all__ = ["ContourProblem", "contour_problem", "identity_of"]
 
 
-# Largest number of sweeps of which both sides are tried, the most doubtful first: each doubles the problems.
-_MOST_DOUBTFUL = 2
-# Logarithm of the prior odds that the direction of a doubtful sweep states its side of contact.
-_BELIEVED = float(np.log(10.0))
+_MOST_DOUBTFUL = 2  # sweeps of which both sides are tried, the most doubtful first: each doubles the problems
+_BELIEVED = float(np.log(10.0))  # log prior odds that the direction of a doubtful sweep states its side of contact
 
 
 class ContourProblem(NamedTuple):
@@ -43,8 +41,7 @@ class ContourProblem(NamedTuple):
     loaded: Flags  # True for samples with a load that noise does not explain, shape (samples,)
 
     others: tuple[ContourProblem, ...] = ()  # problems with other sides of contact, if these are doubtful
-    # Logarithm of the prior odds of the sides of contact over those that the directions state.
-    log_prior_odds: float = 0.0
+    log_prior_odds: float = 0.0  # of the sides of contact over those that the directions state
 
     @property
     def identity(self) -> dict[str, str]:

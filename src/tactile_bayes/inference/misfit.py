@@ -20,13 +20,13 @@ NO_LOAD = (
 )
 GAUGE = "gauge"  # name of the family of a gauge, whose contour is known
 _OF_ROD = ("rest_curvature", "taper", "stem", "length")
-# Nuisance parameters, or groups of them, that may cause a misfit.
+# Unknowns of a rig, or groups of them, that may cause a misfit.
 _SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance", *_OF_ROD)
 _SMOOTH = "shape-free"
 
 
 def is_inferred(suspect: str, nuisances: Collection[str]) -> bool:
-    """Return True if a nuisance parameter, or one of its group, is among the inferred ones."""
+    """Return True if an unknown of a rig, or one of its group, is among the inferred ones."""
     return any(belongs(name, suspect) for name in nuisances)
 
 

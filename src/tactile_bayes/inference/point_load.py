@@ -53,13 +53,10 @@ _VAGUE = 100.0  # prior sd of a sensor coefficient, in full scales of the readin
 _GUESSES = 400  # number of draws of the prior among which the search for a start begins
 _REFINED = 4  # number of the best of them that are refined
 _INITIAL_NOISE = 0.01  # noise over range of the readings at the beginning of the search
-# Scatter of the walkers' starts over the sd of the normal approximation; halved until enough of them are possible.
-_INFLATION = 2.0
+_INFLATION = 2.0  # scatter of starts over the sd of the approximation; halved until enough are possible
 _LEAST_INFLATION = 1e-3
-# Log-probability per parameter by which a start may be below the centre, so that no minor mode captures it.
-_DROP = 10.0
-# Most of an evaluation does not depend on the number of points, so many walkers are cheap.
-_SETTINGS = SamplerSettings(walkers=64)
+_DROP = 10.0  # log-probability per parameter of a start below the centre, so that no minor mode captures it
+_SETTINGS = SamplerSettings(walkers=64)  # most of an evaluation does not depend on their number
 
 
 def _reach(axial: Floats, lateral: Floats) -> float:

@@ -35,8 +35,7 @@ class Evaluated(NamedTuple):
     """Contacts with the logarithm of their posterior density."""
 
     log_density: Floats  # density over force and ψ1 (tip) or arc length (tangential), and drive angle; shape (..., n)
-    # Contact point of the rod's centreline, slope angle, arc length; in the sweep frame, shape (4, ..., n).
-    contact: Floats
+    contact: Floats  # point of the rod's centreline, slope angle, arc length; in the sweep frame, shape (4, ..., n)
 
 
 class ContactDensity:

@@ -9,11 +9,9 @@ from tactile_bayes.arrays import Floats, Index
 
 __all__ = ["ContactProposal"]
 
-# Widths of the normal densities of a branch, in standard deviations of the posterior's approximation.
-_WIDTHS = np.array([1.15, 3.0])
+_WIDTHS = np.array([1.15, 3.0])  # of the normal densities of a branch, in standard deviations of the approximation
 _SHARES = np.array([0.75, 0.25])
-# Largest distance of a mean beyond the edge, in standard deviations, so that probabilities stay positive.
-_MAX_DISTANCE = 30.0
+_MAX_DISTANCE = 30.0  # of a mean beyond the edge, in standard deviations, so that probabilities stay positive
 
 
 class ContactProposal:

@@ -28,8 +28,7 @@ from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["Checkpoint", "changes", "identity_of_run", "open_checkpoint"]
 
-# Entries that follow from the others, if those are complete.
-_START, _COORDINATES = _CONSEQUENCES = ("starting points", "coordinates of the walkers")
+_START, _COORDINATES = _CONSEQUENCES = ("starting points", "coordinates of the walkers")  # follow from the others
 _MAX_CHARACTERS = 60  # largest number of characters of an entry in an error message
 
 
@@ -92,8 +91,7 @@ def _shown(text: str | None, at: int) -> str:
 _DESCRIPTION = "checkpoint.json"
 _KIND = "ensembles of tactile-bayes"
 _FORMAT = 1
-# First step of a block, counted from 0, and the step after its last.
-_BLOCK = re.compile(r"block-(\d{8,})-(\d{8,})\.npz")
+_BLOCK = re.compile(r"block-(\d{8,})-(\d{8,})\.npz")  # first step, from 0, and that after the last
 
 
 class Checkpoint:

@@ -99,8 +99,7 @@ def autocorrelation_time(samples: Floats) -> Floats:
     return np.asarray(times.mean(axis=0))
 
 
-# Distance of two ensembles' means, over the larger of their standard deviations, from which they are separate.
-_MIN_DISTANCE = 5.0
+_MIN_DISTANCE = 5.0  # of two ensembles' means, over the larger of their deviations, from which they are separate
 _MAX_R_HAT = 1.1  # R̂ of an ensemble's early against its late steps below which it is stationary
 _MIN_DRAWS_PER_WALKER = 2.0  # smallest number of effective draws per walker of a stationary ensemble
 _MAX_NAMED = 3  # largest number of parameters that the message names for a mode

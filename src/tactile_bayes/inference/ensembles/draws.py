@@ -21,16 +21,14 @@ class Draws:
     walkers: int
     steps_kept: int  # number of steps of each walker in `samples`: every `every`-th of the second half of its steps
     steps_run: int
-    # Rank-normalised R̂ of each parameter across ensembles, each split in early and late steps to detect drift.
-    r_hat: Floats
+    r_hat: Floats  # rank-normalised, across ensembles, each split in early and late steps to detect drift
     ess_bulk: Floats  # effective sample size of the bulk, per parameter
     ess_tail: Floats  # the smaller effective sample size of the 5 % and 95 % quantiles, per parameter
     acceptance: Floats  # share of accepted proposals, per ensemble, over the steps kept
     # emcee's integrated autocorrelation time [steps] per parameter, mean over ensembles. It is infinite if a walker is
     # stuck. emcee subtracts each walker's own mean, so that the estimate is too small over few autocorrelation times.
     autocorrelation_time: Floats
-    # Number of points at which the log-probability was computed, including earlier calls with a checkpoint.
-    evaluations: int
+    evaluations: int  # points at which the log-probability was computed, in earlier calls with a checkpoint too
     seconds: float  # sampling time [s], including the steps of earlier calls with a checkpoint
     converged: bool
     message: str  # reason for the end of the run, with the worst diagnostics

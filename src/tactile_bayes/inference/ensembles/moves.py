@@ -24,11 +24,9 @@ __all__ = [
 ]
 
 Moves = Sequence[tuple[Any, float]]  # moves of an ensemble, with their shares. They keep nothing from step to step.
-# Smallest share of the new normal draw in a step of `NormalMove`, and the probability that it is all of the step.
-_MIN_NEW_SHARE, _WHOLLY_NEW = 0.2, 0.5
+_MIN_NEW_SHARE, _WHOLLY_NEW = 0.2, 0.5  # least share of the new draw in a step, and the probability that it is all
 _SHORT_SCALE = 0.25  # scale of short differences over the usual scale, for targets along bent ridges or between bounds
-# Largest share of proposals from a fixed distribution, and the efficiency from which it applies.
-_MAX_FIXED_SHARE, _EFFICIENT = 0.8, 0.5
+_MAX_FIXED_SHARE, _EFFICIENT = 0.8, 0.5  # share of a fixed proposal at most, and its efficiency from which that applies
 
 
 def step_ensembles(

@@ -27,8 +27,7 @@ class Block:
 
     samples: Floats  # shape (chain, step, walker, parameter)
     log_probability: Floats  # shape (chain, step, walker)
-    # Random state of each ensemble after the last step; with that step's samples it determines the next step.
-    random_states: tuple[RandomState, ...]
+    random_states: tuple[RandomState, ...]  # after the last step, with whose samples they determine the next step
     whole: bool = True  # false if an interrupt ended the block; the ensembles then do not continue
 
     @property
@@ -65,8 +64,7 @@ def next_diagnosis(steps: int, block_steps: int) -> int:
     return due
 
 
-# Largest count of stored numbers of all ensembles, beyond which steps are thinned: 32 MB, and 6 s for a diagnosis.
-_MAX_STORED = 4_000_000
+_MAX_STORED = 4_000_000  # numbers of all ensembles, beyond which steps are thinned: 32 MB, 6 s for a diagnosis
 _MAX_LOST = 0.1  # largest share of the walkers of an ensemble that are taken back
 
 

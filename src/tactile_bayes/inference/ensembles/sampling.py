@@ -35,8 +35,7 @@ from tactile_bayes.numerics.random_numbers import Seed, spawn
 __all__ = ["Progress", "sample"]
 
 
-# Smallest mean number of effective draws per walker: the discarded half then exceeds five autocorrelation times.
-_DRAWS_PER_WALKER = 5
+_DRAWS_PER_WALKER = 5  # effective ones, at least: the discarded half then exceeds five autocorrelation times
 _CONVERGED = "converged"
 _OUT_OF_STEPS = "not converged, the steps allowed ran out"
 _OUT_OF_TIME = "not converged, the time allowed ran out"

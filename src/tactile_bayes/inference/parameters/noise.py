@@ -28,8 +28,7 @@ class Noise(NamedTuple):
     """Parameters of a load cell's noise, with their priors."""
 
     cell: LoadCell  # load cell in the record's units, whose noise the parameters scale
-    # Names of the parameters: of the white noise, and then of the discrepancy, if it is inferred.
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the white noise, and then of the discrepancy, if it is inferred
     channels: tuple[tuple[str, ...], ...]  # channels that each parameter of the white noise scales
     priors: dict[str, Distribution]  # default priors by name, in the record's units
 

@@ -36,8 +36,7 @@ _OF_NOISE = ("discrepancy_scale", "discrepancy_length", "noise_scale", "moment_n
 _RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
 # Parameters that change the path or the reading of the drive angle, and their names in `RigValues`.
 _RIG["backlash"] = "drive_angle_backlash"
-# Parameters that change only what the load cell senses, not the path.
-_SENSED = (*BIASES, *DRIFTS, *GAINS, *LEVERS, *CURVE)
+_SENSED = (*BIASES, *DRIFTS, *GAINS, *LEVERS, *CURVE)  # change only what the load cell senses, not the path
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ __all__ = ["EncoderErrors"]
 
 _WIDEST, _NARROWEST = 0.75, 0.1  # distance between neighbouring errors, in standard deviations, at most and at least
 _REACH = 3.75  # largest error that is taken into account, in standard deviations
-# Rates of change of loads with the drive angle close to snap-off [EI/L and EI/L² per rad].
-_STEEP = np.array([10.0, 30.0, 30.0])
+_STEEP = np.array([10.0, 30.0, 30.0])  # change of loads close to snap-off [EI/L and EI/L² per rad]
 
 
 class EncoderErrors:

@@ -22,8 +22,7 @@ __all__ = ["RodTables"]
 # default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and
 # for uneven curvature that of the rest curvature.
 _TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
-# Lengths over the stated one in tables of a cone whose length varies: ten standard deviations of the default prior.
-_LENGTHS = 0.9, 1.1
+_LENGTHS = 0.9, 1.1  # over the stated one, in tables of a cone: ten deviations of the default prior
 # Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where the base is
 # carried.
 _FRICTION_ANGLES = (0.0, 0.5), (0.5, MAX_FRICTION_ANGLE)

@@ -30,8 +30,7 @@ _DIVISIBLE = 8  # least number of readings of a bin that is split
 # it is split: without a bend its mean is 2.
 _BEND = 4.0
 _SAME_ANGLE = 1e-12  # standard deviation of drive angles that is rounding [rad]
-# Number of readings on either side of a snap-off that stay single, and the largest number around one.
-_MARGIN, _MOST_SINGLE = 8, 200
+_MARGIN, _MOST_SINGLE = 8, 200  # readings on either side of a snap-off that stay single, and the most around one
 
 
 def is_long(record: xr.Dataset) -> bool:

@@ -27,8 +27,7 @@ _OF_ROUGHNESS = ("amplitude", "length_scale")
 # of the further ones.
 _STEP, _LARGEST_STEP = 1e-5, 0.01
 _FURTHER_DIFFERENCES = 2  # number of times that differences are taken again
-# Smallest significant singular value of the linearised residuals, in standard deviations per prior scale.
-_MIN_CHANGE = 0.03
+_MIN_CHANGE = 0.03  # least singular value of residuals that counts, in deviations per prior scale
 _MIN_WIDTH = 0.01  # smallest standard deviation of a snap-off, over half a step of the drive angle
 _FAR_DOWN = -35.0  # standard normal number of which, and of all below, a truncation at less changes nothing
 _HUBER_THRESHOLD = 4.0  # residual in standard deviations from which Huber's loss is linear

@@ -31,8 +31,7 @@ class Whitening(Coordinates):
 
     approximation: NormalApproximation
     scales: Floats  # amplitude, length scale and noise at the centre of the walkers' starting points, shape (bent,)
-    # Posterior mean of the parameters as the approximation standardises them, shape (d,): zero if it is exact.
-    mean: Floats
+    mean: Floats  # of the posterior, as the approximation standardises it, shape (d,): zero if that is exact
     root: Floats  # root of their posterior covariance, shape (d, d): one if the approximation is exact
 
     @property

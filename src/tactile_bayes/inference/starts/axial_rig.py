@@ -11,8 +11,7 @@ from tactile_bayes.record import CHANNELS, carried_sweeps, frame_of, present_cha
 
 __all__ = ["axial_rig"]
 
-# Residuals, in standard deviations, beyond which the loss is linear, of successive searches.
-_THRESHOLDS = (1e4, 1e3, 1e2, 1e1, 1.0)
+_THRESHOLDS = (1e4, 1e3, 1e2, 1e1, 1.0)  # of residuals from which the loss is linear, in successive searches
 _ROUNDING = 1e-6  # share of the force to which the axial force of a sample is believed
 _SAMPLES_PER_PARAMETER = 2  # least number of loaded samples for each parameter
 # Parts of the names of parameters by which the axial force does not follow from a sample's moment in this form.

@@ -29,22 +29,17 @@ _PRIOR_DRAWS = 1000
 # Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
 # early, since a sample at an event is loaded or not.
 _CANDIDATES = 24
-# Distance of an event outside its bracket that counts as a residual of one, over the width of the bracket.
-_EVENT_TOLERANCE = 0.1
-# Largest distance of the logarithm of a positive parameter from its prior median during a search, in prior spreads.
-_MAX_LOG_DISTANCE = 12.0
+_EVENT_TOLERANCE = 0.1  # distance outside its bracket that counts as a residual of one, over its width
+_MAX_LOG_DISTANCE = 12.0  # of the log of a parameter from its prior median in a search, in prior spreads
 _MISSING_EVENT_RESIDUAL = 1000.0  # residual of an event that does not occur
-# Largest standard deviation of a contact normal to the contour, over the median one, for a fit of the contour.
-_MAX_RELATIVE_SD = 2.0
+_MAX_RELATIVE_SD = 2.0  # of a contact normal to the contour, over the median one, for a fit
 # Gain in coarse log-likelihood beyond the end of a prior above which the prior is reported as too narrow, and the cost
 # per residual there below which the gain is believed.
 _MIN_GAIN, _MAX_COST = 100.0, 5.0
-# Standard deviation of the logarithms of scale and length of a discrepancy, before they are known.
-_DISCREPANCY_SPREAD = 0.4
+_DISCREPANCY_SPREAD = 0.4  # deviation of the logs of its scale and length, before they are known
 _MAX_RESIDUAL = 100.0  # largest residual in standard deviations from which a discrepancy is estimated
 _MAX_TRIED = 9  # number of searches after which the best optimum is taken though it does not explain the record
-# Largest share of the cost that a search from Step 2's contacts may leave for its result to be taken.
-_MAX_COST_RATIO = 0.9
+_MAX_COST_RATIO = 0.9  # share of the cost that a search from Step 2's contacts may leave to be taken
 
 
 class ContourOptimum(NamedTuple):
