@@ -10,11 +10,11 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.family import ContourFamily
-from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws
 from tactile_bayes.inference.family import PartlyKnown
+from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.result import sample_stats
 from tactile_bayes.load_cell.discrepancy import Discrepancy, joined
 from tactile_bayes.numerics.blocks import blocks

@@ -43,8 +43,9 @@ from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, 
 from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.mechanics.clamped_rod import base_curvature
 from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
+from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["default_priors", "infer_point_load"]
+__all__ = ["default_priors", "infer_point_load", "predictive_p_value"]
 
 _GEOMETRY = ("clamp_axial", "clamp_lateral", "clamp_angle", "compliance")
 _UNITS = {"clamp_axial": "mm", "clamp_lateral": "mm", "clamp_angle": "rad", "compliance": "mm"}
@@ -454,3 +455,26 @@ def _tree(model: _Model, draws: Draws, rng: np.random.Generator) -> xr.DataTree:
         ),
     }
     return xr.DataTree.from_dict(groups)
+
+
+def _sum_of_squares(residuals: Floats) -> Floats:
+    return np.asarray((residuals**2).sum(axis=-1))
+
+
+def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats] = _sum_of_squares) -> float:
+    """Return the posterior predictive p-value of a discrepancy.
+
+    For each draw the discrepancy is computed from the residuals over the noise, of the real readings and of predicted
+    ones (Gelman, Meng and Stern 1996, Statistica Sinica 6, 733). If the model holds, the p-value lies closer to one
+    half than a uniform number does.
+    """
+    posterior = tree["posterior"].to_dataset()
+    if "noise_sd" in posterior:
+        noise = posterior["noise_sd"].values[..., None]
+    else:
+        noise = np.asarray(read_json(tree.attrs["known"], "known")["noise_sd"])
+    predictive = tree["posterior_predictive"].to_dataset()
+    expected = predictive["expected_reading"].values
+    observed = tree["observed_data"].to_dataset()["reading"].values
+    real, predicted = (discrepancy((values - expected) / noise) for values in (observed, predictive["reading"].values))
+    return float(np.mean(predicted >= real))

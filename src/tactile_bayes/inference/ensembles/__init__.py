@@ -13,8 +13,7 @@ coordinates, in which a proposal may be known, from which most steps are then ta
 the parameters. With a checkpoint, every block of steps is on disk before the next begins.
 """
 
-from tactile_bayes.inference.ensembles.draws import Draws
-from tactile_bayes.inference.ensembles.sampling import Progress, sample
+from tactile_bayes.inference.ensembles.sampling import Draws, Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
 from tactile_bayes.inference.ensembles.walkers import scatter_walkers
 

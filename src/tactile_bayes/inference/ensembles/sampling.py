@@ -1,4 +1,4 @@
-"""The run: blocks of steps of all ensembles until they agree, or the budget is spent."""
+"""The run: blocks of steps of all ensembles until they agree, or the budget is spent, and its draws."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -19,20 +19,61 @@ from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, identity_of_run, open_checkpoint
 from tactile_bayes.inference.ensembles.diagnosis import (
     Diagnosis,
+    Mode,
     autocorrelation_time,
     lost_walkers,
     modes_message,
     modes_of,
     walker_major,
 )
-from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.moves import moves_in
 from tactile_bayes.inference.ensembles.run_state import Block, RunState, make_block, next_diagnosis
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.walkers import CheckedTarget, checked_start, first_random_state
 from tactile_bayes.numerics.random_numbers import Seed, spawn
+from tactile_bayes.numerics.selection import evenly_spread
 
-__all__ = ["Progress", "sample"]
+__all__ = ["Draws", "Progress", "sample"]
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Draws from a posterior, with their convergence diagnostics."""
+
+    samples: Floats  # shape (chain, draw, parameter): a chain is an ensemble, with its draws walker-major
+    log_probability: Floats  # shape (chain, draw)
+    names: tuple[str, ...]
+    walkers: int
+    steps_kept: int  # number of steps of each walker in `samples`: every `every`-th of the second half of its steps
+    steps_run: int
+    r_hat: Floats  # rank-normalised, across ensembles, each split in early and late steps to detect drift
+    ess_bulk: Floats  # effective sample size of the bulk, per parameter
+    ess_tail: Floats  # the smaller effective sample size of the 5 % and 95 % quantiles, per parameter
+    acceptance: Floats  # share of accepted proposals, per ensemble, over the steps kept
+    # emcee's integrated autocorrelation time [steps] per parameter, mean over ensembles. It is infinite if a walker is
+    # stuck. emcee subtracts each walker's own mean, so that the estimate is too small over few autocorrelation times.
+    autocorrelation_time: Floats
+    evaluations: int  # points at which the log-probability was computed, in earlier calls with a checkpoint too
+    seconds: float  # sampling time [s], including the steps of earlier calls with a checkpoint
+    converged: bool
+    message: str  # reason for the end of the run, with the worst diagnostics
+    stuck: int  # number of walkers that did not move in all the steps kept
+    modes: tuple[Mode, ...] = ()  # modes of the ensembles, if each ensemble is stationary but they disagree; else empty
+    every: int = 1  # thinning: 1, or a power of two if the second half of the steps would take too much memory
+
+    def refuse_interrupted(self, what: str) -> None:
+        """Raise the interrupt that ended the run, for callers that cannot use a part of it."""
+        if "interrupted" in self.message:
+            raise KeyboardInterrupt(f"interrupted while sampling {what}: there is no result")
+
+    def evenly(self, most: int) -> Index:
+        """Return the indices of at most so many draws of each chain, evenly spread."""
+        return evenly_spread(self.samples.shape[1], most)
+
+    def by_walker(self) -> Floats:
+        """Return the samples as (chain, walker, step, parameter)."""
+        chains, _, parameters = self.samples.shape
+        return self.samples.reshape(chains, self.walkers, self.steps_kept, parameters)
 
 
 _DRAWS_PER_WALKER = 5  # effective ones, at least: the discarded half then exceeds five autocorrelation times

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps
     from tactile_bayes.mechanics.poses.forward_table import Tables
 
-__all__ = ["RecordLikelihood"]
+__all__ = ["RecordLikelihood", "events_of"]
 
 # Error of loads over their noise that is negligible for 360 samples: it changes their log-likelihood by less than 0.05
 # in 999 of 1000 records.
@@ -333,3 +333,28 @@ class RecordLikelihood:
                 f"the likelihood of {np.count_nonzero(np.isnan(values))} contours is not a number: please report this"
             )
         return values
+
+
+def events_of(
+    likelihood: RecordLikelihood, contours: Contour, rig: RigValues | None = None, *, exact: bool = True
+) -> dict[str, Floats]:
+    """Return drive angle and contact point of first contact and snap-off in every sweep segment.
+
+    Returns shape (n, segments).
+    """
+    count = contours.shape[0]
+    paths = likelihood.paths(contours, rig, exact=exact)
+    batch = np.arange(paths.sweep_frame.size)
+    backward = paths.sweep_frame.mirrored
+    out = {}
+    for label, angle, parameter in (
+        ("first", paths.first_angle, paths.first_parameter),
+        ("snap_off", paths.snap_angle, paths.snap_parameter),
+    ):
+        locus = paths.sweep_frame.contour.take(batch).locate(np.where(backward, -parameter, parameter))
+        turned = paths.drive_angles_at(angle)
+        out[f"{label}_drive_angle"] = np.where(backward, np.pi - turned, turned)
+        if paths.lines is not None:
+            out[f"{label}_travel"] = likelihood.segments.ways(angle.reshape(-1, count).T).T.ravel()
+        out[f"{label}_contact_x"], out[f"{label}_contact_y"] = locus.x, locus.y
+    return {name: values.reshape(-1, count).T for name, values in out.items()}

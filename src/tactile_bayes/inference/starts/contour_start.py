@@ -12,7 +12,6 @@ from scipy.special import logsumexp
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
 from tactile_bayes.inference.coordinates.flank import FlankCoordinates
@@ -21,6 +20,7 @@ from tactile_bayes.inference.densities import ANYTHING, Ends, Mixture, Proposal
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
 from tactile_bayes.inference.importance import approximate
 from tactile_bayes.inference.misfit import what_to_try
+from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
