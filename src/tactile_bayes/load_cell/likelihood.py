@@ -65,34 +65,16 @@ def log_likelihood(
         readings, expected, deviation = readings[:, present], expected[..., present], deviation[..., present]
     if _is_plain(sheet) and discrepancy is None:
         return _white(readings, expected, deviation, pointwise)
-
-    wanders = bool(np.any(_wandering_sizes(sheet)[present]))
-    correlation = sheet.correlation_matrix[np.ix_(present, present)]
-    correlated = bool(np.any(correlation != np.eye(present.size)))
-    outliers = math.isfinite(sheet.degrees_of_freedom)
     step, limit = sheet.resolution[present], sheet.limit[present]
     _refuse_beyond(readings, step, limit, present)
-    if discrepancy is not None:
-        _refuse_beside_discrepancy(sheet, discrepancy, correlated)
-    if wanders or correlated or discrepancy is not None:
-        refuse_inexact(sheet, readings, present, wanders, correlated, discrepancy is not None)
-        steps = step**2 / 12.0
-        if not correlated:
-            by_sample = _wandering(sheet, readings - expected, deviation**2 + steps, present, discrepancy, left_out)
-        elif wanders:
-            by_sample = _wandering_together(
-                sheet, readings - expected, deviation, steps, present, correlation, left_out
-            )
-        else:
-            by_sample = correlated_density(readings - expected, deviation, steps, correlation)
-    elif outliers or np.any(step) or np.any(np.isfinite(limit)):
+    by_sample = _dependent(sheet, readings, expected, deviation, present, discrepancy, left_out)
+    if by_sample is None:
+        if not (math.isfinite(sheet.degrees_of_freedom) or np.any(step) or np.any(np.isfinite(limit))):
+            return _white(readings, expected, deviation, pointwise)
         by_sample = np.zeros(np.broadcast_shapes(expected.shape[:-1], deviation.shape[:-1]))
-        for c, (c_step, c_limit) in enumerate(zip(step.tolist(), limit.tolist(), strict=True)):
-            by_sample += _channel(
-                readings[:, c], expected[..., c], deviation[..., c], c_step, c_limit, sheet.degrees_of_freedom
-            )
-    else:
-        return _white(readings, expected, deviation, pointwise)
+        for c, ends in enumerate(zip(step.tolist(), limit.tolist(), strict=True)):
+            of_channel = readings[:, c], expected[..., c], deviation[..., c]
+            by_sample += _channel(*of_channel, *ends, sheet.degrees_of_freedom)
     return np.asarray(by_sample if pointwise else by_sample.sum(axis=-1))
 
 
@@ -245,6 +227,32 @@ def _wandering_sizes(sheet: DataSheet) -> Floats:
     """Standard deviations of the unknown zero: bias and drift, shape (3,)."""
     bias = np.array(sheet.bias_uncertainty)
     return bias if sheet.drift is None else np.hypot(bias, sheet.drift.sizes)
+
+
+def _dependent(
+    sheet: DataSheet,
+    readings: Floats,
+    expected: Floats,
+    deviation: Floats,
+    present: Index,
+    discrepancy: Discrepancy | None,
+    left_out: bool,
+) -> Floats | None:
+    """Log-density of each sample given others; None if samples and channels are independent."""
+    wanders = bool(np.any(_wandering_sizes(sheet)[present]))
+    correlation = sheet.correlation_matrix[np.ix_(present, present)]
+    correlated = bool(np.any(correlation != np.eye(present.size)))
+    if discrepancy is not None:
+        _refuse_beside_discrepancy(sheet, discrepancy, correlated)
+    elif not (wanders or correlated):
+        return None
+    refuse_inexact(sheet, readings, present, wanders, correlated, discrepancy is not None)
+    residual, steps = readings - expected, sheet.resolution[present] ** 2 / 12.0
+    if not correlated:
+        return _wandering(sheet, residual, deviation**2 + steps, present, discrepancy, left_out)
+    if wanders:
+        return _wandering_together(sheet, residual, deviation, steps, present, correlation, left_out)
+    return correlated_density(residual, deviation, steps, correlation)
 
 
 def _wandering(
