@@ -39,17 +39,14 @@ def is_long(record: xr.Dataset) -> bool:
 
 
 def shortened(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
-    """Return a record as the likelihood takes it, and the load cell of its samples.
+    """Return a record as the likelihood takes it, and the load cell of its samples; `blocks` of the record states how.
 
     A record of more than `MOST_SAMPLES` is put in blocks of readings at neighbouring drive angles, narrow enough that
     loads are smooth in them, each of which two points of its straight line stand for; readings next to a snap-off stay
     single. The points have the noise of a reading over the root of their number of readings, and what scatters about
-    the line states the noise. For noise
-    whose means have no such distribution (outliers, drift, correlated channels, an encoder with noise or steps, steps
-    above the noise, readings at the end of the range), and where a drive carries the base, every so many readings are
-    taken instead; the drift is then that between them.
-
-    The attribute `blocks` of the result states what was done.
+    the line states the noise. For noise whose means have no such distribution (outliers, drift, correlated channels, an
+    encoder with noise or steps, steps above the noise, readings at the end of the range), and where a drive carries the
+    base, every so many readings are taken instead; the drift is then that between them.
     """
     if not is_long(record):
         return record, cell

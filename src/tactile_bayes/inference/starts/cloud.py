@@ -58,8 +58,6 @@ def gather(
     explain it, and takes thousands of steps to return. Points are therefore drawn around the centre, and while most of
     them are far less probable than the best, centre and covariance are estimated from the best fifth (cross-entropy
     method). The covariance is halved, since the best fifth of points that are twice as wide would not be narrower.
-
-    Shapes: centre (d,), covariance (d, d).
     """
     size = centre.size
     top = float(log_probability(centre[None])[0])

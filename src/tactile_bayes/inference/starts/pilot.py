@@ -44,9 +44,7 @@ def learn_coordinates(
     """Return coordinates with a proposal in them, learned in stages that sample in the best coordinates so far.
 
     The quality of a proposal is estimated at positions of the walkers: its own draws would miss the same parts of the
-    target as the proposal, and a narrow one would look good.
-
-    Shapes: start (walkers, d), scale (d,).
+    target, and a narrow one would look good. Shapes: start (walkers, d), scale (d,).
     """
     best: Coordinates = base
     points = start
@@ -85,12 +83,9 @@ def standardise(
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
 ) -> tuple[Whitening, Floats]:
-    """Return coordinates that are nearer to standard normal ones than the base's nearly normal ones are, and the start.
+    """Return coordinates nearer to standard normal ones than the base's, and the start, (ensembles, walkers, d), in them.
 
-    Each of some pilot runs samples in the coordinates so far, and these are standardised by mean and covariance of its
-    second half.
-
-    Shapes: start (ensembles, walkers, d).
+    Each of some pilot runs samples in those so far, which are standardised by mean and covariance of its second half.
     """
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
     best, start, points = base, start.copy(), start[0]
