@@ -83,7 +83,7 @@ def standardise(
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
 ) -> tuple[Whitening, Floats]:
-    """Return coordinates nearer to standard normal ones than the base's, and the start, (ensembles, walkers, d), in them.
+    """Return coordinates nearer to standard normal than the base's, and the start, (ensembles, walkers, d), in them.
 
     Each of some pilot runs samples in those so far, which are standardised by mean and covariance of its second half.
     """
