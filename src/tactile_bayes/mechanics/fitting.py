@@ -53,8 +53,8 @@ def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike, has_no
     noisy = count if has_noise else 0
     (place, other), (tip_angle, deviation, other_deviation) = np.empty((2, count, 4)), np.empty((3, count))
     fit = RawFit(place, tip_angle, np.empty((noisy, 4, 4)), np.empty(noisy), deviation, other, other_deviation)
-    sizes = (1, 4), (4, 4), (2, 4, 5), (3, 3), (3, 3)
-    room = Room(*(np.empty(size) for size in sizes), contact_workspace())
+    (matrix, axes), shifts = np.empty((2, 3, 3)), np.empty((2, 4, 5))
+    room = Room(np.empty((1, 4)), np.empty((4, 4)), shifts, matrix, axes, contact_workspace())
     curvature, profile, stem = rods_of(rods, count)
     if not has_noise:
         reading = reading._replace(covariance=reading.covariance[:0])

@@ -129,11 +129,16 @@ def _sign(record: xr.Dataset, rows: Index) -> float:
     return -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
 
 
-def _is_plain(record: xr.Dataset, moment: Floats, rows: Index) -> bool:
-    """Return whether no moment contradicts the direction of a sweep, which is exactly without load at either end."""
-    of_sweep = moment[rows]
-    ends = np.concatenate([of_sweep[:FEWEST], of_sweep[-FEWEST:]]) == 0.0
-    return bool((ends[:FEWEST].all() or ends[FEWEST:].all()) and (_sign(record, rows) * of_sweep).min() >= 0.0)
+def _are_plain(record: xr.Dataset, moment: Floats, parts: list[Index]) -> bool:
+    """Return whether no moment contradicts the direction of its sweep, and each sweep is exactly without load at either
+    end."""
+    for rows in parts:
+        of_sweep = moment[rows]
+        if np.any(of_sweep[:FEWEST]) and np.any(of_sweep[-FEWEST:]):
+            return False
+        if (_sign(record, rows) * of_sweep).min() < 0.0:
+            return False
+    return True
 
 
 def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
@@ -145,7 +150,7 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
     present = present_channels(record)
     sweep, moment = record.sweep.values, record.holding_moment.values
     parts = rows_of_sweeps(sweep)
-    if CHANNELS[0] not in present or all(_is_plain(record, moment, rows) for rows in parts):
+    if CHANNELS[0] not in present or _are_plain(record, moment, parts):
         return [_Judged(int(sweep[rows[0]]), rows, np.inf, np.inf) for rows in parts]
     readings = np.stack([record[name].values for name in present], axis=-1)
     readings /= np.maximum(np.abs(readings).max(axis=0), 1e-100 * unit)  # squares of large ones would overflow
