@@ -16,6 +16,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.poses.forward_table import PARTS, chord_in, has_parts, is_far, part_in, pose_in, sheet
@@ -77,13 +80,13 @@ class Varied(NamedTuple):
 
     profile: Profile
     work: Floats
-    sheet: Floats
+    sheet: NDArray[np.void]
     """Coefficients of its pose, from a table."""
     slenderness: float
     """Slenderness of the table; 0 if there are no coefficients."""
     sign: float
     """Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose."""
-    other_sheet: Floats
+    other_sheet: NDArray[np.void]
     other_slenderness: float
     """Coefficients and slenderness for friction that acts in the other sense."""
 
