@@ -312,9 +312,10 @@ def _states(
         curved = columns[:, -1] != 0.0
         for rows, write in ((~curved, wrenches), (curved, partial(continued_wrenches, None, None))):
             if rows.any():  # what is never called is never compiled
-                phases, states = found[rows], out[rows]
-                write(columns[rows], *known, phases, states)
-                found[rows], out[rows] = phases, states
+                which = slice(None) if rows.all() else rows
+                phases, states = found[which], out[which]
+                write(columns[which], *known, phases, states)
+                found[which], out[which] = phases, states
     else:
         room = profile._replace(curvature=np.empty_like(profile.curvature), rigidity=np.empty_like(profile.rigidity))
         continued_wrenches(varied_of(profile), room, columns, *known, found, out)
