@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_kind, check_number
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
@@ -48,12 +49,13 @@ def sweep_paths(
     rod: Rod | None = None,
     friction: float = 0.0,
     compliance: float = 0.0,
+    drive_angles: Floats | None = None,
 ) -> Paths:
     """Compute the exact path of one sweep along one contour, or raise an error that says why there is none.
 
     Parameters and errors are those of `scan`, with one pivot and one direction, and the compliance of the suspension
-    [rad/(EI/L)]. Friction opposes the slip all along the
-    path, or from a travel on: see `sliding_from`.
+    [rad/(EI/L)]. Friction opposes the slip all along the path, or from a travel on: see `sliding_from`. States are
+    computed at the drive angles in the sweep frame [rad].
     """
     rod = Rod() if rod is None else rod
     sweep_frame = to_sweep_frame(contour, base, direction, rod)
@@ -68,6 +70,7 @@ def sweep_paths(
         "friction_angle": friction_angle,
         "suspension_compliance": compliance,
         "profile": rod.profile,
+        "drive_angles": drive_angles,
     }
     paths = trace(sweep_frame, asks_sliding=True, **known)
     if paths.reach[0] == Reachability.STICKS:
@@ -80,26 +83,33 @@ def sweep_paths(
 
 
 def carried_paths(
-    contour: Contour, drive: Carried, *, rod: Rod | None = None, friction: float = 0.0, compliance: float = 0.0
+    contour: Contour,
+    drive: Carried,
+    travels: Floats,
+    *,
+    rod: Rod | None = None,
+    friction: float = 0.0,
+    compliance: float = 0.0,
 ) -> tuple[Paths, Direction]:
     """Compute the exact path of a rod that a drive carries along one contour, and the direction that its side implies.
 
-    It touches the object with its left side, as a forward sweep does, or with its right side. Errors are those of
-    `scan`.
+    It touches the object with its left side, as a forward sweep does, or with its right side. States are computed at
+    the travels. Errors are those of `scan`.
     """
     rod, poses = Rod() if rod is None else rod, drive.poses
     base, friction_angle = (float(poses[0, 0]), float(poses[0, 1])), friction_angle_of(friction)
     found: dict[Direction, Paths] = {}
     for direction in _DIRECTIONS:
         way = float(np.abs(poses[:, 0] - base[0]).max()) / rod.length
-        lines = lines_through(poses, rod.length, backward=direction == "backward").lines[None]
+        path = lines_through(poses, rod.length, backward=direction == "backward")
         sweep_frame = replace(to_sweep_frame(contour, base, direction, rod), way=way)
         found[direction] = trace(
             sweep_frame,
             friction_angle=friction_angle,
             suspension_compliance=compliance,
             profile=rod.profile,
-            lines=lines,
+            drive_angles=np.interp(travels, drive.travels, path.travels),
+            lines=path.lines[None],
         )
 
     first = {direction: float(of_side.first_angle[0]) for direction, of_side in found.items()}

@@ -12,11 +12,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import as_numbers, check_pivots
 from tactile_bayes.contours.base import Contour, Locus
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
-from tactile_bayes.mechanics.branches.line import lines_through
 from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
@@ -277,24 +276,33 @@ def scan(
     sweeps: list[SweepEvents] = []
     for one in drives:
         if isinstance(one, Carried):
-            paths, sense = carried_paths(contour, one, rod=rod, friction=friction, compliance=compliance)
+            travels = _travels(one, rod)
+            paths, sense = carried_paths(contour, one, travels, rod=rod, friction=friction, compliance=compliance)
             sweep = events_of(paths, sense, one, rod)
             _warn_of(sweep, one, rod)
-            travels = _travels(one, sweep, rod)
-            found = [(paths, sweep, one.at(travels), _ways(one, travels, sense, rod))]
+            last = sweep.touches_again if sweep.clear else sweep.snap_off.travel
+            chosen = np.flatnonzero(~(travels > last))
+            found = [(paths, sweep, one.at(travels[chosen]), chosen)]
         else:
             found = []
+            every = _every_angle(one)
             for sense in one.directions:
                 paths = sweep_paths(
-                    contour, base=one.base, direction=sense, rod=rod, friction=friction, compliance=compliance
+                    contour,
+                    base=one.base,
+                    direction=sense,
+                    rod=rod,
+                    friction=friction,
+                    compliance=compliance,
+                    drive_angles=np.pi - every if sense == "backward" else every,
                 )
                 sweep = events_of(paths, sense, one, rod)
                 _warn_of(sweep, one, rod)
-                angles = _angles(one, sweep)
+                angles = _angles(one, every, sweep)
                 poses = np.column_stack([*(np.full(angles.size, value) for value in one.base), angles])
-                found.append((paths, sweep, poses, np.pi - angles if sense == "backward" else angles))
-        for paths, sweep, poses, ways in found:
-            columns.append(_sweep(paths, ways, poses, len(sweeps), sweep.direction, rod))
+                found.append((paths, sweep, poses, np.searchsorted(every, angles)))
+        for paths, sweep, poses, chosen in found:
+            columns.append(_sweep(paths, chosen, poses, len(sweeps), sweep.direction, rod))
             sweeps.append(sweep)
     if not any(len(of_sweep["drive_angle"]) for of_sweep in columns):
         snaps = ", ".join(f"{sweep.snap_off.drive_angle:.6g} rad ({sweep.direction})" for sweep in sweeps)
@@ -344,17 +352,24 @@ def _given(base: Any, options: Mapping[str, Any]) -> str | None:
     return "base" if check_pivots("base", base) != [(0.0, 0.0)] else next(iter(given), None)
 
 
-def _angles(drive: Rotation, sweep: SweepEvents) -> Floats:
+def _every_angle(drive: Rotation) -> Floats:
+    """Drive angles of a rotation, increasing: those asked for, or all multiples of its step within a turn each way."""
+    if drive.drive_angles is not None:
+        return np.array(drive.drive_angles)
+    step = drive.drive_step or _STEP
+    angles = np.arange(np.floor(-_TURN / step), np.ceil(_TURN / step) + 1) * step
+    return np.asarray(angles[np.abs(angles) <= _TURN])  # a drive turns by no more
+
+
+def _angles(drive: Rotation, every: Floats, sweep: SweepEvents) -> Floats:
     """Drive angles of the samples of a rotation, in their order."""
-    forward = sweep.direction == "forward"
+    forward, angles = sweep.direction == "forward", every
     is_asked = drive.drive_angles is not None
-    if is_asked:
-        angles = np.array(drive.drive_angles)
-    else:
+    if not is_asked:
         step = drive.drive_step or _STEP
         first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
-        angles = np.arange(np.floor(first / step) - _MARGIN, np.ceil(snap / step) + _MARGIN + 1) * step
-        angles = angles[np.abs(angles) <= 2.0 * np.pi]  # a drive turns by no more
+        number = np.round(angles / step)
+        angles = angles[(number >= np.floor(first / step) - _MARGIN) & (number <= np.ceil(snap / step) + _MARGIN)]
     sense = 1.0 if forward else -1.0
     if not sweep.clear:
         angles = angles[sense * (sweep.snap_off.drive_angle - angles) >= 0.0]
@@ -382,20 +397,11 @@ def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents, *, is_asked
     return np.asarray(angles[kept])
 
 
-def _travels(drive: Carried, sweep: SweepEvents, rod: Rod) -> Floats:
+def _travels(drive: Carried, rod: Rod) -> Floats:
     """Travels of the samples of a drive that carries the base."""
     if drive.drive_step is None and isinstance(drive, Motion) and drive.x.size > _FEWEST_POSES:
-        travels = drive.travels
-    else:
-        travels = drive.by(drive.drive_step or _SHARE * rod.length)
-    last = sweep.touches_again if sweep.clear else sweep.snap_off.travel
-    return travels[~(travels > last)]
-
-
-def _ways(drive: Carried, travels: Floats, direction: str, rod: Rod) -> Floats:
-    """Travels in the forward model's own measure."""
-    path = lines_through(drive.poses, rod.length, backward=direction == "backward")
-    return np.asarray(np.interp(travels, drive.travels, path.travels))
+        return drive.travels
+    return drive.by(drive.drive_step or _SHARE * rod.length)
 
 
 def _floats(values: ArrayLike) -> Floats:
@@ -451,17 +457,17 @@ def _place(sweep: SweepEvents) -> str:
 
 
 def _sweep(
-    paths: Paths, ways: Floats, poses: Floats, number: int, direction: str, rod: Rod
+    paths: Paths, chosen: Index, poses: Floats, number: int, direction: str, rod: Rod
 ) -> dict[str, NDArray[np.generic]]:
-    """Columns of a sweep at drive angles in the sweep frame, or travels, and at the same poses in the laboratory."""
-    index = np.zeros(ways.size, dtype=np.intp)
-    states = paths.states(index, ways)
+    """Columns of a sweep at some of the drive angles or travels of its path, which are those of poses of the base."""
+    index = np.zeros(chosen.size, dtype=np.intp)
+    states = paths.sampled_states(np.array(0)).take(chosen)
     columns = to_lab_frame(paths.sweep_frame, index, states, rod)
     loaded = states.wrench.phase != NONE
     columns["contact_phase"] = np.array(PHASE_NAMES)[states.wrench.phase]
     sweep: dict[str, NDArray[np.generic]] = {
-        "sweep": np.full(ways.size, number),
-        "direction": np.full(ways.size, direction),
+        "sweep": np.full(chosen.size, number),
+        "direction": np.full(chosen.size, direction),
         "base_x": poses[:, 0],
         "base_y": poses[:, 1],
         "drive_angle": poses[:, 2],
