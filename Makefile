@@ -18,11 +18,11 @@ unexport PYTHONDONTWRITEBYTECODE
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
 
-# Of the notebooks that of one's own record. Each process takes one core, and tests that follow one another
-# stay in one process as far as possible: they share what a file of tests prepares.
+# Each process takes one core, and tests that follow one another stay in one process as far as possible: they share
+# what a file of tests prepares.
 test notebooks: export OPENBLAS_NUM_THREADS = 1
 test: $(READY)
-	$(BIN)/python -m pytest -n auto --dist worksteal --nbmake --doctest-modules src notebooks/7_*.ipynb tests
+	$(BIN)/python -m pytest -n auto --dist worksteal --doctest-modules src tests
 
 notebooks: $(READY)
 	$(BIN)/python -m pytest -n auto --nbmake --nbmake-timeout=1200 notebooks

@@ -21,7 +21,7 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours import Circle, Contour, Joined
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.parameters.matched_priors import matched_priors
+from tactile_bayes.inference.parameters.priors import matched_priors
 from tactile_bayes.rig import NOTHING
 from tactile_bayes.tasks import run_tasks
 

@@ -34,9 +34,8 @@ from scipy import stats
 import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.parameters.nuisances import Nuisances
-from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood, events_of
 from tactile_bayes.inference.result import known_of
 from tactile_bayes.rig import NOTHING
 

@@ -15,7 +15,7 @@ from tactile_bayes.distributions import (
 )
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.parameters.matched_priors import widened
+from tactile_bayes.inference.parameters.priors import widened
 from tactile_bayes.rig import Rig
 
 NAN = float("nan")

@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 from helpers.contour_posteriors import only
 from tactile_bayes.contours import Circle
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.inference.family import Gauge
 from tactile_bayes.rig import Rig
 
 RIG = {

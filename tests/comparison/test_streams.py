@@ -9,7 +9,7 @@ from scipy.special import softmax
 
 import tactile_bayes as tb
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
-from tactile_bayes.inference.parameters.matched_priors import matched_priors
+from tactile_bayes.inference.parameters.priors import matched_priors
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 RIG = tb.Rig(load_cell=CELL, unknown="nothing")

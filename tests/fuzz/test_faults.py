@@ -24,8 +24,8 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.datasets import shard
 from tactile_bayes.diagnostics.inspection import inspect_record
 from tactile_bayes.errors import InferenceError, TactileBayesError
-from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.checkpoint import open_checkpoint
+from tactile_bayes.inference.ensembles.run_state import Block
 from tactile_bayes.inference.ensembles.walkers import RandomState
 from tactile_bayes.inference.result import write_result
 from tactile_bayes.inference.streams.stream import Stream

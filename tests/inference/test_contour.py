@@ -492,7 +492,7 @@ class Clock:
             return predict(likelihood, *arguments)
 
         monkeypatch.setattr(RecordLikelihood, "_predict", slow)
-        for module in ("deadline", "ensembles.sampling", "ensembles.block"):
+        for module in ("deadline", "ensembles.sampling"):
             monkeypatch.setattr(f"tactile_bayes.inference.{module}.time.monotonic", lambda: self.now)
 
 

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-from tactile_bayes.inference.found_rig import contact_points, found_rig
+from tactile_bayes.inference.stored_experiment import contact_points, found_rig
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, to_dimensionless, with_rod
 from tactile_bayes.rig import Rig

@@ -11,8 +11,8 @@ import xarray as xr
 from helpers.contour_posteriors import BRIEF, infer_as_stated, only, swept
 from tactile_bayes.contours import Circle
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.found_rig import found_rig
-from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.inference.family import Gauge
+from tactile_bayes.inference.stored_experiment import found_rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS

@@ -12,7 +12,7 @@ from scipy import stats
 from helpers.load_cells import CELL, SHARED, UNKNOWN, WALK, WANDER, cell, moments
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
-from tactile_bayes.load_cell.discrepancy_filter import innovations
+from tactile_bayes.load_cell.kalman import innovations
 
 N = 40
 SWEEPS = (np.arange(0, 18), np.arange(18, N))
@@ -137,7 +137,7 @@ def test_it_is_exact_where_loads_are_far_above_the_noise(size, length):
         np.array([np.sqrt(3.0) / length]),
         np.arange(count),
         steps,
-        np.zeros((3, 1)),
+        np.zeros((3, 1, 1)),
         1.0,
     )
     with mpmath.workdps(80):

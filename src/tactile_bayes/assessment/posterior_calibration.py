@@ -23,19 +23,14 @@ from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem
-from tactile_bayes.inference.ensembles import (
-    Mixture,
-    Proposal,
-    SamplerSettings,
-    approximate,
-    in_coordinates,
-    scatter_walkers,
-)
-from tactile_bayes.inference.ensembles.proposal import flattened
+from tactile_bayes.inference.coordinates.base import in_coordinates
+from tactile_bayes.inference.densities import Mixture, Proposal, flattened
+from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
 from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.importance import approximate
+from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.contour_start import Walk
 from tactile_bayes.inference.stored_experiment import points_of, predicted_points
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words, words

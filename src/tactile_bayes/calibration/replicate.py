@@ -17,8 +17,8 @@ from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import child
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region

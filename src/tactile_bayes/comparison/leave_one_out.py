@@ -18,6 +18,8 @@ from scipy.special import logsumexp
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.densities import effective_number
+from tactile_bayes.inference.importance import LARGEST_K, pareto_smoothed, weighed
 
 __all__ = [
     "Difference",
@@ -81,7 +83,7 @@ def largest_k(draws: int) -> float:
 
     It is the smaller of 1 − 1 / log₁₀ draws and 0.7 (Vehtari et al. 2024, JMLR 25(72)).
     """
-    return min(1.0 - 1.0 / math.log10(draws), 0.7)
+    return min(1.0 - 1.0 / math.log10(draws), LARGEST_K)
 
 
 def left_out(log_densities: Floats) -> LeftOut:
@@ -151,11 +153,10 @@ def reweighted(log_weights: Floats, log_density: Floats) -> FromWider:
                 f"{name} is {float(values[chain, draw])!r} at draw {draw} of chain {chain}: give finite numbers, or "
                 "-inf where a draw is impossible"
             )
-    total = logsumexp(weights)
-    if total == -np.inf:
+    if not np.isfinite(weights).any():
         return FromWider(math.nan, math.inf, 0.0)
-    weights = weights - total
-    effective = float(np.exp(-logsumexp(2.0 * weights)))
+    weights = weighed(weights.ravel())[0].reshape(weights.shape)
+    effective = float(effective_number(np.exp(weights.ravel())))
     found, error = _weighed(weights, density)
     return FromWider(found, error if effective >= _LEAST_EFFECTIVE else math.inf, effective)
 
@@ -236,12 +237,14 @@ def _smoothed(log_density: Floats) -> tuple[Floats, float]:
     tail = int(3.0 * math.sqrt(log_density.size / efficiency))
     tail = min(tail, log_density.size // 5)
     lowest = np.partition(log_density, tail, axis=None)[: tail + 1]
-    plain = -log_density - logsumexp(-log_density)
+    logs = -log_density.ravel()
+    plain = weighed(logs)[0].reshape(log_density.shape)
     if np.ptp(lowest) < _SAME:
         return plain, -math.inf
     with np.errstate(all="ignore"):  # a fit to few different weights fails and gives NaN
-        smoothed, k = array_stats.psislw(log_density, r_eff=efficiency, axis=(0, 1))  # weights are 1 / its argument
-    return (smoothed, float(k)) if np.isfinite(k) and np.isfinite(smoothed).all() else (plain, math.inf)
+        smoothed, k = pareto_smoothed(logs, efficiency)
+    is_fitted = np.isfinite(k) and np.isfinite(smoothed).all()
+    return (smoothed.reshape(plain.shape), k) if is_fitted else (plain, math.inf)
 
 
 def _weighed(log_weights: Floats, log_density: Floats) -> tuple[float, float]:

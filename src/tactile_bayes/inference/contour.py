@@ -17,11 +17,11 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
+from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import Coordinates, Draws, Progress, SamplerSettings, sample, settings_of
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, settings_of
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.inference.family import Family, Gauge
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.parameters.rig_prior import rig_prior
 from tactile_bayes.inference.result import provenance
@@ -33,8 +33,7 @@ from tactile_bayes.rig.unknown import expanded
 
 __all__ = ["Sampled", "calibrate_rig", "contours_of", "infer_contour", "rig_posterior", "sampled"]
 
-_PRIOR_SECONDS = 3.0
-"""Time limit for draws from the prior [s] if time is limited, since a rod may reach few contours."""
+_PRIOR_SECONDS = 3.0  # time limit for draws from the prior [s] if time is limited, since a rod may reach few contours
 
 
 def infer_contour(

@@ -10,11 +10,11 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.family import ContourFamily
-from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws
 from tactile_bayes.inference.family import PartlyKnown
+from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.result import sample_stats
 from tactile_bayes.load_cell.discrepancy import Discrepancy, joined
 from tactile_bayes.numerics.blocks import blocks
@@ -24,21 +24,13 @@ from tactile_bayes.rig.parameters import parameter_named
 
 __all__ = ["FEWEST_PREDICTIONS", "drawn_groups", "predicted_groups", "prior_draws", "unit_of"]
 
-_KEPT_DRAWS = 250
-"""Largest number of draws of each chain for which predictions and events are stored."""
-
+_KEPT_DRAWS = 250  # largest number of draws of each chain for which predictions and events are stored
+# Largest number of values in predictions and log-likelihoods, 128 MB; with four chains, fewer draws are stored from
+# 4,000 samples on.
 _STORED_NUMBERS = 16_000_000
-"""Largest number of values in predictions and log-likelihoods, 128 MB; with four chains, fewer draws are stored from
-4,000 samples on."""
-
-FEWEST_PREDICTIONS = 100
-"""Least number of predictions that the check of the record requires."""
-
-_PATHS = 200
-"""Number of contours whose paths are followed at a time."""
-
+FEWEST_PREDICTIONS = 100  # least number of predictions that the check of the record requires
+_PATHS = 200  # number of contours whose paths are followed at a time
 _PRIOR_DRAWS = 1000
-
 _BY_SAMPLE = ("chain", "draw", "sample")
 
 

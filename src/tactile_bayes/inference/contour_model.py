@@ -8,14 +8,16 @@ from types import MappingProxyType
 
 import numpy as np
 import xarray as xr
+from scipy.special import chdtri
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.distributions import Distribution, log_density_of, support_of
 from tactile_bayes.errors import DriftWarning, ParameterError, ReachError
+from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import Ends, Logarithms
+from tactile_bayes.inference.densities import Ends
 from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.parameters.noise import Noise
 from tactile_bayes.inference.parameters.nuisances import Nuisances
@@ -30,56 +32,19 @@ from tactile_bayes.rig.parameters import MAY_VANISH
 
 __all__ = ["ContourModel"]
 
-_FEWEST_UNLOADED = 12
-"""Least number of unloaded samples from which zero and noise of a channel are estimated."""
-
-_MOST_TRIALS = 50
-"""Largest number of draws from the prior for each requested draw within reach."""
-
-_FEWEST_TRIALS = 1000
-"""Number of draws from the prior before none within reach is an error, so that one requested draw is found too."""
+_FALSE_ALARM = 1e-7  # probability that noise alone makes an unloaded sample look loaded
+_FEWEST_UNLOADED = 12  # least number of unloaded samples from which zero and noise of a channel are estimated
+_MOST_TRIALS = 50  # largest number of draws from the prior for each requested draw within reach
+_FEWEST_TRIALS = 1000  # draws of the prior before none within reach is an error, so that one is found too
 
 
 class ContourModel:
-    """Prior times likelihood, as a function of arrays of parameters.
+    """Prior times likelihood, as a function of arrays of parameters, in the record's units.
 
-    Points, shape (n, d), have the parameters of the contour first, then those of the rig, then those of the noise, then
-    those of a discrepancy.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A valid record.
-    family : ContourFamily
-    nuisances : Nuisances
-        Parameters of the rig.
-    noise : Noise
-        Parameters of the noise, and the load cell.
-    priors : mapping of str to frozen scipy.stats distribution
-        Priors of all parameters by name, in the record's units.
-
-    Attributes
-    ----------
-    forward_parameters : tuple of str
-        Names of the parameters of the forward model: those of contour and rig.
-    names : tuple of str
-        Names of all parameters.
-    of_path : list of int
-        Places of the parameters that change the path, or where along it the samples lie.
-    low, high : ndarray, shape (d,)
-        Bounds of the parameters, whatever the priors.
-    likelihood : RecordLikelihood
-    rubs : bool
-        Whether there may be friction.
-    found : xr.Dataset
-        Zero and noise of the unloaded samples, from `zero_load`.
-    zero, deviation : ndarray, shape (3,)
-        Zero of each channel (NaN if unknown) and estimated standard deviation [EI/L, EI/L²].
-
-    Raises
-    ------
-    ParameterError
-        If errors of the encoder are combined with a discrepancy, for which there is no closed form.
+    Points, shape (n, d), have the parameters of the contour first, then those of the rig (`forward_parameters`), then
+    those of the noise, then those of a discrepancy; together they are `names`, with their bounds `low` and `high`.
+    `of_path` are the places of those that change the path, or where along it the samples lie; `found` is the result of
+    `zero_load`; `zero` (NaN if unknown) and `deviation` are those of each channel [EI/L, EI/L²].
     """
 
     def __init__(
@@ -137,6 +102,15 @@ class ContourModel:
     def present(self) -> Flags:
         """True for channels that were measured, shape (3,)."""
         return ~np.isnan(self.likelihood.measured).all(axis=0)
+
+    @property
+    def certainly_loaded(self) -> Flags:
+        """True for samples whose load noise does not explain, each taken by itself, above the zero of the record."""
+        present = self.present
+        measured, zero = self.likelihood.measured[:, present], self.zero[present]
+        zero = np.where(np.isfinite(zero), zero, np.median(measured, axis=0))
+        squared_distance = np.square((measured - zero) / self.deviations[:, present]).sum(axis=1)
+        return np.asarray(squared_distance > chdtri(np.count_nonzero(present), _FALSE_ALARM))
 
     @property
     def noise_columns(self) -> list[list[int]]:

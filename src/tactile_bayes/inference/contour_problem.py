@@ -29,26 +29,19 @@ from tactile_bayes.reconstruction import (
 __all__ = ["ContourProblem", "contour_problem", "identity_of"]
 
 
-_MOST_DOUBTFUL = 2
-"""Largest number of sweeps of which both sides are tried, the most doubtful first: each doubles the problems."""
-
-_BELIEVED = float(np.log(10.0))
-"""Logarithm of the prior odds that the direction of a doubtful sweep states its side of contact."""
+_MOST_DOUBTFUL = 2  # sweeps of which both sides are tried, the most doubtful first: each doubles the problems
+_BELIEVED = float(np.log(10.0))  # log prior odds that the direction of a doubtful sweep states its side of contact
 
 
 class ContourProblem(NamedTuple):
     """Prior times likelihood, and a description of both."""
 
     model: ContourModel
-    about: Mapping[str, Any]
-    """Attributes of the posterior."""
-    loaded: Flags
-    """True for samples with a load that noise does not explain, shape (samples,)."""
+    about: Mapping[str, Any]  # attributes of the posterior
+    loaded: Flags  # True for samples with a load that noise does not explain, shape (samples,)
 
-    others: tuple[ContourProblem, ...] = ()
-    """Problems with other sides of contact, if these are doubtful."""
-    log_prior_odds: float = 0.0
-    """Logarithm of the prior odds of the sides of contact over those that the directions state."""
+    others: tuple[ContourProblem, ...] = ()  # problems with other sides of contact, if these are doubtful
+    log_prior_odds: float = 0.0  # of the sides of contact over those that the directions state
 
     @property
     def identity(self) -> dict[str, str]:

@@ -21,18 +21,7 @@ class _PassedError(Exception):
 
 @dataclass(frozen=True)
 class Deadline:
-    """The time at which a search ends with its best result so far.
-
-    Parameters
-    ----------
-    moment : float
-        Time on the clock `time.monotonic` [s]; infinite for no deadline.
-
-    Examples
-    --------
-    >>> Deadline.after(60.0).has_passed, Deadline.after(0.0).has_passed, Deadline.after(None).has_passed
-    (False, True, False)
-    """
+    """The time on the clock `time.monotonic` [s] at which a search ends with its best result so far."""
 
     moment: float = math.inf
 
@@ -76,5 +65,4 @@ class Deadline:
             return least_squares(residuals, best, jacobian, **{**options, "max_nfev": 1})
 
 
-NEVER = Deadline()
-"""No deadline."""
+NEVER = Deadline()  # no deadline

@@ -1,4 +1,4 @@
-"""The evidence of a model: the integral of an unnormalised density, from draws, by bridge sampling."""
+"""The evidence of a model: the integral of prior times likelihood, from draws, by bridge sampling."""
 
 from __future__ import annotations
 
@@ -7,57 +7,42 @@ from typing import NamedTuple
 
 import numpy as np
 from arviz_stats.base.array import array_stats
-from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
-from scipy.special import expit, ndtr
+from scipy.special import expit, log_expit, ndtr
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour import Sampled
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.coordinates.base import in_coordinates
+from tactile_bayes.inference.densities import Proposal, effective_number, normalised
+from tactile_bayes.inference.importance import weighed
+from tactile_bayes.inference.parameters.priors import widened
 
-__all__ = ["Evidence", "bridge_evidence"]
+__all__ = ["WIDTHS", "ContourEvidence", "Evidence", "bridge_evidence", "contour_evidence"]
 
-_KNOTS = np.linspace(-2.0, 2.0, 7)
-"""Knots of piecewise linear normal scores: more would follow noise, fewer would not resolve hard bounds."""
-
-_PROPOSALS = 4000
-"""Default number of proposals."""
-
-_LEAST_PROPOSALS = 20
-
-_MOST_DRAWS = 50_000
-"""Largest number of draws that are used, evenly spaced: more than ten times the proposals add little."""
-
-_LEAST_PER_CHAIN = 8
-"""Least number of draws that ArviZ needs for an effective sample size."""
-
-_LEAST_PER_PARAMETER = 5
-"""Least number of draws in a half, per parameter, for an estimate of the covariance."""
-
-_FLAT = 1e-13
-"""Smallest over largest variance of standardised parameters below which the variance is due to rounding."""
-
-_LEAST_TERMS = 5.0
-"""Least effective number of draws, and of proposals, for an estimate."""
-
-_ROUNDS = 2
-"""Number of iterations for the effective number of draws, which hardly depends on the threshold, and vice versa."""
-
-_PROBES = 2
-"""Number of draws per chain at which the density is recomputed."""
-
-_AGREES = 0.01
-"""Largest difference between given and recomputed log-densities."""
+_KNOTS = np.linspace(-2.0, 2.0, 7)  # of normal scores: more would follow noise, fewer would not resolve hard bounds
+_PROPOSALS, _LEAST_PROPOSALS = 4000, 20  # by default, and at least
+_MOST_DRAWS = 50_000  # that are used, evenly spaced: more than ten times the proposals add little
+_LEAST_PER_CHAIN = 8  # draws that ArviZ needs for an effective sample size
+_LEAST_PER_PARAMETER = 5  # draws in a half, for an estimate of the covariance
+_FLAT = 1e-13  # smallest over largest variance of standardised parameters below which the variance is due to rounding
+_LEAST_TERMS = 5.0  # effective number of draws, and of proposals, for an estimate
+_ROUNDS = 2  # for the effective number of draws, which hardly depends on the threshold, and vice versa
+_PROBES, _AGREES = 2, 0.01  # draws per chain at which the density is recomputed, and the largest difference
+WIDTHS = (0.5, 1.0, 2.0)  # factors on the widths of the priors of sizes, exponents, amplitude and length scale
+_POSTERIOR_DRAWS = 8000  # that are used, evenly spread, since neighbours add little
+_PRIOR_DRAWS, _OTHER_DRAWS = 4000, 1000  # for the share within reach, with the prior and with one of another width
 
 
 class Evidence(NamedTuple):
     """The logarithm of an integral, with its standard error and overlap."""
 
     log_evidence: float
-    standard_error: float
-    """Standard error of `log_evidence`."""
+    standard_error: float  # of `log_evidence`
+    # ∫ p q/(s p + (1 − s) q) of the density p and the proposal density q, both normalised, with s the share of draws of
+    # p: 1 if both are the same, 0 if they are disjoint. Below some 0.1, the standard error is not reliable.
     overlap: float
-    """∫ p q/(s p + (1 − s) q) of the density p and the proposal density q, both normalised, with s the share of draws
-    of p: 1 if both are the same, 0 if they are disjoint. Below some 0.1, the standard error is not reliable."""
 
 
 def bridge_evidence(
@@ -74,58 +59,22 @@ def bridge_evidence(
 
         Z = E_q[f h]/E_p[q h],  h = 1/(s f/Z + (1 − s) q),  s = n/(n + m),
 
-    for n effective draws of p and m draws of q; this h has the least error (Meng & Wong 1996, Statistica
-    Sinica 6, 831; Gronau et al. 2017, doi 10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and
-    compared with the other, since a comparison with the fitted draws is biased (Overstall & Forster 2010,
-    doi 10.1016/j.csda.2010.03.008). The result is the mean over both assignments of the halves.
+    for n effective draws of p and m draws of q; this h has the least error (Meng & Wong 1996, Statistica Sinica 6, 831;
+    Gronau et al. 2017, doi 10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and compared with the
+    other, since a comparison with the fitted draws is biased (Overstall & Forster 2010, doi
+    10.1016/j.csda.2010.03.008). The result is the mean over both assignments of the halves. Its standard error has both
+    terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with the autocorrelation of the terms.
+    The errors due to the fits are common to both results and do not average out; only the error that is independent of
+    the fit does, whose share is estimated by the correlation of the terms under both fits. In tens of dimensions that
+    is slightly too small, and makes the standard error up to a quarter too large.
 
-    Parameters
-    ----------
-    log_density : callable
-        Maps points, shape (m, d), to logarithms of the density, shape (m,), −inf where it is zero.
-    draws : ndarray, shape (chains, n, d)
-        Draws from the density; there are at least two independent chains, each in the order of sampling, walker-major
-        if there are walkers.
-    log_densities : ndarray, shape (chains, n)
-        `log_density` of the draws.
-    rng : np.random.Generator
-    proposals : int, optional
-        Number of points, half of them from each fit, at which `log_density` is computed, by default 4000. It is also
-        recomputed at two draws per chain, where it must agree with `log_densities`.
-
-    Returns
-    -------
-    Evidence
-        Its standard error has both terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with the
-        autocorrelation of the terms, and the correlation of the two results that are averaged (see Notes).
-
-    Raises
-    ------
-    InferenceError
-        If shapes do not agree, there are too few draws, or these are not finite, do not vary, or lie in a plane; if
-        `log_density` is NaN or +inf somewhere, or not what `log_densities` says; if fit and density do not overlap.
-
-    Notes
-    -----
     q is a normal distribution of normal scores, each piecewise linear in one parameter, to account for hard bounds and
     skewness of single parameters; or in one of the uncorrelated axes nearest to the parameters, if the draws are more
     probable under that fit. For normal densities in 40 dimensions and 500 independent draws in each half the error is a
     sixth larger than with a plain normal fit; with 15 half-normal parameters among them it is half as large. A t
-    distribution and a symmetrised density (Warp-III of Meng & Schilling 2002, at equal evaluations) gained nothing. Of
-    more than 50 000 draws every second, third, … is used.
+    distribution and a symmetrised density (Warp-III of Meng & Schilling 2002, at equal evaluations) gained nothing.
 
-    The errors due to the fits are common to both results: to first order they are Σ k(x, y) over x in one half and y in
-    the other, with the same symmetric k, and do not average out. Only the error that is independent of the fit does.
-    Its share is estimated by the correlation of the terms under one fit with those under the other, which in tens of
-    dimensions is slightly too small, and makes the standard error up to a quarter too large.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(1)
-    >>> draws = rng.normal(size=(4, 500, 2))
-    >>> result = bridge_evidence(lambda x: -0.5 * np.sum(x**2, axis=-1), draws, -0.5 * np.sum(draws**2, axis=-1), rng)
-    >>> abs(result.log_evidence - np.log(2.0 * np.pi)) < 4.0 * result.standard_error < 0.02
-    True
+    Shapes: draws (chains, n, d), walker-major, log_densities (chains, n).
     """
     count = (_PROPOSALS if proposals is None else proposals) // 2
     _refuse(draws, log_densities, count)
@@ -151,6 +100,50 @@ def bridge_evidence(
         0.5 * float(np.sqrt(variance)),
         0.5 * (first.overlap + second.overlap),
     )
+
+
+class ContourEvidence(NamedTuple):
+    """Evidence of one family."""
+
+    log_evidence: Floats  # for each of `WIDTHS`, (3,)
+    standard_error: float
+    overlap: float  # as of `Evidence`
+
+
+def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Generator) -> ContourEvidence:
+    """Return the evidence of a model by bridge sampling, in the coordinates of the sampler.
+
+    The prior is restricted to contours within reach, as in the generator, so that the integral over all contours is
+    divided by their share. With priors of other widths, the evidence follows from the same draws by importance weights.
+    """
+    coordinates, (chains, _, size) = sampled.coordinates, sampled.draws.samples.shape
+    kept = sampled.draws.evenly(_POSTERIOR_DRAWS // chains)
+    points = sampled.draws.samples[:, kept].reshape(-1, size)
+    transformed = coordinates.of(points)
+    _, growth = coordinates.parameters(transformed)
+    bridge = bridge_evidence(
+        in_coordinates(model.log_probability, coordinates),
+        transformed.reshape(chains, -1, size),
+        sampled.draws.log_probability[:, kept] + growth.reshape(chains, -1),
+        rng,
+    )
+    own = {name: model.priors[name] for name in model.family.parameters}
+    logs, share = [], 0.0
+    for width in WIDTHS:
+        others = widened(own, width)
+        change = np.zeros(len(points))
+        for name, prior in others.items():
+            if prior is not own[name]:
+                values = points[:, model.names.index(name)]
+                change += prior.logpdf(values) - own[name].logpdf(values)
+        reached = model.share_within_reach(rng, _PRIOR_DRAWS if width == 1.0 else _OTHER_DRAWS, others)
+        share = reached if width == 1.0 else share
+        logs.append(bridge.log_evidence + weighed(change)[1] - np.log(reached))
+    error = np.hypot(bridge.standard_error, np.sqrt((1.0 - share) / (share * _PRIOR_DRAWS)))
+    return ContourEvidence(np.array(logs), float(error), bridge.overlap)
+
+
+# ---- bridge sampling
 
 
 def _fitted(points: Floats) -> _Fit:
@@ -191,13 +184,10 @@ class _Fit:
             raise InferenceError("a half of the draws has too few different points: give more draws")
         self._slopes = (_KNOTS[1] - _KNOTS[0]) / np.diff(self._knots, axis=1)
         scores, _ = self._scores(points)
-        self._mean = scores.mean(axis=0)
-        self._root = np.linalg.cholesky(_covariance(scores))
-        self._scale = (
-            np.sum(np.log(np.diag(self._root)))
-            - np.linalg.slogdet(axes).logabsdet
-            + 0.5 * self._mean.size * np.log(2.0 * np.pi)
+        self._normal = Proposal(
+            scores.mean(axis=0), np.asarray(np.linalg.cholesky(_covariance(scores))), freedom=np.inf
         )
+        self._constant = self._normal.constant + float(np.linalg.slogdet(axes).logabsdet)
 
     def _along(self, points: Floats) -> Floats:
         along: Floats = (points - self._centre) @ self._axes
@@ -205,7 +195,7 @@ class _Fit:
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Draw points, shape (count, d)."""
-        scores: Floats = self._mean + rng.standard_normal((count, self._mean.size)) @ self._root.T
+        scores = self._normal.draw_unbounded(rng, count)
         along = np.empty_like(scores)
         for j, (knots, slopes) in enumerate(zip(self._knots, self._slopes, strict=True)):
             i = _piece(_KNOTS, scores[:, j])
@@ -216,9 +206,7 @@ class _Fit:
     def log_density(self, points: Floats) -> Floats:
         """Return the log-density at points, shape (n, d), as an array of shape (n,)."""
         scores, log_growth = self._scores(points)
-        standard = solve_triangular(self._root, (scores - self._mean).T, lower=True)
-        density: Floats = log_growth - self._scale - 0.5 * np.sum(standard**2, axis=0)
-        return density
+        return np.asarray(self._normal.log_density(scores) + log_growth + self._constant)
 
     def _scores(self, points: Floats) -> tuple[Floats, Floats]:
         """Return normal scores, shape (n, d), and the logarithm of their Jacobian determinant, shape (n,)."""
@@ -241,12 +229,9 @@ class _Bridge(NamedTuple):
     """Bridge estimate of one fit and the draws of the other half."""
 
     log_evidence: float
-    threshold: float
-    """Value of log f − log q at which draw and proposal are equally likely."""
-    of_draws: float
-    """Variance due to the draws."""
-    of_proposals: float
-    """Variance due to the proposals."""
+    threshold: float  # value of log f − log q at which draw and proposal are equally likely
+    of_draws: float  # variance due to the draws
+    of_proposals: float  # variance due to the proposals
     overlap: float
 
 
@@ -265,7 +250,8 @@ def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
     for _ in range(_ROUNDS):
         threshold = _threshold(drawn, proposed, effective)
         from_draws, from_proposals = expit(threshold - drawn), expit(proposed - threshold)
-        if min(_effective_number(from_draws), _effective_number(from_proposals)) < _LEAST_TERMS:
+        logs = log_expit(threshold - drawn.ravel()), log_expit(proposed - threshold)
+        if min(float(effective_number(normalised(each))) for each in logs) < _LEAST_TERMS:
             raise InferenceError(
                 "density and fit do not overlap: few points dominate it; do all chains sample the same place?"
             )
@@ -294,12 +280,6 @@ def _effective_size(terms: Floats) -> float:
     """Return the effective sample size of terms, shape (chains, n), from their autocorrelation."""
     ess: Callable[..., float] = array_stats.ess
     return float(min(ess(terms, chain_axis=0, draw_axis=1, method="mean"), terms.size))
-
-
-def _effective_number(terms: Floats) -> float:
-    """Return Kish's effective number of weights."""
-    total, squares = terms.sum(), np.sum(terms**2)
-    return float(total**2 / squares) if squares > 0.0 else 0.0
 
 
 def _correlation(both: tuple[Floats, Floats], halves: tuple[slice, slice]) -> float:

@@ -13,8 +13,7 @@ from tactile_bayes.checks import check_kind, check_switch
 from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.distributions import Distribution, all_in_words, in_words
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.inference.gauge import Gauge
+from tactile_bayes.inference.family import Family, Gauge, family_of
 from tactile_bayes.inference.parameters.discrepancy import discrepancy_priors
 from tactile_bayes.inference.parameters.noise import Noise, noise_of
 from tactile_bayes.inference.parameters.nuisances import Nuisances, nuisances_of
@@ -30,32 +29,15 @@ from tactile_bayes.rig import Rig
 
 __all__ = ["Experiment", "usual_load_cell"]
 
-_WHOLE = "whole_sha256"
-"""Attribute of a shortened record: the hash of the whole one."""
+_WHOLE = "whole_sha256"  # attribute of a shortened record: the hash of the whole one
 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """A record, its rig and the family of its contour, with priors of all unknown parameters.
+    """A record, or a template, its rig and the family of its contour, with priors of all unknown parameters.
 
-    Parameters
-    ----------
-    record : xr.Dataset
-        Measured record, or a template.
-    rig : Rig
-    family : Family or str
-    events : bool
-        Whether unloaded samples count, as in `SamplerSettings`.
-    gauge : Gauge, optional
-        The known contour, in place of a family.
+    With a `gauge`, the contour is known. `events` says whether unloaded samples count, as in `SamplerSettings`.
 
-    Raises
-    ------
-    RecordError, ParameterError
-        As in `infer_contour`.
-
-    Examples
-    --------
     >>> from tactile_bayes import scan
     >>> from tactile_bayes.contours import paper_profile
     >>> from tactile_bayes.rig import NOTHING

@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import as_number, check_number
-from tactile_bayes.contours import Contour
+from tactile_bayes.checks import as_number, check_kind, check_number
+from tactile_bayes.contours import Circle, Contour, Parabola, Single
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.family import ContourFamily, FamilyParameter
 from tactile_bayes.distributions import (
@@ -31,10 +31,11 @@ from tactile_bayes.distributions import (
     text_or_unwritten,
 )
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.misfit import GAUGE
 from tactile_bayes.inference.result import refuse_no_contour
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["Family", "PartlyKnown", "family_of"]
+__all__ = ["Family", "Gauge", "PartlyKnown", "family_of"]
 
 
 class Family:
@@ -63,8 +64,7 @@ class Family:
     """
 
     name: str
-    priors: Mapping[str, Distribution]
-    """Distributions that are given, by parameter."""
+    priors: Mapping[str, Distribution]  # distributions that are given, by parameter
     known: Mapping[str, float]
 
     def __init__(self, name: str, /, **said: Any) -> None:
@@ -173,3 +173,36 @@ class PartlyKnown(ContourFamily):
     def fit(self, x: Floats, y: Floats) -> dict[str, float]:
         found = self.whole.fit(x, y)
         return {name: found[name] for name in self.parameters}
+
+
+@dataclass(frozen=True)
+class Gauge(ContourFamily):
+    """Family whose only contour is a known one, in the record's unit of length."""
+
+    known: Contour
+
+    def __post_init__(self) -> None:
+        correction = "give the contour of the gauge, like Circle(r=0.01, q=0.03)"
+        check_kind("contour", self.known, Contour, correction)
+        if isinstance(self.known, Single) or self.known.shape:
+            raise ParameterError(
+                f"contour is {self.known!r}: {correction}, one contour of a family (not from_points or from_function)"
+            )
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return GAUGE
+
+    @property
+    def table(self) -> Mapping[str, FamilyParameter]:  # type: ignore[override]
+        return {}
+
+    @property
+    def is_always_clear(self) -> bool:
+        return isinstance(self.known, Circle | Parabola)
+
+    def build(self, *values: Any) -> Contour:
+        return self.known
+
+    def fit(self, x: Floats, y: Floats) -> dict[str, float]:
+        return {}

@@ -8,30 +8,25 @@ from tactile_bayes.inference.parameters.nuisances import belongs
 
 __all__ = ["CHECK_RIG", "GAUGE", "NO_LOAD", "is_inferred", "what_to_try"]
 
+# Advice if loads contradict one another for any contour: the cause is the rig.
 CHECK_RIG = (
     "check the rod (length, flexural rigidity, rest curvature, taper, stem), unit, sign and axes of each load, the "
     "zero of the drive angle and its backlash, the point where the load cell takes its moment, and the friction"
 )
-"""Advice if loads contradict one another for any contour: the cause is the rig."""
-
+# Message of the error for a record without a loaded sample.
 NO_LOAD = (
     "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise in the "
     "record's units?"
 )
-"""Message of the error for a record without a loaded sample."""
-
-GAUGE = "gauge"
-"""Name of the family of a gauge, whose contour is known."""
-
+GAUGE = "gauge"  # name of the family of a gauge, whose contour is known
 _OF_ROD = ("rest_curvature", "taper", "stem", "length")
+# Unknowns of a rig, or groups of them, that may cause a misfit.
 _SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance", *_OF_ROD)
-"""Nuisance parameters, or groups of them, that may cause a misfit."""
-
 _SMOOTH = "shape-free"
 
 
 def is_inferred(suspect: str, nuisances: Collection[str]) -> bool:
-    """Return True if a nuisance parameter, or one of its group, is among the inferred ones."""
+    """Return True if an unknown of a rig, or one of its group, is among the inferred ones."""
     return any(belongs(name, suspect) for name in nuisances)
 
 

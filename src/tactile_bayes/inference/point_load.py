@@ -43,34 +43,21 @@ from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, 
 from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.mechanics.clamped_rod import base_curvature
 from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
+from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["default_priors", "infer_point_load"]
+__all__ = ["default_priors", "infer_point_load", "predictive_p_value"]
 
 _GEOMETRY = ("clamp_axial", "clamp_lateral", "clamp_angle", "compliance")
 _UNITS = {"clamp_axial": "mm", "clamp_lateral": "mm", "clamp_angle": "rad", "compliance": "mm"}
 _POWERS = 4
-_VAGUE = 100.0
-"""Prior sd of a sensor coefficient, in full scales of the reading per power of 3/reach."""
-
-_GUESSES = 400
-"""Number of draws of the prior among which the search for a start begins."""
-
-_REFINED = 4
-"""Number of the best of them that are refined."""
-
-_INITIAL_NOISE = 0.01
-"""Noise over range of the readings at the beginning of the search."""
-
-_INFLATION = 2.0
-"""Scatter of the walkers' starts over the sd of the normal approximation; halved until enough of them are possible."""
-
+_VAGUE = 100.0  # prior sd of a sensor coefficient, in full scales of the reading per power of 3/reach
+_GUESSES = 400  # number of draws of the prior among which the search for a start begins
+_REFINED = 4  # number of the best of them that are refined
+_INITIAL_NOISE = 0.01  # noise over range of the readings at the beginning of the search
+_INFLATION = 2.0  # scatter of starts over the sd of the approximation; halved until enough are possible
 _LEAST_INFLATION = 1e-3
-
-_DROP = 10.0
-"""Log-probability per parameter by which a start may be below the centre, so that no minor mode captures it."""
-
-_SETTINGS = SamplerSettings(walkers=64)
-"""Most of an evaluation does not depend on the number of points, so many walkers are cheap."""
+_DROP = 10.0  # log-probability per parameter of a start below the centre, so that no minor mode captures it
+_SETTINGS = SamplerSettings(walkers=64)  # most of an evaluation does not depend on their number
 
 
 def _reach(axial: Floats, lateral: Floats) -> float:
@@ -110,8 +97,7 @@ class _Model:
     axial: Floats
     lateral: Floats
     reading: Floats
-    unit_curvature: float
-    """3/reach, the unit of the curvature in the powers of the sensor curve."""
+    unit_curvature: float  # 3/reach, the unit of the curvature in the powers of the sensor curve
     coefficient_sd: float
     priors: Mapping[str, Any]
     known: Mapping[str, float]
@@ -469,3 +455,26 @@ def _tree(model: _Model, draws: Draws, rng: np.random.Generator) -> xr.DataTree:
         ),
     }
     return xr.DataTree.from_dict(groups)
+
+
+def _sum_of_squares(residuals: Floats) -> Floats:
+    return np.asarray((residuals**2).sum(axis=-1))
+
+
+def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats] = _sum_of_squares) -> float:
+    """Return the posterior predictive p-value of a discrepancy.
+
+    For each draw the discrepancy is computed from the residuals over the noise, of the real readings and of predicted
+    ones (Gelman, Meng and Stern 1996, Statistica Sinica 6, 733). If the model holds, the p-value lies closer to one
+    half than a uniform number does.
+    """
+    posterior = tree["posterior"].to_dataset()
+    if "noise_sd" in posterior:
+        noise = posterior["noise_sd"].values[..., None]
+    else:
+        noise = np.asarray(read_json(tree.attrs["known"], "known")["noise_sd"])
+    predictive = tree["posterior_predictive"].to_dataset()
+    expected = predictive["expected_reading"].values
+    observed = tree["observed_data"].to_dataset()["reading"].values
+    real, predicted = (discrepancy((values - expected) / noise) for values in (observed, predictive["reading"].values))
+    return float(np.mean(predicted >= real))

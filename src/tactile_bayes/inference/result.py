@@ -39,14 +39,10 @@ __all__ = [
     "write_result",
 ]
 
-STREAMED = "sequential Monte Carlo"
-"""Sampler of a stream, as the attribute of its posterior states it."""
-
+STREAMED = "sequential Monte Carlo"  # sampler of a stream, as the attribute of its posterior states it
+# Libraries by which a posterior is computed and stored, besides Python.
 _SOFTWARE = ("tactile-bayes", "numpy", "scipy", "emcee", "numba", "xarray", "arviz-stats", "h5netcdf")
-"""Libraries by which a posterior is computed and stored, besides Python."""
-
 _EVENTS = ("first_contact_x", "snap_off_contact_x", "snap_off_drive_angle")
-
 _NO_CONTOUR = "this is no result of infer_contour: give the tree that it returned, or that read_result reads"
 
 

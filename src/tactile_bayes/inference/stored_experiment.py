@@ -1,7 +1,8 @@
-"""The experiment behind a stored posterior: its record, rig and priors."""
+"""The experiment behind a stored posterior: its record, rig, priors and points, and the rig that it found."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,15 @@ from tactile_bayes.distributions import in_words
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
-from tactile_bayes.inference.result import contour_draws, record_of
+from tactile_bayes.inference.result import contour_draws, known_of, posterior_draws, record_of
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction import contacts_of
+from tactile_bayes.record import CHANNELS, present_channels
+from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["experiment_of", "points_of", "predicted_points"]
+__all__ = ["contact_points", "experiment_of", "found_rig", "points_of", "predicted_points"]
 
 
 def experiment_of(posterior: xr.DataTree, family: Family | None = None, rig: Rig | None = None) -> Experiment:
@@ -47,3 +52,24 @@ def predicted_points(posterior: xr.DataTree, names: tuple[str, ...]) -> Floats:
     predicted = posterior["posterior_predictive"].to_dataset()
     draws = contour_draws(posterior).sel(chain=predicted["chain"], draw=predicted["draw"])
     return np.stack([draws[name].transpose("chain", "draw").values.ravel() for name in names], axis=-1)
+
+
+def found_rig(measured: xr.Dataset, posterior: xr.DataTree, load_cell: LoadCell | None = None) -> Corrected:
+    """Return the rig with the posterior medians of its parameters."""
+    draws = posterior_draws(posterior)
+    found = {str(name): float(values.median()) for name, values in draws.data_vars.items()}
+    stated = load_cell or LoadCell.from_record(measured) or LoadCell()
+    names = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
+    noise: dict[str, Any] = {name: found[name] for name in ("moment_noise", "force_noise") if name in found}
+    rig = {name: value for name, value in found.items() if name in names}
+    return corrected(measured, replace(stated, **noise), {**known_of(posterior.attrs), **rig})
+
+
+def contact_points(
+    measured: xr.Dataset, posterior: xr.DataTree, load_cell: LoadCell | None = None
+) -> xr.Dataset | None:
+    """Return contact points by Step 2, with the inferred noise, biases, stiffness, offset and friction."""
+    if set(present_channels(measured)) != set(CHANNELS):
+        return None
+    found = found_rig(measured, posterior, load_cell)
+    return contacts_of(found, "constrained" if found.load_cell.has_variances else "raw")

@@ -127,64 +127,6 @@ class Discrepancy:
             drawn[sample] = value
         return np.asarray(np.moveaxis(drawn, 0, -2) * self.deviation)
 
-    def given_before(
-        self,
-        residual: Floats,
-        noise: Floats,
-        initial_variance: Floats,
-        decay: float,
-        step_variance: Floats,
-        bias: Floats,
-    ) -> tuple[Floats, Floats]:
-        """Return innovations given the samples before in the course, shape (..., samples, channels), and variances.
-
-        Parameters
-        ----------
-        residual : ndarray, shape (..., samples, channels)
-        noise : ndarray, broadcastable to that shape
-            Variance of the white noise.
-        initial_variance, step_variance, bias : ndarray, shape (channels,)
-            Variances of the drift at the first sample, of its steps, and of the unknown bias.
-        decay : float
-            Factor on the drift from one sample to the next.
-        """
-        from tactile_bayes.load_cell.discrepancy_filter import innovations  # numba takes a second to load
-
-        shape, arguments = self._arguments(residual, noise, initial_variance, step_variance, bias)
-        new, total = innovations(*arguments, decay)
-        return new.reshape(shape), total.reshape(shape)
-
-    def given_others(
-        self,
-        residual: Floats,
-        noise: Floats,
-        initial_variance: Floats,
-        decay: float,
-        step_variance: Floats,
-        bias: Floats,
-    ) -> tuple[Floats, Floats]:
-        """Return residuals of each sample given all others, and their variances; arguments as in `given_before`."""
-        from tactile_bayes.load_cell.discrepancy_filter import leave_one_out
-
-        shape, arguments = self._arguments(residual, noise, initial_variance, step_variance, bias)
-        weighed, precision = leave_one_out(*arguments, decay)
-        return (weighed / precision).reshape(shape), (1.0 / precision).reshape(shape)
-
-    def _arguments(
-        self, residual: Floats, noise: Floats, initial_variance: Floats, step_variance: Floats, bias: Floats
-    ) -> tuple[tuple[int, ...], tuple[Floats, Floats, Floats, Floats, Index, Floats, Floats]]:
-        """Return the shape of the result, and arrays for the filter, with one axis for the batch."""
-        noise = np.atleast_2d(noise)
-        shape = np.broadcast_shapes(residual.shape, noise.shape, self.deviation.shape, (*self.length.shape, 1, 1))
-        flat = (math.prod(shape[:-2]), *shape[-2:])
-        residual, noise, deviation = (
-            np.ascontiguousarray(np.broadcast_to(values, shape)).reshape(flat)
-            for values in (residual, noise, self.deviation)
-        )
-        rate = np.broadcast_to(self.rate, shape[:-2]).ravel()
-        wandering = np.stack(np.broadcast_arrays(initial_variance, step_variance, bias)).astype(float)
-        return shape, (residual, noise, deviation, rate, *self.course, wandering)
-
 
 def joined(parts: Sequence[Discrepancy]) -> Discrepancy | None:
     """Return one batch of several; None if there are none."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["Drift", "OrnsteinUhlenbeck", "RandomWalk"]
+__all__ = ["Drift", "OrnsteinUhlenbeck", "RandomWalk", "Zero"]
 
 
 @dataclass(frozen=True)
@@ -143,3 +144,19 @@ class OrnsteinUhlenbeck(_DriftProcess):
 
 
 Drift = RandomWalk | OrnsteinUhlenbeck
+
+
+class Zero(NamedTuple):
+    """Variances of an unknown zero, shape (..., channels): of the drift at the first sample, its steps, and a bias."""
+
+    initial: Floats
+    step: Floats
+    bias: Floats
+    decay: float  # factor on the drift from one sample to the next
+
+    @classmethod
+    def of(cls, drift: Drift | None, sizes: Floats, bias: Floats) -> Zero:
+        """Return the variances for a drift of these squared sizes, shape (..., channels), none without a drift."""
+        if drift is None:
+            return cls(np.zeros_like(bias), np.zeros_like(bias), bias, 1.0)
+        return cls(drift.initial_variance * sizes, drift.step_variance * sizes, bias, drift.decay)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from tactile_bayes.checks import check_array, check_optional
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
+from tactile_bayes.load_cell.drift import Zero
 from tactile_bayes.record import CHANNELS
 
 __all__ = [
@@ -27,9 +27,6 @@ __all__ = [
     "refuse_inexact",
     "refuse_silent",
 ]
-
-Given = Callable[[Floats, Floats, Floats, float, Floats, Floats], tuple[Floats, Floats]]
-"""Type of `_given_before`: innovations given other samples, and their variances."""
 
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -68,36 +65,16 @@ def log_likelihood(
         readings, expected, deviation = readings[:, present], expected[..., present], deviation[..., present]
     if _is_plain(sheet) and discrepancy is None:
         return _white(readings, expected, deviation, pointwise)
-
-    given: Given = _given_others if left_out else _given_before
-    if discrepancy is not None:
-        of_present = discrepancy.of(present)
-        given = of_present.given_others if left_out else of_present.given_before
-    wanders = bool(np.any(_wandering_sizes(sheet)[present]))
-    correlation = sheet.correlation_matrix[np.ix_(present, present)]
-    correlated = bool(np.any(correlation != np.eye(present.size)))
-    outliers = math.isfinite(sheet.degrees_of_freedom)
     step, limit = sheet.resolution[present], sheet.limit[present]
     _refuse_beyond(readings, step, limit, present)
-    if discrepancy is not None:
-        _refuse_beside_discrepancy(sheet, discrepancy, correlated)
-    if wanders or correlated or discrepancy is not None:
-        refuse_inexact(sheet, readings, present, wanders, correlated, discrepancy is not None)
-        steps = step**2 / 12.0
-        if not correlated:
-            by_sample = _wandering(sheet, readings - expected, deviation**2 + steps, present, given)
-        elif wanders:
-            by_sample = _wandering_together(sheet, readings - expected, deviation, steps, present, correlation, given)
-        else:
-            by_sample = correlated_density(readings - expected, deviation, steps, correlation)
-    elif outliers or np.any(step) or np.any(np.isfinite(limit)):
+    by_sample = _dependent(sheet, readings, expected, deviation, present, discrepancy, left_out)
+    if by_sample is None:
+        if not (math.isfinite(sheet.degrees_of_freedom) or np.any(step) or np.any(np.isfinite(limit))):
+            return _white(readings, expected, deviation, pointwise)
         by_sample = np.zeros(np.broadcast_shapes(expected.shape[:-1], deviation.shape[:-1]))
-        for c, (c_step, c_limit) in enumerate(zip(step.tolist(), limit.tolist(), strict=True)):
-            by_sample += _channel(
-                readings[:, c], expected[..., c], deviation[..., c], c_step, c_limit, sheet.degrees_of_freedom
-            )
-    else:
-        return _white(readings, expected, deviation, pointwise)
+        for c, ends in enumerate(zip(step.tolist(), limit.tolist(), strict=True)):
+            of_channel = readings[:, c], expected[..., c], deviation[..., c]
+            by_sample += _channel(*of_channel, *ends, sheet.degrees_of_freedom)
     return np.asarray(by_sample if pointwise else by_sample.sum(axis=-1))
 
 
@@ -252,22 +229,45 @@ def _wandering_sizes(sheet: DataSheet) -> Floats:
     return bias if sheet.drift is None else np.hypot(bias, sheet.drift.sizes)
 
 
-def _wandering(sheet: DataSheet, residual: Floats, noise: Floats, present: Index, given: Given) -> Floats:
+def _dependent(
+    sheet: DataSheet,
+    readings: Floats,
+    expected: Floats,
+    deviation: Floats,
+    present: Index,
+    discrepancy: Discrepancy | None,
+    left_out: bool,
+) -> Floats | None:
+    """Log-density of each sample given others; None if samples and channels are independent."""
+    wanders = bool(np.any(_wandering_sizes(sheet)[present]))
+    correlation = sheet.correlation_matrix[np.ix_(present, present)]
+    correlated = bool(np.any(correlation != np.eye(present.size)))
+    if discrepancy is not None:
+        _refuse_beside_discrepancy(sheet, discrepancy, correlated)
+    elif not (wanders or correlated):
+        return None
+    refuse_inexact(sheet, readings, present, wanders, correlated, discrepancy is not None)
+    residual, steps = readings - expected, sheet.resolution[present] ** 2 / 12.0
+    if not correlated:
+        return _wandering(sheet, residual, deviation**2 + steps, present, discrepancy, left_out)
+    if wanders:
+        return _wandering_together(sheet, residual, deviation, steps, present, correlation, left_out)
+    return correlated_density(residual, deviation, steps, correlation)
+
+
+def _wandering(
+    sheet: DataSheet,
+    residual: Floats,
+    noise: Floats,
+    present: Index,
+    discrepancy: Discrepancy | None,
+    left_out: bool,
+) -> Floats:
     """Log-density of each sample given others, for independent noise of the channels."""
     bias = np.array(sheet.bias_uncertainty)[present] ** 2
-    if sheet.drift is None:
-        return normal_density(*given(residual, noise, np.zeros_like(bias), 1.0, np.zeros_like(bias), bias))
-    drift = sheet.drift.sizes[present] ** 2
-    return normal_density(
-        *given(
-            residual,
-            noise,
-            sheet.drift.initial_variance * drift,
-            sheet.drift.decay,
-            sheet.drift.step_variance * drift,
-            bias,
-        )
-    )
+    sizes = bias if sheet.drift is None else sheet.drift.sizes[present] ** 2
+    smooth = None if discrepancy is None else discrepancy.of(present)
+    return normal_density(*_given(left_out, residual, noise, Zero.of(sheet.drift, sizes, bias), smooth))
 
 
 def _wandering_together(
@@ -277,7 +277,7 @@ def _wandering_together(
     steps: Floats,
     present: Index,
     correlation: Floats,
-    given: Given,
+    left_out: bool,
 ) -> Floats:
     """Log-density of each sample given others, for noise that is correlated between channels and stationary."""
     # Coordinates in which the white noise has unit covariance and the drifts are independent.
@@ -287,113 +287,23 @@ def _wandering_together(
     share, axes = np.linalg.eigh(inverse * _wandering_sizes(sheet)[present] ** 2 @ np.swapaxes(inverse, -1, -2))
     residual = residual @ np.swapaxes(np.swapaxes(axes, -1, -2) @ inverse, -1, -2)
     volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)[..., None]
-    initial_variance, decay, step_variance = (
-        (1.0, 1.0, 0.0)
-        if sheet.drift is None
-        else (sheet.drift.initial_variance, sheet.drift.decay, sheet.drift.step_variance)
-    )
-    ones, none = np.ones(present.size), np.zeros(present.size)
-    return normal_density(*given(residual, ones, initial_variance * share, decay, step_variance * share, none)) - volume
+    none = np.zeros(present.size)
+    zero = Zero.of(sheet.drift, share, none) if sheet.drift else Zero(share, none, none, 1.0)
+    return normal_density(*_given(left_out, residual, np.ones(present.size), zero, None)) - volume
 
 
-def _given_before(
-    residual: Floats, noise: Floats, initial_variance: Floats, decay: float, step_variance: Floats, bias: Floats
+def _given(
+    left_out: bool, residual: Floats, noise: Floats, zero: Zero, discrepancy: Discrepancy | None
 ) -> tuple[Floats, Floats]:
-    """Innovations given the samples before, shape (..., samples, channels), and their variances.
+    """Residuals of each sample given those before, or all others, and their variances."""
+    from tactile_bayes.load_cell.kalman import given_before, given_others  # numba takes a second to load
 
-    The unknown zero is the drift of `_filtered` plus a constant of variance `bias`.
-    """
-    if decay == 1.0 or not np.any(bias):
-        return _filtered(residual, noise, bias + initial_variance, decay, step_variance)
-    # A bias beside a decaying drift is a regression on the filter's response to 1 in every sample.
-    residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
-    (new, of_one), total = _filtered(np.stack([residual, ones]), noise, initial_variance, decay, step_variance)
-    with np.errstate(divide="ignore"):
-        known = 1.0 / bias + _sum_before(of_one**2 / total)
-    new = new - of_one * _sum_before(of_one * new / total) / known
-    return new, total + of_one**2 / known
-
-
-def _filtered(
-    residual: Floats, noise: Floats, initial_variance: Floats, decay: float, step_variance: Floats
-) -> tuple[Floats, Floats]:
-    """Innovations, shape (..., samples, channels), and their variances, by a Kalman filter for each channel.
-
-    The state is a drift with `initial_variance` at the first sample, observed with white noise.
-    """
-    residual = np.moveaxis(residual, -2, 0)
-    noise = np.atleast_2d(noise)
-    white = np.broadcast_to(np.moveaxis(noise, -2, 0), (len(residual), *noise.shape[:-2], noise.shape[-1]))
-    total = np.empty((len(residual), *np.broadcast_shapes(white.shape[1:], initial_variance.shape)))
-    new = np.empty((len(residual), *np.broadcast_shapes(residual.shape[1:], total.shape[1:])))
-    place: Floats | float = 0.0
-    variance = initial_variance
-    for i in range(len(residual)):
-        total[i] = variance + white[i]
-        new[i] = residual[i] - place
-        share = variance / total[i]
-        place = decay * (place + share * new[i])
-        variance = decay * decay * share * white[i] + step_variance
-    return np.moveaxis(new, 0, -2), np.moveaxis(total, 0, -2)
-
-
-def _given_others(
-    residual: Floats, noise: Floats, initial_variance: Floats, decay: float, step_variance: Floats, bias: Floats
-) -> tuple[Floats, Floats]:
-    """Residuals of each sample given all others, and their variances; arguments as in `_given_before`.
-
-    With the inverse Q of the covariance of all samples r, they are (Q r)_i / Q_ii and 1 / Q_ii.
-    """
-    if decay == 1.0 or not np.any(bias):
-        weighed, precision = _weighed(residual, noise, bias + initial_variance, decay, step_variance)
-    else:
-        # A bias beside a decaying drift is a change of rank one of Q: the Sherman–Morrison formula.
-        residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
-        (weighed, of_one), precision = _weighed(
-            np.stack([residual, ones]), noise, initial_variance, decay, step_variance
-        )
-        with np.errstate(divide="ignore"):
-            known = 1.0 / bias + of_one.sum(axis=-2, keepdims=True)
-        weighed = weighed - of_one * weighed.sum(axis=-2, keepdims=True) / known
-        precision = precision - of_one**2 / known
-    return weighed / precision, 1.0 / precision
-
-
-def _weighed(
-    residual: Floats, noise: Floats, initial_variance: Floats, decay: float, step_variance: Floats
-) -> tuple[Floats, Floats]:
-    """Q r and the diagonal of Q by channel, for the model of `_filtered`, backward from the last sample.
-
-    This is the disturbance smoother, which needs no matrices: Koopman 1993, doi 10.1093/biomet/80.1.117.
-    """
-    new, total = (
-        np.moveaxis(values, -2, 0) for values in _filtered(residual, noise, initial_variance, decay, step_variance)
-    )
-    noise = np.atleast_2d(noise)
-    white = np.broadcast_to(np.moveaxis(noise, -2, 0), (len(total), *noise.shape[:-2], noise.shape[-1]))
-    weighed, precision = np.empty(new.shape), np.empty(total.shape)
-    pull, weight = np.zeros(new.shape[1:]), np.zeros(total.shape[1:])
-    for i in reversed(range(len(total))):
-        left = decay * white[i] / total[i]
-        share = decay - left
-        own, certain = new[i] / total[i], 1.0 / total[i]
-        weighed[i] = own - share * pull
-        precision[i] = certain + share**2 * weight
-        pull = own + left * pull
-        weight = certain + left**2 * weight
-    return np.moveaxis(weighed, 0, -2), np.moveaxis(precision, 0, -2)
+    return (given_others if left_out else given_before)(residual, noise, zero, discrepancy)
 
 
 def normal_density(deviation: Floats, variance: Floats) -> Floats:
     """Normal log-density of independent channels, summed over them."""
     return np.asarray(-0.5 * (deviation**2 / variance + np.log(variance) + _LOG_2PI).sum(axis=-1))
-
-
-def _sum_before(values: Floats) -> Floats:
-    """Sum over the samples before each."""
-    sums = np.zeros_like(values)
-    np.cumsum(values[..., :-1, :], axis=-2, out=sums[..., 1:, :])
-    return sums
 
 
 # ---- refusals

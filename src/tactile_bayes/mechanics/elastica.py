@@ -8,7 +8,6 @@ others are found by continuation (`continuation`), and contacts of rods with a p
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -310,32 +309,17 @@ def _states(
     found, out = given[5].astype(np.int8).ravel(), np.empty((columns.shape[0], 9))
     known = tables(), workspace()
     if profile is None:
-        _solve(wrenches, partial(continued_wrenches, None, None), columns, known, (found, out))
+        curved = columns[:, -1] != 0.0
+        for rows, write in ((~curved, wrenches), (curved, partial(continued_wrenches, None, None))):
+            if rows.any():  # what is never called is never compiled
+                which = slice(None) if rows.all() else rows
+                phases, states = found[which], out[which]
+                write(columns[which], *known, phases, states)
+                found[which], out[which] = phases, states
     else:
         room = profile._replace(curvature=np.empty_like(profile.curvature), rigidity=np.empty_like(profile.rigidity))
         continued_wrenches(varied_of(profile), room, columns, *known, found, out)
     return found.reshape(shape), np.ascontiguousarray(out.T).reshape(9, *shape)
-
-
-def _solve(
-    straight: Callable[..., None],
-    arcs: Callable[..., None],
-    columns: Floats,
-    known: tuple[object, ...],
-    results: tuple[NDArray[Any], ...],
-) -> None:
-    """Write results for rows of columns, of which the last is the rest curvature; arcs take another function, which is
-    compiled when there are some.
-    """
-    curved = columns[:, -1] != 0.0
-    for function, rows in ((straight, ~curved), (arcs, curved)):
-        if rows.all() and rows.size:
-            function(columns, *known, *results)
-        elif rows.any():
-            parts = [result[rows] for result in results]
-            function(columns[rows], *known, *parts)
-            for result, part in zip(results, parts, strict=True):
-                result[rows] = part
 
 
 def contact_from_wrench(
@@ -432,19 +416,11 @@ def forward_contacts(wrenches: Floats, rods: Rods) -> Floats:
     ndarray, shape (6, n)
         As `Contact`.
     """
-    from tactile_bayes.mechanics.contacts.states import arc_contacts, contacts, profile_contacts
-    from tactile_bayes.mechanics.poses.beam import varied  # numba takes a second to load
+    from tactile_bayes.mechanics.contacts.states import write_contacts
+    from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
-    columns, out = np.column_stack([wrenches, rods.curvature]), np.empty((len(wrenches), 6))
-    if rods.stem:
-        columns[:, 1] -= lever_of_stem(rods.stem, columns[:, 0], columns[:, 2], columns[:, 3])
-    if rods.profile is None:
-        _solve(contacts, arc_contacts, columns, (), (out,))
-    else:
-        profile_contacts(columns, varied(rods.profile), out)
-    if rods.stem:
-        out[:, 0] += rods.stem * np.cos(columns[:, 0])
-        out[:, 1] += rods.stem * np.sin(columns[:, 0])
+    out = np.empty((len(wrenches), 6))
+    write_contacts(np.ascontiguousarray(wrenches), rods.curvature, varied_of(rods.profile), rods.stem, out)
     return np.ascontiguousarray(out.T)
 
 

@@ -41,18 +41,24 @@ _SAME = 1e-4
 """Difference of coordinates of one and the same optimum."""
 
 
-def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike = 0.0) -> RawFit:
-    """Contacts of n samples by Step 2, with friction angles and rods, or rest curvatures of arcs, of shape (n,)."""
-    from tactile_bayes.mechanics.contacts.single_sample import raw_fits
+def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike, has_noise: bool) -> RawFit:
+    """Contacts of n samples by Step 2, with friction angles and rods, or rest curvatures of arcs, of shape (n,).
+
+    Without noise there are no covariances and no bends.
+    """
+    from tactile_bayes.mechanics.contacts.single_sample import Room, raw_fits
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
     count = delta.size
-    place, tip_angle, covariance = np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4))
-    fit = RawFit(place, tip_angle, covariance, np.empty(count), np.empty(count), np.empty((count, 4)), np.empty(count))
-    workspace = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 5)), np.empty((3, 3)), np.empty((3, 3))
+    noisy = count if has_noise else 0
+    (place, other), (tip_angle, deviation, other_deviation) = np.empty((2, count, 4)), np.empty((3, count))
+    fit = RawFit(place, tip_angle, np.empty((noisy, 4, 4)), np.empty(noisy), deviation, other, other_deviation)
+    (matrix, axes), shifts = np.empty((2, 3, 3)), np.empty((2, 4, 5))
+    room = Room(np.empty((1, 4)), np.empty((4, 4)), shifts, matrix, axes, contact_workspace())
     curvature, profile, stem = rods_of(rods, count)
-    known = plain(reading), np.array(delta), curvature, varied_of(profile), stem
-    raw_fits(*known, fit, *workspace, contact_workspace())
+    if not has_noise:
+        reading = reading._replace(covariance=reading.covariance[:0])
+    raw_fits(plain(reading), np.array(delta), curvature, varied_of(profile), stem, fit, room)
     return fit
 
 

@@ -65,6 +65,8 @@ class Paths:
     snap_off: NDArray[np.int8]
     changes: Floats
     """Beginnings of phases, then the end of the last, as in `Found`, shape (n, phases + 1, 6); NaN beyond."""
+    events: Floats
+    """States there, with the columns of `STATE`, shape (n, phases + 1, columns); zero beyond."""
     phases: Index
     """Number of phases."""
     largest_curvature: Floats
@@ -161,17 +163,11 @@ class Paths:
 
         Those of a path are its first `phases + 1`; the others are NaN.
         """
-        return _as_states(self._events()[..., :STATE_COLUMNS])
+        return _as_states(self.events)
 
     def event_travels(self) -> Floats:
         """Travels at the events of `event_states`: drive angles [rad], or ways of the base [L]."""
-        return self._events()[..., STATE_COLUMNS]
-
-    def _events(self) -> Floats:
-        from tactile_bayes.mechanics.branches.sweeps import solve_events  # numba takes a second to load
-
-        sweeps, lines = _segments_of(self.sweeps, self.lines, 1)
-        return solve_events(self.shapes, sweeps, self.changes, self.profile, lines)
+        return np.where(self.events[..., 0] == NONE, np.nan, self.events[..., STATE_COLUMNS.index("travel")])
 
 
 def trace(
@@ -215,13 +211,43 @@ def trace(
     asks_sliding : bool
         Whether there is a path only where friction opposes the slip all along it, as it always does on such lines.
     """
+    sweeps = _sweeps_of(sweep_frame, friction_angle, suspension_compliance)
+    shapes = shapes_of(sweep_frame.contour, *(sweep_frame.own_domain() if sweep_frame.contour.halves is None else ()))
+    angles = np.empty(0) if drive_angles is None else drive_angles
+    options: dict[str, Any] = {"profile": profile, "tolerance": tolerance, "asks_sliding": asks_sliding}
+    solutions = _swept(shapes, sweeps, angles, lines, relative, states=True, polished=polished, **options)
+    most = int(solutions.phases.max(initial=0))
+    has_path = solutions.phases[:, None, None] > 0
+    return Paths(
+        sweep_frame=sweep_frame,
+        friction_angle=sweeps.friction_angle,
+        reach=solutions.reach,
+        distance=solutions.distance,
+        first_angle=solutions.first_angle,
+        first_parameter=solutions.first_parameter,
+        snap_angle=solutions.snap_angle,
+        snap_parameter=solutions.snap_parameter,
+        snap_off=solutions.snap_off,
+        changes=np.where(has_path, solutions.changes[:, : most + 1], np.nan),
+        events=np.where(has_path, solutions.event_states[:, : most + 1], 0.0),
+        phases=solutions.phases,
+        largest_curvature=solutions.curvature,
+        clear_angle=solutions.clear_angle,
+        tolerance=tolerance,
+        shapes=shapes,
+        sweeps=sweeps,
+        profile=profile,
+        lines=lines,
+        sampled=solutions.states,
+    )
+
+
+def _sweeps_of(sweep_frame: SweepFrame, friction_angle: ArrayLike, compliance: ArrayLike) -> Sweeps:
+    """One sweep along each contour, with loads in EI/L and EI/L²."""
     from tactile_bayes.mechanics.branches.sweeps import Sweeps  # numba takes a second to load
 
     count, every = sweep_frame.size, np.arange(sweep_frame.size)
-    friction_angle = np.broadcast_to(np.asarray(friction_angle, dtype=float), (count,))
-    compliance = np.broadcast_to(np.asarray(suspension_compliance, dtype=float), (count,))
-    shapes = shapes_of(sweep_frame.contour, *(sweep_frame.own_domain() if sweep_frame.contour.halves is None else ()))
-    sweeps = Sweeps(
+    return Sweeps(
         contour=every,
         segment=every,
         base_x=_each(sweep_frame.base_x, count),
@@ -237,32 +263,6 @@ def trace(
         offset=np.zeros(count),
         rigidity=np.ones(count),
         relative_length=np.ones(count),
-    )
-    angles = np.empty(0) if drive_angles is None else drive_angles
-    options: dict[str, Any] = {"profile": profile, "tolerance": tolerance, "asks_sliding": asks_sliding}
-    solutions = _swept(shapes, sweeps, angles, lines, relative, states=True, polished=polished, **options)
-    most = int(solutions.phases.max(initial=0))
-    changes = np.where(solutions.phases[:, None, None] > 0, solutions.changes[:, : most + 1], np.nan)
-    return Paths(
-        sweep_frame=sweep_frame,
-        friction_angle=friction_angle,
-        reach=solutions.reach,
-        distance=solutions.distance,
-        first_angle=solutions.first_angle,
-        first_parameter=solutions.first_parameter,
-        snap_angle=solutions.snap_angle,
-        snap_parameter=solutions.snap_parameter,
-        snap_off=solutions.snap_off,
-        changes=changes,
-        phases=solutions.phases,
-        largest_curvature=solutions.curvature,
-        clear_angle=solutions.clear_angle,
-        tolerance=tolerance,
-        shapes=shapes,
-        sweeps=sweeps,
-        profile=profile,
-        lines=lines,
-        sampled=solutions.states,
     )
 
 
@@ -284,29 +284,22 @@ def _swept(
     angles = np.atleast_2d(np.asarray(drive_angles, dtype=float))
     if lines is not None:
         angles = np.broadcast_to(angles, (max(angles.shape[0], lines.shape[0]), angles.shape[1]))
+        lines = np.broadcast_to(lines, (angles.shape[0], *lines.shape[1:])).copy()
     order = np.argsort(angles, axis=1, kind="stable")
     segments, each = angles.shape
-    sweeps, lines = _segments_of(sweeps, lines, segments)
+    sweeps = sweeps._replace(segment=sweeps.contour % segments)
     sorted_angles = np.take_along_axis(angles, order, axis=1)
     asked = Segments(each * np.arange(segments + 1), order.ravel(), sorted_angles.ravel(), lines, relative)
     return solve_sweeps(shapes, sweeps, asked, (sweeps.contour.size, each), **options)
 
 
-def _segments_of(sweeps: Sweeps, lines: Floats | None, segments: int) -> tuple[Sweeps, Floats | None]:
-    """Sweeps of as many segments, or of as many as there are drives, and the lines of each."""
-    if lines is not None:
-        segments = max(segments, lines.shape[0])
-        lines = np.broadcast_to(lines, (segments, *lines.shape[1:])).copy()
-    return sweeps._replace(segment=sweeps.contour % segments), lines
-
-
 def _as_states(columns: Floats) -> States:
     """States from their columns, shape (..., columns); NaN where there is none."""
-    side_by_side = np.moveaxis(columns, -1, 0).copy()
-    phase = side_by_side[0].astype(np.int8)
-    np.copyto(side_by_side, np.nan, where=phase == NONE)
-    _, parameter, x, y, alpha, drive_angle, moment, force_x, force_y, *rest = side_by_side
-    arclength, tip_angle, by_slope, by_distance = rest
-    lying = np.where(phase == TANGENTIAL, arclength, np.nan)
-    wrench = Wrench(drive_angle, moment, force_x, force_y, arclength, tip_angle, phase, by_slope, by_distance, lying)
+    phase = columns[..., 0].astype(np.int8)
+    found = np.where((phase == NONE)[..., None], np.nan, columns)
+    parameter, x, y, alpha, drive_angle, moment, force_x, force_y, arclength, tip_angle, _ = np.moveaxis(
+        found[..., 1:], -1, 0
+    ).copy()
+    unknown, lying = np.full(phase.shape, np.nan), np.where(phase == TANGENTIAL, arclength, np.nan)
+    wrench = Wrench(drive_angle, moment, force_x, force_y, arclength, tip_angle, phase, unknown, unknown, lying)
     return States(parameter, x, y, alpha, wrench)

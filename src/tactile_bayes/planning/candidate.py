@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 from scipy import stats
-from scipy.special import logsumexp
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.errors import ReachError
-from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.densities import Proposal, effective_number
+from tactile_bayes.inference.importance import weighed
+from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.numerics.random_numbers import Seed, words
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
@@ -26,9 +27,9 @@ from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
 
-_DEGREES_OF_FREEDOM = 8
-_WIDENING = 1.2
-"""Scale of the t distribution from which nested draws come, over that of Laplace's approximation."""
+_FREEDOM, _WIDENING = 8.0, 1.2
+"""Degrees of freedom of the t distribution from which nested draws come, and its scale over that of Laplace's
+approximation."""
 
 
 @dataclass(frozen=True)
@@ -191,19 +192,17 @@ def _nested(
     middle = known.points.mean(axis=0)
     covariance = np.linalg.inv(precision)
     centre = point + covariance @ (score + known.precision @ (middle - point))
-    root = _WIDENING * np.linalg.cholesky(covariance)
-    proposal = stats.multivariate_t(centre, root @ root.T, _DEGREES_OF_FREEDOM)
-    points = proposal.rvs(question.nested, random_state=rng)
+    proposal = Proposal(centre, _WIDENING * np.asarray(np.linalg.cholesky(covariance)), freedom=_FREEDOM)
+    points, density = proposal.draw(rng, question.nested)
     log_known = stats.multivariate_normal(middle, np.linalg.inv(known.precision)).logpdf(points)
-    log_weights = densities(points).sum(axis=1) + log_known - proposal.logpdf(points)
-    evidence = float(logsumexp(log_weights) - np.log(question.nested))
-    weights = np.exp(log_weights - logsumexp(log_weights))
+    logs, evidence = weighed(densities(points).sum(axis=1) + log_known - density - proposal.constant)
+    weights = np.exp(logs)
     likely = weights > 0.0
     contours = model.family.build(*points[likely, : len(model.family.parameters)].T)
     heights = np.asarray(contours.take(np.arange(contours.shape[0])[:, None]).height(question.x))
     width = float(_band_widths(heights, weights[likely], question.probability).mean())
     own = float(densities(point[None]).sum())
-    return width, own - evidence, float(1.0 / np.sum(weights**2))
+    return width, own - float(evidence), float(effective_number(weights))
 
 
 def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) -> xr.Dataset:

@@ -20,8 +20,8 @@ from tactile_bayes.checks import (
     refused,
 )
 from tactile_bayes.errors import ParameterError, ReachError, StudyError
-from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.family import Family, family_of
+from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.result import record_of
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, words

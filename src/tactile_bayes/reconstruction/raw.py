@@ -31,7 +31,7 @@ _APART = 2.0, 1e-6
 
 def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
     """Contacts by Step 2, with their covariance to first order in the errors of the sensor."""
-    fit = raw_contacts(samples.reading, delta, samples.rods)
+    fit = raw_contacts(samples.reading, delta, samples.rods, samples.has_noise)
     slope_angle, arclength = fit.place[:, 2:].T
     found = np.isfinite(arclength) & ~(samples.cut_off & samples.loaded)
     status = unanswered(samples.loaded, samples.cut_off)

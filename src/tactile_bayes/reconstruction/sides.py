@@ -124,6 +124,23 @@ class _Judged(NamedTuple):
         return self.score < _CONTRADICTED and self.absolute < -_UNLIKELY
 
 
+def _sign(record: xr.Dataset, rows: Index) -> float:
+    """Sign of the moment that the direction of a sweep implies."""
+    return -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
+
+
+def _are_plain(record: xr.Dataset, moment: Floats, parts: list[Index]) -> bool:
+    """Return whether no moment contradicts the direction of its sweep, and each sweep is exactly without load at either
+    end."""
+    for rows in parts:
+        of_sweep = moment[rows]
+        if np.any(of_sweep[:FEWEST]) and np.any(of_sweep[-FEWEST:]):
+            return False
+        if (_sign(record, rows) * of_sweep).min() < 0.0:
+            return False
+    return True
+
+
 def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
     """Judge every sweep of a record, in the order of their numbers."""
     unit = rod_of(record).moment_unit
@@ -133,7 +150,7 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
     present = present_channels(record)
     sweep, moment = record.sweep.values, record.holding_moment.values
     parts = rows_of_sweeps(sweep)
-    if CHANNELS[0] not in present:
+    if CHANNELS[0] not in present or _are_plain(record, moment, parts):
         return [_Judged(int(sweep[rows[0]]), rows, np.inf, np.inf) for rows in parts]
     readings = np.stack([record[name].values for name in present], axis=-1)
     readings /= np.maximum(np.abs(readings).max(axis=0), 1e-100 * unit)  # squares of large ones would overflow
@@ -148,7 +165,7 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
     found, everywhere = [], np.concatenate(unloaded)
     for rows, inside, own, is_enclosed in zip(parts, loaded, unloaded, enclosed, strict=True):
         noise = max(rough_noise(moment[rows]), known, _ROUNDING * float(np.abs(moment[rows]).max()), 1e-100 * unit)
-        sign = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
+        sign = _sign(record, rows)
 
         def score(samples: Index, zero: float, error: float, noise: float = noise, sign: float = sign) -> float:
             apart = moment[samples] - zero

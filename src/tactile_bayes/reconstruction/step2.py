@@ -12,6 +12,7 @@ from scipy.special import chdtrc
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_number, refused
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.measurement import stated_entries
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
@@ -155,7 +156,7 @@ def reconstruct(
     check_choice("method", method, _METHODS)
     rig = rig_of(rig)
     measured = with_rod(validate(measured), rig.rod)
-    cell = rig.load_cell or LoadCell.from_record(measured) or LoadCell()
+    cell = rig.load_cell or LoadCell.from_entries(stated_entries(measured))
     return contacts_of(corrected(measured, cell, rig.known), method)
 
 
@@ -290,7 +291,7 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
 
 def _in_lab_frame(place: Floats, side: Floats, surface: Surface) -> Floats:
     """Places on the object's surface in the laboratory frame."""
-    x, y, alpha, arclength = surface.on_object(place.T)
+    x, y, alpha, arclength = surface.on_object(place.T) if surface.radius else place.T
     return np.stack([side * x, y, side * alpha, arclength], axis=-1)
 
 

@@ -14,8 +14,8 @@ from tactile_bayes.assessment.trust import draws_digest
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import DriftWarning, InferenceError
-from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import read_result, record_of
+from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.record import record_hash
 from tactile_bayes.record.netcdf import read_netcdf

@@ -24,8 +24,8 @@ from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
-from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import known_of, posterior_draws, record_of, write_result
+from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import Rng
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod

@@ -15,7 +15,7 @@ import pytest
 
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles import Draws, SamplerSettings, block, checkpoint, sample
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, checkpoint, run_state, sample
 from tactile_bayes.tasks import files
 
 SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
@@ -466,9 +466,9 @@ def test_a_full_disk_is_told_and_what_is_written_is_kept(tmp_path, monkeypatch):
 
 
 def test_looks_do_not_depend_on_where_a_run_began():
-    looks = [block.next_diagnosis(0, 50)]
+    looks = [run_state.next_diagnosis(0, 50)]
     while looks[-1] < 20_000:
-        looks.append(block.next_diagnosis(looks[-1], 50))
+        looks.append(run_state.next_diagnosis(looks[-1], 50))
     assert looks[:7] == [50, 100, 150, 200, 250, 313, 392]
     for before, look in pairwise(looks):
-        assert {block.next_diagnosis(steps, 50) for steps in (before, before + 1, look - 1)} == {look}
+        assert {run_state.next_diagnosis(steps, 50) for steps in (before, before + 1, look - 1)} == {look}

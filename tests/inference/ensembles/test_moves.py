@@ -6,10 +6,9 @@ import emcee
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.ensembles.block import Block, make_block
-from tactile_bayes.inference.ensembles.mixture import Mixture
+from tactile_bayes.inference.densities import Mixture, Proposal
 from tactile_bayes.inference.ensembles.moves import FittedMove, FixedMove, NormalMove, standard_moves, whitened_moves
-from tactile_bayes.inference.ensembles.proposal import Proposal
+from tactile_bayes.inference.ensembles.run_state import Block, make_block
 from tactile_bayes.inference.ensembles.walkers import first_random_state
 
 WALKERS = 40

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.ensembles import Logarithms, Plain, SamplerSettings, run_state, sample
-from tactile_bayes.inference.ensembles.block import Block
-from tactile_bayes.inference.ensembles.run_state import RunState
+from tactile_bayes.inference.coordinates.base import Coordinates, Logarithms
+from tactile_bayes.inference.ensembles import SamplerSettings, run_state, sample
+from tactile_bayes.inference.ensembles.run_state import Block, RunState
 
 
 def walked(steps):
@@ -42,7 +42,7 @@ def little_memory(monkeypatch):
 @pytest.mark.usefixtures("little_memory")
 def test_of_few_steps_the_second_half_is_kept(steps):
     samples = walked(steps)
-    points, values, walkers_moved, every = second_half(appended(samples, [steps], Plain()))
+    points, values, walkers_moved, every = second_half(appended(samples, [steps], Coordinates()))
     np.testing.assert_array_equal(points, samples[:, steps // 2 + 1 :])
     np.testing.assert_array_equal(values, points.sum(axis=-1))
     moved = np.any(points[:, 1:] != points[:, :-1], axis=-1)
@@ -55,7 +55,7 @@ def test_of_few_steps_the_second_half_is_kept(steps):
 def test_of_many_steps_every_so_manieth_is_kept(steps, every):
     """And whether walkers moved is known of all of them."""
     samples = walked(steps)
-    points, _, moved, thinning = second_half(appended(samples, [steps], Plain()))
+    points, _, moved, thinning = second_half(appended(samples, [steps], Coordinates()))
     assert thinning == every
     assert points.shape[1] <= 11
     number = np.arange(steps + 1)
@@ -111,7 +111,7 @@ def test_few_lost_walkers_are_taken_back_and_many_stay(count, stay):
     samples[0, :, :count] += 1000.0
     values = np.where(samples[..., 0] > 500.0, -50.0, -0.5 * samples[..., 0] ** 2)
     start = Block(samples[:, :1], values[:, :1], ())
-    state, _ = RunState.begin(Plain(), start).append(Block(samples, values, ())).diagnose()
+    state, _ = RunState.begin(Coordinates(), start).append(Block(samples, values, ())).diagnose()
     last = state.recovered().last
     assert np.count_nonzero(last.samples[:, -1] > 500.0) == stay
     np.testing.assert_array_equal(last.samples[:, -1, count:], samples[:, -1, count:])

@@ -334,7 +334,6 @@ def test_the_stem_is_inferred_about_the_stated_one(bent):
         prior = model.priors["stem"]
         assert prior.support() == (pytest.approx(0.0, abs=1e-12), np.inf)
         assert prior.logpdf(stem) - prior.logpdf(stem + 0.002) == pytest.approx(0.5)
-        assert model.nuisances.unit("stem") == "m"
         for true in (stem, stem + 0.003):
             expected = scan(
                 Parabola(5.0, 0.06),
@@ -362,7 +361,6 @@ def test_the_length_is_inferred_about_the_stated_one(bent):
         model = model_of(record, names, cell)
         prior = model.priors["length"]
         assert (prior.mean(), prior.std()) == pytest.approx((0.1, 0.001))
-        assert model.nuisances.unit("length") == "m"
         longer = stated.reshaped(curvature, 0.0, length=0.102)
         assert (longer.stem, longer.mean_rest_curvature) == pytest.approx((0.002, curvature))
         values = dict(zip(names, (0.102, curvature), strict=False))

@@ -10,12 +10,13 @@ import pytest
 
 from helpers.profiled_rods import drawn_rods, integrated
 from tactile_bayes.mechanics.compiler import cached
-from tactile_bayes.mechanics.contacts import profile_contact, states
-from tactile_bayes.mechanics.poses import profile_pose, profile_shape
+from tactile_bayes.mechanics.contacts import states
+from tactile_bayes.mechanics.poses import beam, profile_pose, profile_shape
 from tactile_bayes.mechanics.poses.taylor import FARTHEST, workspace
 from tactile_bayes.mechanics.rods.profile import profile_of
 
-_pose, _contact, _closed = profile_pose.pose_along, profile_contact.contact_along, states.contact
+_pose, _contact, _closed = profile_pose.pose_along, states.contact_of, states.contact
+_mirrored_by = beam.mirrored_by
 _shape, _rest, _chord = profile_shape.shape_along, profile_shape.rest_along, profile_shape.chord_along
 _bending = profile_shape.largest_bending_along
 
@@ -29,8 +30,12 @@ def pose(profile, psi1, arclength, force, work):
 
 
 @cached
+def _found(varied, wrench, delta):
+    return _contact(_mirrored_by(varied.profile.sign, varied, 0.0), wrench[0], wrench[1], wrench[2], wrench[3], delta)
+
+
 def contact(profile, wrench, delta, work):
-    return _contact(profile, wrench[0], wrench[1], wrench[2], wrench[3], delta, work)
+    return _found(beam.varied(profile)._replace(work=work), wrench, delta)[:5]
 
 
 @cached

@@ -34,37 +34,16 @@ ContactPrior = Literal["flat", "polar"] | LogPrior
 class Evaluated(NamedTuple):
     """Contacts with the logarithm of their posterior density."""
 
-    log_density: Floats
-    """Density over force and ψ1 (tip) or arc length (tangential), and drive angle; shape (..., n)."""
-    contact: Floats
-    """Contact point of the rod's centreline, slope angle, arc length; in the sweep frame, shape (4, ..., n)."""
+    log_density: Floats  # density over force and ψ1 (tip) or arc length (tangential), and drive angle; shape (..., n)
+    contact: Floats  # point of the rod's centreline, slope angle, arc length; in the sweep frame, shape (4, ..., n)
 
 
 class ContactDensity:
     """Log-density of contacts, given one sample each.
 
     The prior is a density over contact point and slope angle. A phase is a sheet in the space of (force, ψ1, s1, drive
-    angle), with three coordinates of its own; there the prior is multiplied by the volume that they span.
-
-    Parameters
-    ----------
-    samples : Samples
-        Samples of a record with all channels, from `samples_of`. Their covariance serves for proposals only.
-    readings : LoneSamples
-        The same samples as read by the load cell, dimensionless.
-    base : ndarray, shape (n, 2)
-        The pivots, in the record's unit of length.
-    turning : bool
-        True if the cell turns with the drive.
-    delta : float
-        Friction angle of the centreline, as in `Surface` [rad].
-    prior : "flat", "polar" or callable
-        Prior of contact point and slope angle; see `infer_contacts`.
-
-    Raises
-    ------
-    ParameterError
-        If the prior is none of these, or a function returns no log-density.
+    angle), with three coordinates of its own; there the prior is multiplied by the volume that they span. The
+    covariance of `samples` serves for proposals only; `base` are the pivots, (n, 2), in the record's unit of length.
     """
 
     def __init__(

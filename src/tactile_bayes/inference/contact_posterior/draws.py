@@ -19,44 +19,27 @@ from tactile_bayes.numerics.selection import resampled
 __all__ = ["CHAINS", "EMCEE", "EMCEE_SETTINGS", "IMPORTANCE", "ContactDraws", "Method", "draw_contacts"]
 
 Method = Literal["auto", "importance", "emcee"]
-
-CHAINS = 4
-"""Number of chains."""
-
-IMPORTANCE, EMCEE = 1, 2
-"""Codes of the method that made the draws."""
-
+CHAINS = 4  # number of chains
+IMPORTANCE, EMCEE = 1, 2  # codes of the method that made the draws
+# Default settings of emcee for a single contact.
 EMCEE_SETTINGS = SamplerSettings(walkers=24, min_ess=400.0, max_steps=4000)
-"""Default settings of emcee for a single contact."""
-
-_PROPOSALS = 4
-"""Number of proposals per resampled draw."""
-
-_MIN_PROPOSALS = 1000
-"""Smallest number of proposals of a sample, among which emcee's walkers start."""
-
-_BLOCK = 64
-"""Number of samples that are processed at a time."""
+_PROPOSALS = 4  # number of proposals per resampled draw
+_MIN_PROPOSALS = 1000  # smallest number of proposals of a sample, among which emcee's walkers start
+_BLOCK = 64  # number of samples that are processed at a time
 
 
 class ContactDraws(NamedTuple):
     """Draws for each of n samples, with their diagnostics."""
 
-    points: Floats
-    """Way, force and, if it is uncertain, drive angle, shape (chains, draws, n, 2 or 3)."""
-    engine: NDArray[np.int8]
-    """`IMPORTANCE` or `EMCEE`, shape (n,), like all further entries."""
+    points: Floats  # way, force and, if it is uncertain, drive angle, shape (chains, draws, n, 2 or 3)
+    engine: NDArray[np.int8]  # `IMPORTANCE` or `EMCEE`, shape (n,), like all further entries
     converged: Flags
-    tangential: Floats
-    """Probability of tangential contact."""
-    log_evidence: Floats
-    """NaN with emcee; see `ContactWeights`."""
+    tangential: Floats  # probability of tangential contact
+    log_evidence: Floats  # NaN with emcee; see `ContactWeights`
     pareto_k: Floats
     effective_draws: Floats
-    r_hat: Floats
-    """R̂ of emcee; NaN with importance sampling."""
-    ess: Floats
-    """Effective sample size of emcee; NaN with importance sampling."""
+    r_hat: Floats  # R̂ of emcee; NaN with importance sampling
+    ess: Floats  # effective sample size of emcee; NaN with importance sampling
 
 
 def draw_contacts(

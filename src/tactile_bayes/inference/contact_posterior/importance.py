@@ -5,54 +5,38 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from arviz_stats.base.array import array_stats
-from scipy.special import logsumexp
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.proposal import ContactProposal
+from tactile_bayes.inference.densities import effective_number
+from tactile_bayes.inference.importance import LARGEST_K, pareto_smoothed, weighed
 from tactile_bayes.mechanics.contacts.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
 from tactile_bayes.mechanics.fitting import fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
-__all__ = ["LARGEST_K", "LEAST_DRAWS", "ContactWeights", "weigh_contacts"]
+__all__ = ["LEAST_DRAWS", "ContactWeights", "weigh_contacts"]
 
-LARGEST_K = 0.7
-"""Pareto k̂ above which weights are not reliable (Vehtari et al. 2024, JMLR 25(72))."""
-
-LEAST_DRAWS = 400.0
-"""Smallest number of effective draws."""
-
-_NEGLIGIBLE = 600.0
-"""Logarithm of a ratio of weights from which the smaller is negligible."""
-
+LEAST_DRAWS = 400.0  # smallest number of effective draws
+_NEGLIGIBLE = 600.0  # logarithm of a ratio of weights from which the smaller is negligible
+# Number of proposals of each pilot run, and the smallest share of a branch in the next run: the edge between the phases
+# cuts off narrow layers of the posterior, which need more than one pilot.
 _PILOTS = ((600, 0.25), (600, 0.15))
-"""Number of proposals of each pilot run, and the smallest share of a branch in the next run: the edge between the
-phases cuts off narrow layers of the posterior, which need more than one pilot."""
-
+# Effective share of a branch's proposals from which its approximation is final: moments of a truncated posterior would
+# not improve it.
 _GOOD_SHARE = 0.4
-"""Effective share of a branch's proposals from which its approximation is final: moments of a truncated posterior would
-not improve it."""
-
-_HOPELESS = 60.0
-"""Excess of the sum of squares from which a tip that is turned beyond the normal is left out."""
+_HOPELESS = 60.0  # excess of the sum of squares from which a tip that is turned beyond the normal is left out
 
 
 class ContactWeights(NamedTuple):
     """Weighted contacts for each of n samples."""
 
-    points: Floats
-    """Way, force and, if it is uncertain, drive angle, shape (draws, n, 2 or 3)."""
-    contact: Floats
-    """Contact point, slope angle and arc length, in the sweep frame and dimensionless, shape (4, draws, n)."""
-    log_weight: Floats
-    """Logarithms of smoothed weights with sum one, shape (draws, n)."""
-    pareto_k: Floats
-    """Shape (n,); infinite if no proposal is possible."""
-    effective_draws: Floats
-    """Shape (n,)."""
-    log_evidence: Floats
-    """Logarithm of the sample's density under the prior, shape (n,)."""
+    points: Floats  # way, force and, if it is uncertain, drive angle, (draws, n, 2 or 3)
+    contact: Floats  # point, slope angle and arc length, in the sweep frame and dimensionless, (4, draws, n)
+    log_weight: Floats  # smoothed, with sum one, (draws, n)
+    pareto_k: Floats  # (n,); infinite if no proposal is possible
+    effective_draws: Floats  # (n,)
+    log_evidence: Floats  # logarithm of the sample's density under the prior, (n,)
 
     @property
     def certified(self) -> Flags:
@@ -72,17 +56,16 @@ def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequ
         approximation = _refined(points, log_weight, density.ways, *approximation, least)
     proposal = ContactProposal(*approximation, density.ways)
     points, contact, log_weight = _evaluated(density, proposal, draws, rng)
-    with np.errstate(invalid="ignore"):
-        log_evidence = logsumexp(log_weight, axis=0) - np.log(draws)
+    _, log_evidence = weighed(log_weight)
     lost = ~np.isfinite(log_evidence)
     log_weight[:, lost] = 0.0
     smoothed, k = log_weight.copy(), np.full(lost.size, np.inf)
     # If nearly all weights are negligible there is no tail to smooth.
     many = np.count_nonzero(log_weight > log_weight.max(axis=0) - _NEGLIGIBLE, axis=0) >= 0.25 * draws
     for i in np.flatnonzero(many & ~lost).tolist():
-        smoothed[:, i], k[i] = array_stats.psislw(-log_weight[:, i])  # weights are exp(−argument)
-    smoothed = smoothed - logsumexp(smoothed, axis=0)
-    effective = np.exp(-logsumexp(2.0 * smoothed, axis=0))
+        smoothed[:, i], k[i] = pareto_smoothed(log_weight[:, i])
+    smoothed, _ = weighed(smoothed)
+    effective = effective_number(np.exp(smoothed))
     return ContactWeights(points, contact, smoothed, k, np.where(lost, 0.0, effective), log_evidence)
 
 
@@ -90,9 +73,9 @@ def _evaluated(
     density: ContactDensity, proposal: ContactProposal, draws: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats, Floats]:
     """Return proposals, their contacts, and the logarithms of their importance weights."""
-    proposed = proposal.draw(draws, rng)
-    found = density.at(*density.unfold(proposed.points))
-    return proposed.points, found.contact, found.log_density - proposed.log_density
+    points, log_proposal = proposal.draw(draws, rng)
+    found = density.at(*density.unfold(points))
+    return points, found.contact, found.log_density - log_proposal
 
 
 def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
@@ -138,8 +121,8 @@ def _refined(
         mass = own.sum(axis=0)
         masses.append(mass)
         with np.errstate(divide="ignore", invalid="ignore"):
-            effective = mass**2 / (own**2).sum(axis=0)
             own = own / mass
+            effective = effective_number(own)
             new = np.einsum("dn,dnk->nk", own, points)
             off = points - new
             spread = np.einsum("dn,dni,dnj->nij", own, off, off)

@@ -25,8 +25,9 @@ from tactile_bayes.inference.contact_posterior.draws import (
     Method,
     draw_contacts,
 )
-from tactile_bayes.inference.contact_posterior.importance import LARGEST_K, LEAST_DRAWS
+from tactile_bayes.inference.contact_posterior.importance import LEAST_DRAWS
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.importance import LARGEST_K
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.shortening import thinned
 from tactile_bayes.load_cell import LoadCell, LoneSamples
@@ -40,12 +41,8 @@ from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["infer_contacts"]
 
-_MIN_MISFIT_PROBABILITY = 1e-4
-"""Probability of a misfit below which the message reports that the loads do not fit."""
-
-_MOST_DRAWS = 10**6
-"""Largest number of draws for each sample."""
-
+_MIN_MISFIT_PROBABILITY = 1e-4  # probability of a misfit below which the message reports that the loads do not fit
+_MOST_DRAWS = 10**6  # largest number of draws for each sample
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 
 
@@ -166,9 +163,7 @@ def infer_contacts(
         raise InferenceError(NO_LOAD)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         found = draw_contacts(density, draws, method, spawn(seed, 1)[0], settings, progress)
-        groups = _groups(measured, density, loaded, found.points)
-    groups["sample_stats"] = _stats(measured.sizes["sample"], loaded, found)
-    tree = xr.DataTree.from_dict(groups)
+        tree = xr.DataTree.from_dict(_groups(measured, density, loaded, found))
     tree.attrs = _attributes(measured, cell, seed, prior, friction, draws, method, settings, found)
     return tree
 
@@ -214,59 +209,44 @@ def _density(
     return ContactDensity(samples, readings, base, turning=turning, delta=delta, prior=prior).take(loaded), loaded
 
 
-def _groups(measured: xr.Dataset, density: ContactDensity, loaded: Index, points: Floats) -> dict[str, xr.Dataset]:
-    size = measured.sizes["sample"]
+def _everywhere(values: Floats, loaded: Index, size: int) -> Floats:
+    """Return values of loaded samples, shape (..., n), at their places among all samples; NaN elsewhere."""
+    spread = np.full((*values.shape[:-1], size), np.nan)
+    spread[..., loaded] = values
+    return spread
+
+
+def _groups(measured: xr.Dataset, density: ContactDensity, loaded: Index, found: ContactDraws) -> dict[str, xr.Dataset]:
+    size, points, units = measured.sizes["sample"], found.points, measured.attrs["units"]
     coordinates, _ = density.unfold(points)
-    contacts = density.contacts(coordinates)
-    units = measured.attrs["units"]
-    dims = ("chain", "draw", "sample")
-
-    def everywhere(values: Floats) -> Floats:
-        spread = np.full((*values.shape[:2], size), np.nan)
-        spread[:, :, loaded] = values
-        return spread
-
-    variables: dict[str, Any] = {
-        name: (dims, everywhere(values), column_attributes(name, units))
-        for name, values in zip(PLACE, contacts, strict=True)
+    columns = {
+        name: (values, column_attributes(name, units))
+        for name, values in zip(PLACE, density.contacts(coordinates), strict=True)
     }
     if density.has_free_angle:
-        side = density.samples.side
-        angle = np.where(side < 0.0, np.pi - coordinates[..., 3], coordinates[..., 3])
-        variables["drive_angle"] = dims, everywhere(angle), {"units": "rad", "long_name": "drive angle"}
-    tangential = everywhere((points[..., 0] < 0.0).astype(float))
-    variables["tangential"] = dims, tangential, {"units": "1", "long_name": "whether the contact is tangential"}
-    coords = {"chain": np.arange(points.shape[0]), "draw": np.arange(points.shape[1]), "sample": np.arange(size)}
+        angle = np.where(density.samples.side < 0.0, np.pi - coordinates[..., 3], coordinates[..., 3])
+        columns["drive_angle"] = angle, {"units": "rad", "long_name": "drive angle"}
+    columns["tangential"] = points[..., 0] < 0.0, {"units": "1", "long_name": "whether the contact is tangential"}
+    dims, sample = ("chain", "draw", "sample"), {"sample": np.arange(size)}
+    coords = {"chain": np.arange(points.shape[0]), "draw": np.arange(points.shape[1]), **sample}
+    variables = {name: (dims, _everywhere(v, loaded, size), attrs) for name, (v, attrs) in columns.items()}
     observed = [name for name in ("drive_angle", *CHANNELS) if name in measured]
     return {
         "posterior": xr.Dataset(variables, coords=coords),
-        "observed_data": measured[observed].assign_coords(sample=np.arange(size)),
-        "constant_data": measured[list(_CONSTANT)].assign_coords(sample=np.arange(size)),
+        "observed_data": measured[observed].assign_coords(sample),
+        "constant_data": measured[list(_CONSTANT)].assign_coords(sample),
+        "sample_stats": _stats(size, loaded, found).assign_coords(sample),
     }
 
 
 def _stats(size: int, loaded: Index, found: ContactDraws) -> xr.Dataset:
-    def everywhere(values: Floats) -> Floats:
-        spread = np.full(size, np.nan)
-        spread[loaded] = values
-        return spread
-
     codes, done = np.zeros(size, dtype=np.int8), np.zeros(size, dtype=np.int8)
     codes[loaded], done[loaded] = found.engine, found.converged
     meanings = {"flag_values": [0, IMPORTANCE, EMCEE], "flag_meanings": "none importance_sampling emcee"}
-    return xr.Dataset(
-        {
-            "tangential_probability": ("sample", everywhere(found.tangential)),
-            "log_evidence": ("sample", everywhere(found.log_evidence)),
-            "pareto_k": ("sample", everywhere(found.pareto_k)),
-            "effective_draws": ("sample", everywhere(found.effective_draws)),
-            "r_hat": ("sample", everywhere(found.r_hat)),
-            "ess": ("sample", everywhere(found.ess)),
-            "engine": ("sample", codes, meanings),
-            "converged": ("sample", done),
-        },
-        coords={"sample": np.arange(size)},
-    )
+    numbers = {"tangential_probability": found.tangential}
+    numbers |= {name: getattr(found, name) for name in ("log_evidence", "pareto_k", "effective_draws", "r_hat", "ess")}
+    variables: dict[str, Any] = {name: ("sample", _everywhere(v, loaded, size)) for name, v in numbers.items()}
+    return xr.Dataset(variables | {"engine": ("sample", codes, meanings), "converged": ("sample", done)})
 
 
 def _attributes(

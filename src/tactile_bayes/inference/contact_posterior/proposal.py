@@ -2,46 +2,23 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
 
 from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["ContactProposal", "Proposed"]
+__all__ = ["ContactProposal"]
 
-_WIDTHS = np.array([1.15, 3.0])
-"""Widths of the normal densities of a branch, in standard deviations of the posterior's approximation."""
-
+_WIDTHS = np.array([1.15, 3.0])  # of the normal densities of a branch, in standard deviations of the approximation
 _SHARES = np.array([0.75, 0.25])
-
-_MAX_DISTANCE = 30.0
-"""Largest distance of a mean beyond the edge, in standard deviations, so that probabilities stay positive."""
-
-
-class Proposed(NamedTuple):
-    """Points (way, force[, drive angle]) with the logarithm of their proposal density."""
-
-    points: Floats
-    """Shape (draws, n, 2 or 3)."""
-    log_density: Floats
-    """Shape (draws, n)."""
+_MAX_DISTANCE = 30.0  # of a mean beyond the edge, in standard deviations, so that probabilities stay positive
 
 
 class ContactProposal:
-    """A mixture distribution for each of n samples.
+    """A mixture distribution for each of n samples, of normal densities on each branch.
 
-    Parameters
-    ----------
-    mean : ndarray, shape (branches, n, k)
-        Mean of way, force and, if k is 3, drive angle, on each branch.
-    covariance : ndarray, shape (branches, n, k, k)
-        Covariance of the same.
-    share : ndarray, shape (branches, n)
-        Share of each branch; 0 if it has no approximation.
-    ways : ndarray, shape (branches, 2)
-        Least and largest way on each branch.
+    Shapes: mean (branches, n, k) of way, force and, if k is 3, drive angle, covariance (branches, n, k, k), share
+    (branches, n), 0 without an approximation, ways (branches, 2), the least and the largest.
     """
 
     def __init__(self, mean: Floats, covariance: Floats, share: Floats, ways: Floats) -> None:
@@ -54,8 +31,8 @@ class ContactProposal:
             mean[..., 0], self._low - _MAX_DISTANCE * spread, self._high + _MAX_DISTANCE * spread
         )
 
-    def draw(self, count: int, rng: np.random.Generator) -> Proposed:
-        """Draw `count` independent points for every sample, with all branches in their shares."""
+    def draw(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Draw `count` points for every sample, (count, n, k), in the shares of branches, with log-densities."""
         size, k = self._share.shape[1], self._mean.shape[-1]
         # The draws are stratified: shares are exact to one draw.
         order = (np.arange(count)[:, None] + rng.random((count, size))) / count
@@ -77,7 +54,7 @@ class ContactProposal:
             across = (points[..., 1] - middle) / root[..., 1, 1]
             middle = mean[..., 2] + root[..., 2, 0] * along + root[..., 2, 1] * across
             points[..., 2] = middle + width * root[..., 2, 2] * rng.standard_normal((count, size))
-        return Proposed(points, self._log_density(points, branch, who))
+        return points, self._log_density(points, branch, who)
 
     def _log_density(self, points: Floats, branch: Index, who: Index) -> Floats:
         mean, root = self._mean[branch, who], self._root[branch, who]

@@ -2,58 +2,19 @@
 
 The walkers of one ensemble propose from one another and are not independent, so a convergence test across walkers
 means nothing. Here a chain is a whole ensemble, several of them run side by side from their own starts and random
-numbers, and the diagnostics compare ensembles.
-
-The draws of a chain are laid out walker-major: each walker's history in one piece, one walker after the other. Laid
-out step by step, neighbours in the array would be different walkers, and any estimate of autocorrelation would take
-the draws for nearly independent.
+numbers, and the diagnostics compare ensembles. The draws of a chain are laid out walker-major, each walker's history in
+one piece: laid out step by step, neighbours would be different walkers, and pass for nearly independent draws.
 
 By default, seven proposals in ten come from a t distribution fitted to those walkers of the ensemble that do not move
 meanwhile (after Boehl 2022, doi 10.2139/ssrn.4250395), which gives three to four times the effective draws per
 evaluation if a posterior is nearly normal. The others are differential evolution (ter Braak 2006, doi
-10.1007/s11222-006-8769-1; Nelson et al. 2014, doi 10.1088/0067-0049/210/1/11): the difference of two other walkers,
-scaled, which adapts to any shape, and now and then unscaled, which lets a walker jump between separated modes.
-
-Parameters may be sampled in other coordinates; diagnoses and results are always of the parameters. `learn_coordinates`
-finds such coordinates, and a proposal in them, by a short run whose draws are discarded. If there is a proposal, most
-steps are taken from it; differential evolution with long and short steps covers what it misses.
-
-With a checkpoint, every block of steps is on disk before the next begins. A block's file holds the last positions of
-the walkers and the states of their random numbers, so that a killed run makes the same draws as an uninterrupted one.
+10.1007/s11222-006-8769-1; Nelson et al. 2014, doi 10.1088/0067-0049/210/1/11). Parameters may be sampled in other
+coordinates, in which a proposal may be known, from which most steps are then taken; diagnoses and results are always of
+the parameters. With a checkpoint, every block of steps is on disk before the next begins.
 """
 
-from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithms, Plain, Proposing, in_coordinates
-from tactile_bayes.inference.ensembles.draws import Draws
-from tactile_bayes.inference.ensembles.mixture import Mixture
-from tactile_bayes.inference.ensembles.modes import Mode
-from tactile_bayes.inference.ensembles.moves import whitened_moves
-from tactile_bayes.inference.ensembles.pilot import learn_coordinates, standardise
-from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends, Proposal, approximate
-from tactile_bayes.inference.ensembles.sampling import Progress, sample
+from tactile_bayes.inference.ensembles.sampling import Draws, Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
-from tactile_bayes.inference.ensembles.straightened import Straightened
 from tactile_bayes.inference.ensembles.walkers import scatter_walkers
 
-__all__ = [
-    "ANYTHING",
-    "Coordinates",
-    "Draws",
-    "Ends",
-    "Logarithms",
-    "Mixture",
-    "Mode",
-    "Plain",
-    "Progress",
-    "Proposal",
-    "Proposing",
-    "SamplerSettings",
-    "Straightened",
-    "approximate",
-    "in_coordinates",
-    "learn_coordinates",
-    "sample",
-    "scatter_walkers",
-    "settings_of",
-    "standardise",
-    "whitened_moves",
-]
+__all__ = ["Draws", "Progress", "SamplerSettings", "sample", "scatter_walkers", "settings_of"]

@@ -9,23 +9,24 @@ import emcee
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.ensembles.mixture import Mixture
-from tactile_bayes.inference.ensembles.proposal import Proposal
-from tactile_bayes.inference.ensembles.target import LogProbability
+from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
 
-__all__ = ["FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "step_ensembles", "whitened_moves"]
+__all__ = [
+    "FittedMove",
+    "FixedMove",
+    "Moves",
+    "NormalMove",
+    "moves_in",
+    "standard_moves",
+    "step_ensembles",
+    "whitened_moves",
+]
 
-Moves = Sequence[tuple[Any, float]]
-"""Moves of an ensemble, with their shares. They keep nothing from step to step."""
-
-_MIN_NEW_SHARE, _WHOLLY_NEW = 0.2, 0.5
-"""Smallest share of the new normal draw in a step of `NormalMove`, and the probability that it is all of the step."""
-
-_SHORT_SCALE = 0.25
-"""Scale of short differences over the usual scale, for targets along bent ridges or between bounds."""
-
-_MAX_FIXED_SHARE, _EFFICIENT = 0.8, 0.5
-"""Largest share of proposals from a fixed distribution, and the efficiency from which it applies."""
+Moves = Sequence[tuple[Any, float]]  # moves of an ensemble, with their shares. They keep nothing from step to step.
+_MIN_NEW_SHARE, _WHOLLY_NEW = 0.2, 0.5  # least share of the new draw in a step, and the probability that it is all
+_SHORT_SCALE = 0.25  # scale of short differences over the usual scale, for targets along bent ridges or between bounds
+_MAX_FIXED_SHARE, _EFFICIENT = 0.8, 0.5  # share of a fixed proposal at most, and its efficiency from which that applies
 
 
 def step_ensembles(
@@ -60,11 +61,7 @@ def step_ensembles(
 
 
 class FixedMove(emcee.moves.RedBlueMove):
-    """Proposals from a fixed distribution, independent of the walkers (independence sampler).
-
-    The nearer it is to the target, the more proposals are accepted; an accepted one is independent of the walker's
-    past.
-    """
+    """Proposals from a fixed distribution, independent of the walkers: an accepted one is independent of their past."""
 
     def __init__(self, proposal: Mixture) -> None:
         super().__init__()
@@ -81,12 +78,9 @@ class FixedMove(emcee.moves.RedBlueMove):
 class FittedMove(emcee.moves.RedBlueMove):
     """Proposals from a distribution that is fitted to the half of the ensemble that does not move meanwhile.
 
-    By default it is Student's t. If a posterior is nearly normal, a walker forgets its position in a few steps. The
-    proposal does not depend on the moving half, so that the target stays invariant however bad the fit is. If the other
-    half lies in a plane, no distribution can be fitted, and no walker moves.
-
-    Proposals of this kind beside differential evolution are due to Boehl (2022), doi 10.2139/ssrn.4250395, who adapts
-    them to the whole run instead.
+    By default it is Student's t. The proposal does not depend on the moving half, so that the target stays invariant
+    however bad the fit is. If the other half lies in a plane, no walker moves. Boehl (2022), doi 10.2139/ssrn.4250395,
+    adapts such proposals to the whole run instead.
     """
 
     def __init__(
@@ -137,13 +131,16 @@ class NormalMove(emcee.moves.RedBlueMove):
         return proposed, 0.5 * np.sum(there**2 - moving**2, axis=1)
 
 
+def moves_in(coordinates: Coordinates) -> Moves:
+    """Return the moves of an ensemble in coordinates, with their shares."""
+    return standard_moves(coordinates.proposal) if coordinates.bent is None else whitened_moves(coordinates.bent)
+
+
 def standard_moves(proposal: Mixture | None = None) -> Moves:
     """Return the moves of an ensemble, with their shares.
 
-    Proposals fitted to the walkers suit a nearly normal posterior; differences of two other walkers, scaled and now and
-    then unscaled, suit others. A given proposal near the posterior is used most, the more the more efficient it is;
-    what it misses, a proposal fitted to walkers would miss as well, but short differences of other walkers reach it.
-    All moves split the ensemble in two halves, as `step_ensembles` does.
+    Fitted proposals suit a nearly normal posterior, differences of two other walkers, scaled and now and then unscaled,
+    suit others. A given proposal is used the more the more efficient it is; short differences reach what it misses.
     """
     if proposal is None:
         return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]

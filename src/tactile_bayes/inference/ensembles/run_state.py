@@ -1,40 +1,81 @@
-"""The state of a run: its last step, from which it continues, and the second half of its steps."""
+"""The state of a run: its last block of steps, from which it continues, and the second half of its steps."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.inference.ensembles.block import Block
-from tactile_bayes.inference.ensembles.coordinates import Coordinates
+from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, lost_walkers
+from tactile_bayes.inference.ensembles.moves import Moves, step_ensembles
+from tactile_bayes.inference.ensembles.walkers import RandomState
 
-__all__ = ["RunState", "StoredSteps"]
+__all__ = ["Block", "RunState", "StoredSteps", "make_block", "next_diagnosis"]
+
+_GROWTH = 1.25  # ratio of the steps at two successive diagnoses: all diagnoses together then cost five times the last
 
 
-_MAX_STORED = 4_000_000
-"""Largest count of stored numbers of all ensembles, beyond which steps are thinned: 32 MB, and 6 s for a diagnosis."""
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Consecutive steps of all ensembles, and the random states with which they continue."""
 
-_MAX_LOST = 0.1
-"""Largest share of the walkers of an ensemble that are taken back."""
+    samples: Floats  # shape (chain, step, walker, parameter)
+    log_probability: Floats  # shape (chain, step, walker)
+    random_states: tuple[RandomState, ...]  # after the last step, with whose samples they determine the next step
+    whole: bool = True  # false if an interrupt ended the block; the ensembles then do not continue
+
+    @property
+    def steps(self) -> int:
+        return self.samples.shape[1]
+
+
+def make_block(target: LogProbability, moves: Moves, last: Block, steps: int, deadline: Deadline = NEVER) -> Block:
+    """Make the steps after a block, which are determined by its last one.
+
+    The block has at least one step, but fewer than asked for after the deadline or an interrupt.
+    """
+    points, values = last.samples[:, -1], last.log_probability[:, -1]
+    randoms = [state.generator() for state in last.random_states]
+    states = last.random_states
+    samples, log_probability = (np.empty((len(a), steps, *a.shape[1:])) for a in (points, values))
+    made, whole = 0, True
+    try:
+        while made < steps and not (made and deadline.has_passed):
+            points, values = step_ensembles(target, moves, randoms, points, values)
+            samples[:, made], log_probability[:, made] = points, values
+            states = tuple(RandomState.of(random) for random in randoms)
+            made += 1
+    except KeyboardInterrupt:
+        whole = False
+    return Block(samples[:, :made], log_probability[:, :made], states, whole)
+
+
+def next_diagnosis(steps: int, block_steps: int) -> int:
+    """Return the number of steps at which a run that has made `steps` is diagnosed next."""
+    due = block_steps
+    while due <= steps:
+        due += max(block_steps, math.ceil((_GROWTH - 1.0) * due))
+    return due
+
+
+_MAX_STORED = 4_000_000  # numbers of all ensembles, beyond which steps are thinned: 32 MB, 6 s for a diagnosis
+_MAX_LOST = 0.1  # largest share of the walkers of an ensemble that are taken back
 
 
 class StoredSteps(NamedTuple):
     """Consecutive steps, some of them stored."""
 
-    first: int
-    """Number of the first step, counted from 1."""
-    numbers: Index
-    """Numbers of the stored steps."""
-    samples: Floats
-    """Samples of the stored steps, shape (chain, step, walker, parameter)."""
-    values: Floats
-    """Their log-probability, shape (chain, step, walker)."""
-    moved: Flags
-    """True if a walker moved in a step, for all steps, shape (chain, step, walker)."""
+    first: int  # number of the first step, counted from 1
+    numbers: Index  # numbers of the stored steps
+    samples: Floats  # samples of the stored steps, shape (chain, step, walker, parameter)
+    values: Floats  # their log-probability, shape (chain, step, walker)
+    moved: Flags  # True if a walker moved in a step, for all steps, shape (chain, step, walker)
 
     def since(self, steps: int, every: int) -> StoredSteps:
         """Return the part after so many steps of the run, with every `every`-th step."""
@@ -48,19 +89,14 @@ class StoredSteps(NamedTuple):
 class RunState:
     """State of a run: its last step, from which it continues, and the second half of its steps."""
 
-    coordinates: Coordinates
-    """Coordinates in which the parameters are sampled."""
-    last: Block
-    """Last block, whose last step determines the next one."""
-    steps: int
-    """Number of steps of each ensemble."""
+    coordinates: Coordinates  # coordinates in which the parameters are sampled
+    last: Block  # last block, whose last step determines the next one
+    steps: int  # number of steps of each ensemble
+    # Thinning: a power of two that follows from the number of steps and the shape alone, so that a resumed run stores
+    # the same steps as an uninterrupted one.
     every: int
-    """Thinning: a power of two that follows from the number of steps and the shape alone, so that a resumed run stores
-    the same steps as an uninterrupted one."""
-    half: StoredSteps
-    """Second half of the steps at the last diagnosis, as parameters."""
-    recent: tuple[StoredSteps, ...] = ()
-    """Blocks since then, in the coordinates."""
+    half: StoredSteps  # second half of the steps at the last diagnosis, as parameters
+    recent: tuple[StoredSteps, ...] = ()  # blocks since then, in the coordinates
 
     @classmethod
     def begin(cls, coordinates: Coordinates, start: Block, steps: int = 0, planned: int = 0) -> RunState:

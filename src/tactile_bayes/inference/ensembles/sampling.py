@@ -1,8 +1,7 @@
-"""The run: blocks of steps of all ensembles until they agree, or the budget is spent."""
+"""The run: blocks of steps of all ensembles until they agree, or the budget is spent, and its draws."""
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -12,33 +11,75 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles.block import Block, make_block, next_diagnosis
-from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, open_checkpoint
-from tactile_bayes.inference.ensembles.coordinates import Coordinates, Plain, in_coordinates
-from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time, lost_walkers, walker_major
-from tactile_bayes.inference.ensembles.draws import Draws
-from tactile_bayes.inference.ensembles.identity import identity_of_run
-from tactile_bayes.inference.ensembles.modes import modes_message, modes_of
-from tactile_bayes.inference.ensembles.run_state import RunState
+from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
+from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.densities import LogProbability
+from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, identity_of_run, open_checkpoint
+from tactile_bayes.inference.ensembles.diagnosis import (
+    Diagnosis,
+    Mode,
+    autocorrelation_time,
+    lost_walkers,
+    modes_message,
+    modes_of,
+    walker_major,
+)
+from tactile_bayes.inference.ensembles.moves import moves_in
+from tactile_bayes.inference.ensembles.run_state import Block, RunState, make_block, next_diagnosis
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
-from tactile_bayes.inference.ensembles.target import CheckedTarget, LogProbability
-from tactile_bayes.inference.ensembles.walkers import checked_start, first_random_state
+from tactile_bayes.inference.ensembles.walkers import CheckedTarget, checked_start, first_random_state
 from tactile_bayes.numerics.random_numbers import Seed, spawn
+from tactile_bayes.numerics.selection import evenly_spread
 
-__all__ = ["Progress", "sample"]
+__all__ = ["Draws", "Progress", "sample"]
 
 
-_DRAWS_PER_WALKER = 5
-"""Smallest mean number of effective draws per walker: the discarded half then exceeds five autocorrelation times."""
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Draws from a posterior, with their convergence diagnostics."""
 
+    samples: Floats  # shape (chain, draw, parameter): a chain is an ensemble, with its draws walker-major
+    log_probability: Floats  # shape (chain, draw)
+    names: tuple[str, ...]
+    walkers: int
+    steps_kept: int  # number of steps of each walker in `samples`: every `every`-th of the second half of its steps
+    steps_run: int
+    r_hat: Floats  # rank-normalised, across ensembles, each split in early and late steps to detect drift
+    ess_bulk: Floats  # effective sample size of the bulk, per parameter
+    ess_tail: Floats  # the smaller effective sample size of the 5 % and 95 % quantiles, per parameter
+    acceptance: Floats  # share of accepted proposals, per ensemble, over the steps kept
+    # emcee's integrated autocorrelation time [steps] per parameter, mean over ensembles. It is infinite if a walker is
+    # stuck. emcee subtracts each walker's own mean, so that the estimate is too small over few autocorrelation times.
+    autocorrelation_time: Floats
+    evaluations: int  # points at which the log-probability was computed, in earlier calls with a checkpoint too
+    seconds: float  # sampling time [s], including the steps of earlier calls with a checkpoint
+    converged: bool
+    message: str  # reason for the end of the run, with the worst diagnostics
+    stuck: int  # number of walkers that did not move in all the steps kept
+    modes: tuple[Mode, ...] = ()  # modes of the ensembles, if each ensemble is stationary but they disagree; else empty
+    every: int = 1  # thinning: 1, or a power of two if the second half of the steps would take too much memory
+
+    def refuse_interrupted(self, what: str) -> None:
+        """Raise the interrupt that ended the run, for callers that cannot use a part of it."""
+        if "interrupted" in self.message:
+            raise KeyboardInterrupt(f"interrupted while sampling {what}: there is no result")
+
+    def evenly(self, most: int) -> Index:
+        """Return the indices of at most so many draws of each chain, evenly spread."""
+        return evenly_spread(self.samples.shape[1], most)
+
+    def by_walker(self) -> Floats:
+        """Return the samples as (chain, walker, step, parameter)."""
+        chains, _, parameters = self.samples.shape
+        return self.samples.reshape(chains, self.walkers, self.steps_kept, parameters)
+
+
+_DRAWS_PER_WALKER = 5  # effective ones, at least: the discarded half then exceeds five autocorrelation times
 _CONVERGED = "converged"
-
 _OUT_OF_STEPS = "not converged, the steps allowed ran out"
-
 _OUT_OF_TIME = "not converged, the time allowed ran out"
-
 _INTERRUPTED = "not converged, interrupted"
 
 
@@ -46,15 +87,11 @@ _INTERRUPTED = "not converged, interrupted"
 class Progress:
     """State of a run at a diagnosis."""
 
-    steps: int
-    """Number of steps that each ensemble has made."""
+    steps: int  # number of steps that each ensemble has made
     max_steps: int
-    r_hat: float
-    """Largest R̂ of all parameters."""
-    ess: float
-    """Smallest effective sample size of all parameters, bulk or tail."""
-    seconds: float
-    """Time since the start [s], including the steps of earlier calls with a checkpoint."""
+    r_hat: float  # largest R̂ of all parameters
+    ess: float  # smallest effective sample size of all parameters, bulk or tail
+    seconds: float  # time since the start [s], including the steps of earlier calls with a checkpoint
 
 
 def sample(
@@ -75,65 +112,14 @@ def sample(
     half of the steps so far is diagnosed: rank-normalised R̂ across ensembles, each split in early and late steps, and
     effective sample size in bulk and tails (Vehtari et al. 2021, doi 10.1214/20-BA1221). The run stops when every
     parameter satisfies the settings, the walkers have given five effective draws each on average, and none is lost
-    where nothing is probable. A few that are lost are taken back to where others of their ensemble were.
+    where nothing is probable. A few that are lost are taken back to where others of their ensemble were. `start`,
+    (ensembles, walkers, parameters), is in the coordinates; it should be wider than the posterior, or R̂ cannot
+    distinguish a part of it from the whole.
 
-    Parameters
-    ----------
-    log_probability : callable
-        Function from an array (n, parameters) to (n,): log of the target density up to a constant, −inf outside its
-        support.
-    start : array_like, shape (ensembles, walkers, parameters)
-        Starting point of each walker, in the coordinates, each with a finite log-probability. Start wider than the
-        posterior, or R̂ cannot distinguish a part of it from the whole; `scatter_walkers` helps.
-    names : sequence of str
-        Names of the parameters, for messages.
-    seed : int or numpy.random.SeedSequence
-        Seed of all random numbers; the same seed gives the same draws.
-    settings : SamplerSettings, optional
-        Size of the ensembles and criteria for stopping.
-    progress : callable, optional
-        Called with a `Progress` after each diagnosis.
-    checkpoint : path-like, optional
-        Folder, created if missing, in which every block of steps is stored (see Notes).
-    identity : mapping of str to str, optional
-        All that determines the log-probability, for the checkpoint: hash of the data, model, priors and the like. The
-        arguments of `sample` are added to it.
-    coordinates : Coordinates, optional
-        Coordinates in which the parameters are sampled; by default the parameters. Diagnoses and results are of the
-        parameters.
-
-    Returns
-    -------
-    Draws
-        `converged` is True if the settings were satisfied. A KeyboardInterrupt ends the run, and the draws made so far
-        are returned, with `converged` False; before the first step the interrupt is raised.
-
-    Raises
-    ------
-    ParameterError
-        If shapes do not agree or there are too few walkers.
-    InferenceError
-        If walkers start outside the support or in a plane, or the log-probability is NaN or +inf somewhere; if the
-        checkpoint belongs to another run, has another format, is damaged or in use, or the folder holds other files.
-    OSError
-        If a block cannot be written; the blocks before it remain.
-
-    Notes
-    -----
-    A run with a checkpoint may be killed at any moment. Called again with the same arguments it resumes after the last
-    finished block of at most `block_steps` steps, and its draws are, bit by bit, those of an uninterrupted run, if the
-    log-probability is reproducible. A run that has ended is not made again: its draws come from the checkpoint, and the
-    log-probability is not evaluated. Of the settings, `max_steps`, `max_seconds`, `min_ess` and `max_r_hat` may change
-    from call to call, so that a run which ran out of steps or time can resume with more of them. Stored steps are never
-    dropped: with a smaller `max_steps` all of them are returned. Steps of a block that an interrupt cuts short are
-    returned, but not stored.
-
-    Examples
-    --------
-    >>> start = np.random.default_rng(1).normal(size=(4, 32, 1))
-    >>> draws = sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], seed=2)
-    >>> draws.converged, draws.samples.shape[0]
-    (True, 4)
+    A KeyboardInterrupt after the first step ends the run with the draws so far. A run with a checkpoint may be killed
+    at any moment: called again it resumes after the last finished block, and its draws are, bit by bit, those of an
+    uninterrupted run; one that has ended is not made again. `identity` states what determines the log-probability. Of
+    the settings, `max_steps`, `max_seconds`, `min_ess` and `max_r_hat` may change from call to call.
     """
     began = time.monotonic()
     settings = SamplerSettings() if settings is None else settings
@@ -142,57 +128,146 @@ def sample(
         raise ParameterError(f"names are {names!r}: give each parameter a name of its own")
     points = checked_start(start, names, settings)
     chains, walkers, _ = points.shape
-    target = CheckedTarget(log_probability, names)
-    coordinates = coordinates or Plain()
-    density = in_coordinates(target, coordinates)
     settings = replace(settings, min_ess=max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers))
-    deadline = math.inf if settings.max_seconds is None else began + settings.max_seconds
-    due, stored = 0, None
+    coordinates = coordinates or Coordinates()
     with ExitStack() as stack:
+        stored = None
         if checkpoint is not None:
             about = identity_of_run(identity, points, names, seed, settings, coordinates)
             stored = stack.enter_context(open_checkpoint(checkpoint, about, points.shape))
-        if stored is not None and stored.steps:
-            state = _resumed(stored, coordinates, points)
-            began, target.evaluations = began - stored.seconds, chains * walkers * (1 + state.steps)
-            due = state.steps if stored.ended_at == state.steps else 0
-        else:
-            state = RunState.begin(coordinates, _first_block(points, density, seed))
-        due = due or next_diagnosis(state.steps - 1, settings.block_steps)  # also if it was killed before a diagnosis
-
-        ending, late, diagnosis = "", False, None
-        while not ending or diagnosis is None:
+        run = _Run(CheckedTarget(log_probability, names), coordinates, settings, stored, progress, began)
+        run.begin(points, seed)
+        while not run.has_ended:
             try:
-                due = min(due, settings.max_steps)
-                while state.steps < due and not (late or ending):
-                    steps = min(settings.block_steps, due - state.steps)
-                    block = make_block(density, coordinates.moves(), state.last, steps, deadline)
-                    diagnosis = None
-                    state = state.append(block)
-                    if not block.whole:
-                        raise KeyboardInterrupt
-                    if stored is not None:
-                        stored.write(block, time.monotonic() - began)
-                    late = time.monotonic() > deadline
-                state, diagnosis = state.diagnose()
-                if not ending:
-                    enough = diagnosis.satisfies(settings.max_r_hat, settings.min_ess)
-                    spent = _OUT_OF_TIME if late else _OUT_OF_STEPS if state.steps >= settings.max_steps else ""
-                    ending = _CONVERGED if enough and not np.any(state.lost()) else spent
-                if stored is not None and ending not in ("", _INTERRUPTED):
-                    stored.note_end()
-                if progress is not None:
-                    worst = float(diagnosis.r_hat[diagnosis.worst_r_hat]), float(diagnosis.ess[diagnosis.worst_ess])
-                    progress(Progress(state.steps, settings.max_steps, *worst, time.monotonic() - began))
-                if state.steps == next_diagnosis(state.steps - 1, settings.block_steps):  # not where a budget ended
-                    state = state.recovered()
-                due = next_diagnosis(state.steps, settings.block_steps)
+                run.advance()
+                run.diagnose()
             except KeyboardInterrupt:
-                if not state.steps:
+                if not run.steps:
                     raise
-                ending = ending or _INTERRUPTED
+                run.ending = run.ending or _INTERRUPTED
+        return run.draws()
 
-    return _draws(state, diagnosis, ending, names, settings, target.evaluations, time.monotonic() - began)
+
+class _Run:
+    """A run of ensembles: where it is, when it is diagnosed next, and why it has ended."""
+
+    state: RunState
+    diagnosis: Diagnosis | None = None  # of the state as it is
+    ending: str = ""
+    is_late: bool = False
+    due: int  # number of steps of the next diagnosis
+
+    def __init__(
+        self,
+        target: CheckedTarget,
+        coordinates: Coordinates,
+        settings: SamplerSettings,
+        stored: Checkpoint | None,
+        progress: Callable[[Progress], object] | None,
+        began: float,
+    ) -> None:
+        self.target, self.density = target, in_coordinates(target, coordinates)
+        self.coordinates, self.settings, self.stored, self.progress = coordinates, settings, stored, progress
+        self.began = began
+        self.deadline = NEVER if settings.max_seconds is None else Deadline(began + settings.max_seconds)
+
+    @property
+    def steps(self) -> int:
+        return self.state.steps
+
+    @property
+    def seconds(self) -> float:
+        return time.monotonic() - self.began
+
+    @property
+    def has_ended(self) -> bool:
+        return bool(self.ending) and self.diagnosis is not None
+
+    def begin(self, points: Floats, seed: Seed) -> None:
+        """Begin at starting points, or where the stored blocks end."""
+        due = 0
+        if self.stored is not None and self.stored.steps:
+            self.state = _resumed(self.stored, self.coordinates, points)
+            self.began -= self.stored.seconds
+            self.target.evaluations = points[..., 0].size * (1 + self.steps)
+            due = self.steps if self.stored.ended_at == self.steps else 0
+        else:
+            self.state = RunState.begin(self.coordinates, _first_block(points, self.density, seed))
+        self.due = due or next_diagnosis(self.steps - 1, self.settings.block_steps)  # also if killed before a diagnosis
+
+    def advance(self) -> None:
+        """Make the steps up to the next diagnosis, block by block, each of which is stored."""
+        self.due = min(self.due, self.settings.max_steps)
+        while self.steps < self.due and not (self.is_late or self.ending):
+            steps = min(self.settings.block_steps, self.due - self.steps)
+            block = make_block(self.density, moves_in(self.coordinates), self.state.last, steps, self.deadline)
+            self.diagnosis = None
+            self.state = self.state.append(block)
+            if not block.whole:
+                raise KeyboardInterrupt
+            if self.stored is not None:
+                self.stored.write(block, self.seconds)
+            self.is_late = self.deadline.has_passed
+
+    def diagnose(self) -> None:
+        """Diagnose the second half of the steps, and say whether the run ends, or when it is diagnosed next."""
+        settings = self.settings
+        self.state, found = self.state.diagnose()
+        self.diagnosis = found
+        if not self.ending:
+            enough = found.satisfies(settings.max_r_hat, settings.min_ess)
+            spent = _OUT_OF_TIME if self.is_late else _OUT_OF_STEPS if self.steps >= settings.max_steps else ""
+            self.ending = _CONVERGED if enough and not np.any(self.state.lost()) else spent
+        if self.stored is not None and self.ending not in ("", _INTERRUPTED):
+            self.stored.note_end()
+        if self.progress is not None:
+            worst = float(found.r_hat[found.worst_r_hat]), float(found.ess[found.worst_ess])
+            self.progress(Progress(self.steps, settings.max_steps, *worst, self.seconds))
+        if self.steps == next_diagnosis(self.steps - 1, settings.block_steps):  # not where a budget ended
+            self.state = self.state.recovered()
+        self.due = next_diagnosis(self.steps, settings.block_steps)
+
+    def draws(self) -> Draws:
+        """Return the second half of a run that has ended, with the message on its end."""
+        state, found, settings, names = self.state, self.diagnosis, self.settings, tuple(self.target.names)
+        assert found is not None
+        chains, _, walkers, _ = state.last.samples.shape
+        converged, half, moved = self.ending == _CONVERGED, state.half, state.moved
+        stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
+        lost = int(np.count_nonzero(lost_walkers(half.values)))
+        modes = () if converged else modes_of(half.samples, half.values, names)
+        message = f"{self.ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {found.message(names)}"
+        if not converged:
+            message += (
+                f"; criteria: R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
+            )
+        if modes:
+            message += f"; {modes_message(modes)}"
+        of_walkers = f"of {chains * walkers} walkers"
+        if lost:
+            message += f"; {lost} {of_walkers} are lost in improbable regions: do not use the results"
+        if stuck:
+            message += f"; {stuck} {of_walkers} did not move in the steps kept: look at their positions"
+        return Draws(
+            samples=walker_major(half.samples),
+            log_probability=walker_major(half.values),
+            names=names,
+            walkers=walkers,
+            steps_kept=half.samples.shape[1],
+            every=state.every,
+            steps_run=state.steps,
+            r_hat=found.r_hat,
+            ess_bulk=found.ess_bulk,
+            ess_tail=found.ess_tail,
+            acceptance=moved.mean(axis=(1, 2)) if moved.size else np.full(chains, np.nan),
+            autocorrelation_time=state.every * autocorrelation_time(half.samples),
+            evaluations=self.target.evaluations,
+            seconds=self.seconds,
+            converged=converged,
+            message=message,
+            stuck=stuck,
+            modes=modes,
+        )
 
 
 def _first_block(points: Floats, density: LogProbability, seed: Seed) -> Block:
@@ -215,49 +290,3 @@ def _resumed(stored: Checkpoint, coordinates: Coordinates, points: Floats) -> Ru
     for block in stored.read(since=stored.steps // 2):
         state = state.append(block)
     return state
-
-
-def _draws(
-    state: RunState,
-    diagnosis: Diagnosis,
-    ending: str,
-    names: tuple[str, ...],
-    settings: SamplerSettings,
-    evaluations: int,
-    seconds: float,
-) -> Draws:
-    """Return the second half of a run that has ended, with the message on its end."""
-    chains, _, walkers, _ = state.last.samples.shape
-    converged, half, moved = ending == _CONVERGED, state.half, state.moved
-    stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
-    lost = int(np.count_nonzero(lost_walkers(half.values)))
-    modes = () if converged else modes_of(half.samples, half.values, names)
-    message = f"{ending} after {state.steps} step{'' if state.steps == 1 else 's'}: {diagnosis.message(names)}"
-    if not converged:
-        message += f"; criteria: R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
-    if modes:
-        message += f"; {modes_message(modes)}"
-    if lost:
-        message += f"; {lost} of {chains * walkers} walkers are lost in improbable regions: do not use the results"
-    if stuck:
-        message += f"; {stuck} of {chains * walkers} walkers did not move in the steps kept: look at their positions"
-    return Draws(
-        samples=walker_major(half.samples),
-        log_probability=walker_major(half.values),
-        names=names,
-        walkers=walkers,
-        steps_kept=half.samples.shape[1],
-        every=state.every,
-        steps_run=state.steps,
-        r_hat=diagnosis.r_hat,
-        ess_bulk=diagnosis.ess_bulk,
-        ess_tail=diagnosis.ess_tail,
-        acceptance=moved.mean(axis=(1, 2)) if moved.size else np.full(chains, np.nan),
-        autocorrelation_time=state.every * autocorrelation_time(half.samples),
-        evaluations=evaluations,
-        seconds=seconds,
-        converged=converged,
-        message=message,
-        stuck=stuck,
-        modes=modes,
-    )

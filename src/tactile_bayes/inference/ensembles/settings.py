@@ -10,8 +10,7 @@ from tactile_bayes.errors import ParameterError
 
 __all__ = ["SamplerSettings", "refuse_few_walkers", "settings_of"]
 
-_MOST = 10**9
-"""Largest number of ensembles, walkers and steps."""
+_MOST = 10**9  # largest number of ensembles, walkers and steps
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Starting points of walkers, and their random numbers."""
+"""Starting points of walkers, their random numbers, and their target: checked and counted."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
-from tactile_bayes.inference.ensembles.target import LogProbability
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 
-__all__ = ["RandomState", "checked_start", "first_random_state", "scatter_walkers"]
+__all__ = ["CheckedTarget", "RandomState", "checked_start", "first_random_state", "scatter_walkers"]
 
 
 class RandomState(NamedTuple):
     """State of NumPy's Mersenne Twister, which emcee's moves use."""
 
     algorithm: str
-    key: NDArray[np.uint32]
-    """Shape (624,)."""
+    key: NDArray[np.uint32]  # shape (624,)
     position: int
     has_gauss: int
     gauss: float
@@ -41,6 +40,33 @@ class RandomState(NamedTuple):
 
 def first_random_state(seed: np.random.SeedSequence) -> RandomState:
     return RandomState.of(np.random.RandomState(np.random.MT19937(seed)))
+
+
+class CheckedTarget:
+    """The log-probability with its values checked and its evaluations counted."""
+
+    def __init__(self, log_probability: LogProbability, names: Sequence[str]) -> None:
+        self.log_probability = log_probability
+        self.names = names
+        self.evaluations = 0
+
+    def __call__(self, points: Floats) -> Floats:
+        values = np.asarray(self.log_probability(points), dtype=float)
+        if values.shape != points.shape[:1]:
+            raise InferenceError(
+                f"the log-probability of {points.shape[0]} points came back with shape {values.shape}: it has to take "
+                f"an array (n, {len(self.names)}) and return one of shape (n,)"
+            )
+        self.evaluations += values.size
+        wrong = np.isnan(values) | (values == np.inf)
+        if np.any(wrong):
+            i = int(np.argmax(wrong))
+            where = ", ".join(f"{name} = {value!r}" for name, value in zip(self.names, points[i].tolist(), strict=True))
+            raise InferenceError(
+                f"the log-probability is {values[i]} at {where}: it has to be a number, or −inf where the point is "
+                "impossible"
+            )
+        return values
 
 
 def checked_start(start: ArrayLike, names: Sequence[str], settings: SamplerSettings) -> Floats:

@@ -21,21 +21,16 @@ if TYPE_CHECKING:
 __all__ = ["Noise", "noise_of"]
 
 
-_LOUDEST = 10.0
-"""Largest noise in the default prior of an unknown one [EI/L, EI/L²]."""
+_LOUDEST = 10.0  # largest noise in the default prior of an unknown one [EI/L, EI/L²]
 
 
 class Noise(NamedTuple):
     """Parameters of a load cell's noise, with their priors."""
 
-    cell: LoadCell
-    """Load cell in the record's units, whose noise the parameters scale."""
-    names: tuple[str, ...]
-    """Names of the parameters: of the white noise, and then of the discrepancy, if it is inferred."""
-    channels: tuple[tuple[str, ...], ...]
-    """Channels that each parameter of the white noise scales."""
-    priors: dict[str, Distribution]
-    """Default priors by name, in the record's units."""
+    cell: LoadCell  # load cell in the record's units, whose noise the parameters scale
+    names: tuple[str, ...]  # of the white noise, and then of the discrepancy, if it is inferred
+    channels: tuple[tuple[str, ...], ...]  # channels that each parameter of the white noise scales
+    priors: dict[str, Distribution]  # default priors by name, in the record's units
 
     @property
     def of_white(self) -> tuple[str, ...]:
@@ -63,26 +58,30 @@ def noise_of(measured: xr.Dataset, rig: Rig, discrepancy: Mapping[str, Distribut
     cell = rig.load_cell or LoadCell.from_record(measured)
     present = present_channels(measured)
     if cell is not None and any(cell.standard_deviations[name] > 0.0 for name in present):
-        if (factor := rig.known.get("noise_scale")) is not None:
-            scaled = ("force_noise", "moment_noise", "relative_noise")
-            louder = replace(cell, **{name: factor * getattr(cell, name) for name in scaled})
-            return Noise(louder, tuple(discrepancy), (), dict(discrepancy))
-        prior = rig.distributions.get("noise_scale", stats.lognorm(s=PARAMETERS["noise_scale"].width))
-        return Noise(cell, ("noise_scale", *discrepancy), (CHANNELS,), {"noise_scale": prior, **discrepancy})
+        return _scaled(cell, rig, discrepancy)
     if cell is not None and cell.relative_noise:
         raise ParameterError("the load cell states only relative_noise: state its force_noise and moment_noise as well")
-    gains = (cell or LoadCell()).own_gains
-    moment, force = gains[:2] * rod_of(measured).load_units[:2]
-    sources = {"moment_noise": (("holding_moment",), moment), "force_noise": (CHANNELS[1:], force)}
+    cell = cell or LoadCell()
+    moment, force = cell.own_gains[:2] * rod_of(measured).load_units[:2]
+    sources = {"moment_noise": (CHANNELS[:1], moment), "force_noise": (CHANNELS[1:], force)}
     sources = {name: source for name, source in sources.items() if set(source[0]) & set(present)}
-    for name in sources:
-        if name in rig.known:
-            raise ParameterError(f"{name} is known: state it in LoadCell({name}=...), and noise_scale = 1")
+    if known := [name for name in sources if name in rig.known]:
+        raise ParameterError(f"{known[0]} is known: state it in LoadCell({known[0]}=...), and noise_scale = 1")
     usual = {n: stats.loguniform(PARAMETERS[n].width * unit, _LOUDEST * unit) for n, (_, unit) in sources.items()}
     priors = {name: rig.distributions.get(name, default) for name, default in usual.items()}
     return Noise(
-        replace(cell or LoadCell(), force_noise=1.0, moment_noise=1.0),
+        replace(cell, force_noise=1.0, moment_noise=1.0),
         (*sources, *discrepancy),
         tuple(channels for channels, _ in sources.values()),
         {**priors, **discrepancy},
     )
+
+
+def _scaled(cell: LoadCell, rig: Rig, discrepancy: Mapping[str, Distribution]) -> Noise:
+    """Return the noise of a cell that is stated up to a factor, which may be known."""
+    factor = rig.known.get("noise_scale")
+    if factor is None:
+        prior = rig.distributions.get("noise_scale", stats.lognorm(s=PARAMETERS["noise_scale"].width))
+        return Noise(cell, ("noise_scale", *discrepancy), (CHANNELS,), {"noise_scale": prior, **discrepancy})
+    louder = {n: factor * getattr(cell, n) for n in ("force_noise", "moment_noise", "relative_noise")}
+    return Noise(replace(cell, **louder), tuple(discrepancy), (), dict(discrepancy))

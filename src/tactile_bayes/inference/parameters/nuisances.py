@@ -1,9 +1,9 @@
-"""Nuisance parameters: deviations of a rig from the stated one that are inferred beside a contour."""
+"""Unknowns of a rig: its deviations from the stated one that are inferred beside a contour."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,76 +20,40 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
 from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, parameter_named
 from tactile_bayes.rig.stated import Stated, stated_values, unit_of
-from tactile_bayes.rig.unknown import of_pivots
+from tactile_bayes.rig.unknown import Unknown, of_pivots
 
 if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
     from tactile_bayes.rig.rig_prior import RigPrior
 
-__all__ = [
-    "BIASES",
-    "CURVE",
-    "DRIFTS",
-    "GAINS",
-    "LEVERS",
-    "Nuisances",
-    "belongs",
-    "deviating",
-    "nuisances_of",
-]
+__all__ = ["BIASES", "CURVE", "DRIFTS", "GAINS", "LEVERS", "Nuisances", "belongs", "deviating", "nuisances_of"]
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
-
 BIASES, DRIFTS, GAINS, LEVERS, CURVE = (GROUPS[what] for what in ("bias", "drift", "gain", "lever", "moment_curve"))
-
-_SAME_DIRECTION = 1e-3
-"""Range of drive angles [rad] within which a rod keeps its direction."""
-
+_SAME_DIRECTION = 1e-3  # range of drive angles [rad] within which a rod keeps its direction
+# Parameters of the noise, which are none of the forward model.
 _OF_NOISE = ("discrepancy_scale", "discrepancy_length", "noise_scale", "moment_noise", "force_noise")
-"""Parameters of the noise, which are none of the forward model."""
-
 _RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
+# Parameters that change the path or the reading of the drive angle, and their names in `RigValues`.
 _RIG["backlash"] = "drive_angle_backlash"
-"""Parameters that change the path or the reading of the drive angle, and their names in `RigValues`."""
-
-_SENSED = (*BIASES, *DRIFTS, *GAINS, *LEVERS, *CURVE)
-"""Parameters that change only what the load cell senses, not the path."""
+_SENSED = (*BIASES, *DRIFTS, *GAINS, *LEVERS, *CURVE)  # change only what the load cell senses, not the path
 
 
 @dataclass(frozen=True)
 class Nuisances:
-    """Parameters of a rig that are inferred beside those of a contour.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the parameters.
-    priors : mapping of str to frozen scipy.stats distribution
-        Default priors by name, in the record's units.
-    rod : Rod
-        The stated rod.
-    known : mapping of str to float
-        Known parameters that are not as stated, in the record's units.
-    elapsed : ndarray, shape (samples,)
-        Position of each sample in the record, linear from the first (−½) to the last (½), for drift.
-    joint : RigPrior, optional
-        Joint prior of the parameters that a calibration of the rig has found; their `priors` are its marginals.
-    curve : (float, float)
-        Stated curve of the moment [L/EI, (L/EI)²], where it is not inferred.
-    pivots : int
-        Number of pivots of the record.
-    """
+    """Parameters of a rig that are inferred beside those of a contour."""
 
     names: tuple[str, ...]
-    priors: Mapping[str, Distribution]
-    rod: Rod
-    known: Mapping[str, float] = field(default_factory=dict)
+    priors: Mapping[str, Distribution]  # in the record's units
+    rod: Rod  # as stated
+    known: Mapping[str, float] = field(default_factory=dict)  # not as stated, in the record's units
+    # Of each sample, linear from the first (−½) to the last (½).
     elapsed: Floats = field(default_factory=lambda: np.zeros(1))
-    joint: RigPrior | None = None
-    curve: tuple[float, float] = (0.0, 0.0)
+    joint: RigPrior | None = None  # prior that a calibration found; `priors` are its marginals
+    curve: tuple[float, float] = (0.0, 0.0)  # stated one of the moment [L/EI, (L/EI)²]
     pivots: int = 1
+    # Unit of each parameter in dimensionless calculations, in the record's units.
     units: Mapping[str, float] = field(init=False)
-    """Unit of each parameter in dimensionless calculations, in the record's units."""
 
     def __post_init__(self) -> None:
         units = {name: unit_of(name, self.rod) for name in PARAMETERS}
@@ -111,11 +75,6 @@ class Nuisances:
     def of_path(self) -> tuple[str, ...]:
         """Names of the parameters that change the path, or where along it the samples lie."""
         return tuple(name for name in self.names if name not in _SENSED)
-
-    def unit(self, name: str) -> str:
-        """Return the SI unit of a parameter, like "N m"."""
-        parameter = parameter_named(name)
-        return "1" if parameter is None else parameter.unit
 
     def _with_known(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return values by name, shape (n,), with the known parameters that are not as stated."""
@@ -158,50 +117,56 @@ class Nuisances:
         return shifts
 
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
-        """Apply inferred gains, levers and zeros, and the curve, to loads, shape (n, ..., 3) [EI/L, EI/L²], in place.
+        """Apply unknown gains, levers and zeros, and the curve, to loads, shape (n, ..., 3) [EI/L, EI/L²], in place.
 
         Zeros are given as readings, and enter as the loads that the cell reads as such if its own curve is left out.
         """
         values = self._with_known(values)
-        curve = [
-            values[name] / self.units[name] if name in values else stated
-            for name, stated in zip(CURVE, self.curve, strict=True)
-        ]
+        curve = [self._dimensionless(values, name, stated) for name, stated in zip(CURVE, self.curve, strict=True)]
         is_bent = any(np.any(v) for v in curve)
         gains = [values.get(name) for name in GROUPS["gain"]]
-        levers = [values[name] / self.units[name] if name in values else None for name in GROUPS["lever"]]
+        levers = [self._dimensionless(values, name) for name in GROUPS["lever"]]
         # Gains act on readings at the lever's end, to which the cell's own lever is applied later.
         own = cell.lever if is_bent or any(gain is not None for gain in gains) else (0.0, 0.0)
-        _take_at(loads, *(known if lever is None else known + lever for known, lever in zip(own, levers, strict=True)))
+        _take_at(loads, own[0] + levers[0], own[1] + levers[1])
         if is_bent:
-            loads[..., 0] = curved(loads[..., 0], *(np.reshape(v, (-1, *(1,) * (loads.ndim - 2))) for v in curve))
+            loads[..., 0] = curved(loads[..., 0], *(_by_point(v, loads) for v in curve))
         for channel, gain in enumerate(gains):
             if gain is not None:
-                loads[..., channel] *= gain.reshape(-1, *(1,) * (loads.ndim - 2))
-        _take_at(loads, *(-known for known in own))
-        for what, course in (("bias", np.ones(1)), ("drift", self.elapsed)):
-            if not values.keys().isdisjoint(GROUPS[what]):
-                zeros = self._zeros(GROUPS[what], values, cell)
-                for channel, zero in enumerate(zeros.T):  # broadcasting over an axis of three is several times slower
-                    loads[..., channel] += zero.reshape(-1, *(1,) * (loads.ndim - 2)) * course
+                loads[..., channel] *= _by_point(gain, loads)
+        _take_at(loads, -own[0], -own[1])
+        self._add_zeros(loads, values, cell)
         return loads
 
-    def _zeros(self, names: Sequence[str], values: Mapping[str, Floats], cell: LoadCell) -> Floats:
-        """Return the loads that the cell reads as the named zeros, shape (n, 3)."""
-        read = [values[name] / self.units[name] if name in values else 0.0 for name in names]
-        return np.linalg.solve(cell.gain_matrix, np.array(np.broadcast_arrays(*read))).T
+    def _add_zeros(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> None:
+        """Add the loads that the cell reads as the unknown zeros, and as their drift along the record, in place."""
+        for what, course in (("bias", np.ones(1)), ("drift", self.elapsed)):
+            if values.keys().isdisjoint(GROUPS[what]):
+                continue
+            read = np.broadcast_arrays(*(self._dimensionless(values, name) for name in GROUPS[what]))
+            zeros = np.linalg.solve(cell.gain_matrix, np.array(read))
+            for channel, zero in enumerate(zeros):  # broadcasting over an axis of three is several times slower
+                loads[..., channel] += _by_point(zero, loads) * course
+
+    def _dimensionless(self, values: Mapping[str, Floats], name: str, stated: float = 0.0) -> Floats | float:
+        return values[name] / self.units[name] if name in values else stated
 
 
 def belongs(name: str, group: str) -> bool:
-    """Return True for the name of a nuisance parameter, or of one of a group."""
+    """Return True for the name of a parameter, or of one of a group."""
     return name == group or name in GROUPS.get(group, ()) or (group == "base" and bool(BASE.fullmatch(name)))
+
+
+def _by_point(values: Floats | float, loads: Floats) -> Floats:
+    """Return values of points in the shape of one channel of loads, (n, ..., 3)."""
+    return np.reshape(values, (-1, *(1,) * (loads.ndim - 2)))
 
 
 def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
     """Move the reference point of the moment of loads, shape (n, ..., 3), from the pivot to (x, y), in place."""
     for channel, arm in ((2, -np.asarray(x)), (1, np.asarray(y))):
         if np.any(arm):
-            loads[..., 0] += arm.reshape(-1, *(1,) * (loads.ndim - 2)) * loads[..., channel]
+            loads[..., 0] += _by_point(arm, loads) * loads[..., channel]
 
 
 def nuisances_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool = False) -> Nuisances:
@@ -211,41 +176,52 @@ def nuisances_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool 
     parameters of the noise and of a discrepancy are not among them either.
     """
     present = [_SHORT[name] for name in present_channels(measured)]
-    joint = rig.calibration
+    rod, pivots, joint = rod_of(measured), len(bases_of(measured)), rig.calibration
     if joint is not None:
         joint = joint.without([name for name in joint.priors if not _is_shown(name, present)])
-    found = () if joint is None else tuple(joint.priors)
-    said = {name: v for name, v in rig.said.items() if name not in (*found, *_OF_NOISE)}
-    said = of_pivots(said, len(bases_of(measured)))
-    hidden = _hidden(measured, rig, cell, present, gauge)
-    names = [name for name, value in said.items() if not isinstance(value, float) and name not in hidden]
-    every_gain = [f"{name}_gain" for name in present]
-    if set(every_gain) <= {*names, *found} and not rig.is_named("rigidity_scale"):
-        names = [name for name in names if name != "rigidity_scale"]
-    if "rigidity_scale" in names and set(every_gain) <= set(names):
-        raise ParameterError(
-            f"rigidity_scale and {', '.join(every_gain)} cannot all be unknown: a stiffer rod and larger gains "
-            "have the same effect; say that one of them is known, like rigidity_scale = 1"
-        )
-    names += found
-    known = {n: v for n, v in said.items() if isinstance(v, float) and (gauge or n not in GROUPS["gauge"])}
-    rod, curve = rod_of(measured), cell.dimensionless(rod_of(measured)).moment_curve
+    of_joint = {} if joint is None else dict(joint.priors)
+    said = {name: v for name, v in rig.said.items() if name not in (*of_joint, *_OF_NOISE)}
+    said = of_pivots(said, pivots)
+    names = (*_unknown_names(said, measured, rig, cell, present, gauge, of_joint), *of_joint)
     if "stem" in names:
         _refuse_shifted_stem(measured, names, gauge)
-    nuisances = Nuisances(
-        tuple(names),
-        {},
+    known = {n: v for n, v in said.items() if isinstance(v, float) and (gauge or n not in GROUPS["gauge"])}
+    stated = Stated.of(rod, cell)
+    priors = {n: stated.default(n) if isinstance(v := said[n], str | float) else v for n in names if n not in of_joint}
+    return Nuisances(
+        names,
+        priors | of_joint,
         rod,
         deviating(known, names, rod, cell),
         elapsed_in(measured),
         joint,
-        curve,
-        len(bases_of(measured)),
+        cell.dimensionless(rod).moment_curve,
+        pivots,
     )
-    stated = Stated.of(rod, cell)
-    priors = {name: stated.default(name) for name in names if name not in found}
-    priors |= {name: value for name, value in said.items() if name in priors and not isinstance(value, str | float)}
-    return replace(nuisances, priors={**priors, **(joint.priors if joint is not None else {})})
+
+
+def _unknown_names(
+    said: Mapping[str, Unknown],
+    measured: xr.Dataset,
+    rig: Rig,
+    cell: LoadCell,
+    present: Sequence[str],
+    gauge: bool,
+    of_joint: Collection[str],
+) -> list[str]:
+    """Return the names of the unknowns that the record shows, beside those of the calibration."""
+    hidden = _hidden(measured, rig, cell, present, gauge)
+    names = [name for name, value in said.items() if not isinstance(value, float) and name not in hidden]
+    every_gain = [f"{name}_gain" for name in present]
+    if "rigidity_scale" in names and set(every_gain) <= {*names, *of_joint}:
+        if not rig.is_named("rigidity_scale"):
+            names.remove("rigidity_scale")
+        elif set(every_gain) <= set(names):
+            raise ParameterError(
+                f"rigidity_scale and {', '.join(every_gain)} cannot all be unknown: a stiffer rod and larger gains "
+                "have the same effect; say that one of them is known, like rigidity_scale = 1"
+            )
+    return names
 
 
 def _hidden(measured: xr.Dataset, rig: Rig, cell: LoadCell, present: Sequence[str], gauge: bool) -> set[str]:
@@ -291,12 +267,8 @@ def _refuse_shifted_stem(measured: xr.Dataset, names: Sequence[str], gauge: bool
         )
 
 
-def _is_measured(name: str, present: Sequence[str]) -> bool:
-    """Return True if the channel of a parameter, if any, was measured."""
-    channel, _, what = name.rpartition("_")
-    return channel in present or name not in GROUPS.get(what, ())
-
-
 def _is_shown(name: str, present: Sequence[str]) -> bool:
     """Return True if a measured channel depends on a parameter."""
-    return _is_measured(name, present) and (name not in (*GROUPS["lever"], *CURVE) or "moment" in present)
+    channel, _, what = name.rpartition("_")
+    is_measured = channel in present or name not in GROUPS.get(what, ())
+    return is_measured and (name not in (*GROUPS["lever"], *CURVE) or "moment" in present)

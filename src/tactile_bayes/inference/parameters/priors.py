@@ -1,13 +1,21 @@
-"""Default priors of the parameters of contours."""
+"""Default priors of the parameters of contours, and priors that are matched between families."""
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Mapping
+
+import numpy as np
 from scipy import stats
+from scipy.optimize import brentq
 
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours import Contour
+from tactile_bayes.contours.families import family_named, sides_of
 from tactile_bayes.contours.family import ContourFamily, FamilyParameter
-from tactile_bayes.distributions import Distribution
+from tactile_bayes.distributions import Distribution, numbers_of
 
-__all__ = ["default_priors", "own_priors"]
+__all__ = ["default_priors", "matched_priors", "mean_log_radius", "own_priors", "widened"]
 
 
 def own_priors(family: ContourFamily, length: float) -> dict[str, Distribution]:
@@ -37,3 +45,84 @@ def default_priors(family: ContourFamily, base: tuple[float, float], length: flo
     x, y = base
     vertex = {"q": stats.uniform(y - length, 2.0 * length), "x_c": stats.uniform(x - length, 2.0 * length)}
     return own_priors(family, length) | {name: prior for name, prior in vertex.items() if name in family.parameters}
+
+
+# Slope angles over which a flank's radius of curvature is averaged [rad].
+_SLOPES = np.linspace(0.0, 0.25 * np.pi, 9, endpoint=False) + np.pi / 72.0
+# Median [rod lengths] of the geometric mean of a flank's radius of curvature, and standard deviation of its logarithm.
+_MEDIAN, _SPREAD = 0.5, 1.0
+_DRAWS = 2048  # number of quasi-random draws from a prior
+_NARROWEST, _WIDEST = 0.05, 3.0  # range of factors on standard deviations in which the matching one is sought
+
+
+def matched_priors(family: str, length: float) -> dict[str, Distribution]:
+    """Return priors of a family's own parameters under which a flank is as curved as in all other families.
+
+    The default priors are the same for all parameters of a kind, so that an ellipse, which has two sizes, is expected
+    to be wider and rounder than a circle. Here, sizes have priors for which the geometric mean of the radius of
+    curvature between slopes of 0° and 45° on one side has its median at half the rod's length, and its logarithm a
+    standard deviation of 1.
+    """
+    return {
+        f"{side}{parameter}": prior
+        for side, name in sides_of(family_named(family).name).items()
+        for parameter, prior in _of_flank(name, length).items()
+    }
+
+
+def mean_log_radius(contours: Contour) -> Floats:
+    """Return the logarithm of the geometric mean radius of curvature of the right flank up to 45°, shape (n,)."""
+    return np.mean([np.log(contours.radius_of_curvature(np.full(contours.shape, a))) for a in _SLOPES], axis=0)
+
+
+def widened(priors: Mapping[str, Distribution], factor: float) -> dict[str, Distribution]:
+    """Return priors whose log-normal ones have the same median and a standard deviation multiplied by a factor."""
+    return {name: _log_normal(prior, factor) if _is_log_normal(prior) else prior for name, prior in priors.items()}
+
+
+def _of_flank(name: str, length: float) -> dict[str, Distribution]:
+    family = family_named(name)
+    priors = own_priors(family, length)
+    stretch, width = _matching(name)
+    return {
+        n: _log_normal(prior, width, stretch ** family.length_powers[n]) if family.length_powers[n] else prior
+        for n, prior in priors.items()
+    }
+
+
+@functools.cache
+def _matching(name: str) -> tuple[float, float]:
+    """Return the factors on the medians of sizes, and on the standard deviations of their logarithms."""
+    family = family_named(name)
+    priors = own_priors(family, 1.0)
+    uniform = stats.qmc.Sobol(len(priors), seed=0).random(_DRAWS).T
+
+    def drawn(width: float) -> Floats:
+        values = {
+            n: (_log_normal(prior, width) if family.length_powers[n] else prior).ppf(u)  # type: ignore[attr-defined]
+            for (n, prior), u in zip(priors.items(), uniform, strict=True)
+        }
+        return mean_log_radius(_built(family, values))
+
+    def too_wide(width: float) -> float:
+        ends = np.quantile(drawn(width), stats.norm.cdf([-1.0, 1.0]))
+        return float(0.5 * np.diff(ends)[0] - _SPREAD)
+
+    width = float(brentq(too_wide, _NARROWEST, _WIDEST, xtol=1e-3))
+    return float(_MEDIAN / np.exp(np.median(drawn(width)))), width
+
+
+def _built(family: ContourFamily, values: Mapping[str, Floats]) -> Contour:
+    """Return contours with the vertex at the origin; parameters out of bounds are moved to the nearest bound."""
+    zeros = np.zeros(_DRAWS)
+    inside = {name: np.clip(value, *family.bounds[name]) for name, value in values.items()}
+    return family.build(*(inside.get(name, zeros) for name in family.parameters))
+
+
+def _is_log_normal(prior: Distribution) -> bool:
+    return getattr(getattr(prior, "dist", None), "name", "") == "lognorm"
+
+
+def _log_normal(prior: Distribution, width: float, stretch: float = 1.0) -> Distribution:
+    known = numbers_of(prior)
+    return stats.lognorm(s=width * known["s"], loc=known["loc"], scale=stretch * known["scale"])

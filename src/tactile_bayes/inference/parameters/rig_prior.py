@@ -19,13 +19,11 @@ from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["refuse_other_rig", "rig_prior"]
 
+# Parameters, by parts of their names, that belong to one record (zeros, pivots and gauge) or to rod and object
+# (friction).
 _PASSING = ("bias", "drift", "friction", "base", "gauge")
-"""Parameters, by parts of their names, that belong to one record (zeros, pivots and gauge) or to rod and object
-(friction)."""
-
-_PROBABILITIES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
-"""Probabilities of the quantiles at which draws and density are compared."""
-
+_PROBABILITIES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])  # at which quantiles of draws and density are compared
+# Beginnings of the attributes that must agree: the rig's parameters are deviations from what they state.
 _SENSES = (
     "rod_",
     "units",
@@ -35,8 +33,6 @@ _SENSES = (
     "load_cell_moment_curve",
     "load_cell_drive_angle_",
 )
-"""Beginnings of the attributes that must agree: the rig's parameters are deviations from what they state."""
-
 _NOISES = ("load_cell_drive_angle_noise", "load_cell_drive_angle_resolution")
 
 

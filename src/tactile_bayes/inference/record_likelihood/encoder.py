@@ -10,35 +10,18 @@ from tactile_bayes.load_cell import LoadCell
 
 __all__ = ["EncoderErrors"]
 
-_WIDEST, _NARROWEST = 0.75, 0.1
-"""Distance between neighbouring errors, in standard deviations, at most and at least."""
-
-_REACH = 3.75
-"""Largest error that is taken into account, in standard deviations."""
-
-_STEEP = np.array([10.0, 30.0, 30.0])
-"""Rates of change of loads with the drive angle close to snap-off [EI/L and EI/L² per rad]."""
+_WIDEST, _NARROWEST = 0.75, 0.1  # distance between neighbouring errors, in standard deviations, at most and at least
+_REACH = 3.75  # largest error that is taken into account, in standard deviations
+_STEEP = np.array([10.0, 30.0, 30.0])  # change of loads close to snap-off [EI/L and EI/L² per rad]
 
 
 class EncoderErrors:
-    """Quadrature nodes and weights over errors of the encoder, by which the likelihood of a sample is summed.
+    """Quadrature nodes (reading less true angle [rad]) and weights over errors of the encoder of a dimensionless cell.
 
     The sum is accurate if loads are smooth functions of the drive angle, and valid at first contact and at snap-off,
     where the rod is in contact at some nodes and not at others; the event is then resolved to the distance of nodes.
     Compared with a fine integral the error of the logarithm of a sample's probability is 0.001, and 0.8 at worst next
     to an event.
-
-    Parameters
-    ----------
-    cell : LoadCell
-        The load cell, dimensionless.
-
-    Attributes
-    ----------
-    errors : ndarray, shape (k,)
-        Reading less true angle [rad].
-    log_weights : ndarray, shape (k,)
-        Logarithms of the weights, which sum to one.
     """
 
     def __init__(self, cell: LoadCell) -> None:

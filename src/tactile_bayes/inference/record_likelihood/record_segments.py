@@ -22,14 +22,10 @@ if TYPE_CHECKING:
 
 __all__ = ["RecordSegments", "Segment", "without_errors"]
 
-_OFF = 1e-6
-"""Distance of recorded poses from a line [L and rad] that is rounding of the record."""
-
-_SCATTER = 10.0
-"""Range of drive angles, over the noise of their readings, of a rod that is clamped at one."""
-
+_OFF = 1e-6  # distance of recorded poses from a line [L and rad] that is rounding of the record
+_SCATTER = 10.0  # range of drive angles, over the noise of their readings, of a rod that is clamped at one
+# Rotation as a line, with the drive angle as travel.
 _TURNS = np.array([[0.0, 0.0, -0.5 * np.pi, 0.0, 0.0, 1.0, -0.5 * np.pi, 1.5 * np.pi]])
-"""Rotation as a line, with the drive angle as travel."""
 
 
 @dataclass(frozen=True)
@@ -37,45 +33,22 @@ class Segment:
     """Sweep segment: samples with one pivot, one side of contact and one direction of the drive, or those of sweeps
     in which the drive carries the base through the same poses."""
 
-    pivot: int
-    """Index of the pivot, in the order of the record."""
-    base: tuple[float, float]
-    """The pivot, or where the drive begins [length]."""
-    backward: bool
-    """True if the side of contact is that of a backward sweep."""
+    pivot: int  # index of the pivot, in the order of the record
+    base: tuple[float, float]  # the pivot, or where the drive begins [length]
+    backward: bool  # True if the side of contact is that of a backward sweep
+    # Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 if it carries the base, which
+    # turns no encoder.
     sense: float
-    """Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 if it carries the base, which
-    turns no encoder."""
-    samples: Index
-    """Indices of the samples, shape (samples of the segment,)."""
+    samples: Index  # indices of the samples, shape (samples of the segment,)
 
 
 class RecordSegments:
     """Sweep segments of a record; a sequence of `Segment`.
 
     Drive angles are corrected by the data sheet of the load cell. In the frame of a sweep they grow in forward contact;
-    where the drive carries the base, its travel takes their place.
-
-    Parameters
-    ----------
-    measured : xr.Dataset
-        A valid record.
-    load_cell : LoadCell
-        Load cell in the record's units.
-
-    Attributes
-    ----------
-    drive_angles : ndarray, shape (samples,)
-        Readings of the drive angle, corrected [rad].
-    pivots : ndarray of int, shape (segments,)
-        Index of the pivot of every segment, in the order of the record.
-    signs : ndarray, shape (segments,)
-        −1 where contact is on the side of a backward sweep, else 1.
-    senses : ndarray, shape (segments,)
-        Directions of the drive, as in `Segment`.
-    lines : ndarray, shape (segments, lines, `LINE_COLUMNS`), optional
-        Lines of all drives, NaN after the last, as in `Segments`; a rotation is a line along the drive
-        angle. None if no drive carries the base.
+    where the drive carries the base, its travel takes their place. `pivots`, `signs` (−1 for contact as in a backward
+    sweep) and `senses` are by segment; `lines`, (segments, lines, `LINE_COLUMNS`), are those of all drives, NaN after
+    the last, a rotation being a line along the drive angle; None if no drive carries the base.
     """
 
     def __init__(self, measured: xr.Dataset, load_cell: LoadCell) -> None:

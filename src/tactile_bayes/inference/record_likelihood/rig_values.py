@@ -10,24 +10,15 @@ __all__ = ["RigValues"]
 class RigValues(NamedTuple):
     """Deviations of a rig from the stated one; numbers, or arrays of shape (n,) with one for every contour."""
 
-    drive_angle_offset: Any = 0.0
-    """Encoder offset in addition to that of the load cell's data sheet [rad]."""
-    rigidity_scale: Any = 1.0
-    """Flexural rigidity over the stated one."""
-    suspension_compliance: Any = 0.0
-    """Turn of the pivot's suspension per holding moment, in the unit of the record as stated [rad/(EI/L)]."""
-    friction: Any = 0.0
-    """Coulomb's coefficient."""
-    drive_angle_backlash: Any = 0.0
-    """Reading of the encoder in forward motion less that in backward motion, in addition to the data sheet [rad]."""
-    rest_curvature: Any = 0.0
-    """Rest curvature of the rod in addition to the stated one [1/L]."""
-    taper: Any = 0.0
-    """Taper of the rod in addition to the stated one."""
-    stem: Any = 0.0
-    """Rigid piece between pivot and rod in addition to the stated one [L]."""
-    length: Any = 1.0
-    """Length of the rod over the stated one; its rest curvature, and what is added to it, are then per that length."""
+    drive_angle_offset: Any = 0.0  # encoder offset in addition to that of the load cell's data sheet [rad]
+    rigidity_scale: Any = 1.0  # flexural rigidity over the stated one
+    suspension_compliance: Any = 0.0  # turn of the pivot's suspension per holding moment [rad/(EI/L) as stated]
+    friction: Any = 0.0  # Coulomb's coefficient
+    drive_angle_backlash: Any = 0.0  # forward less backward reading, in addition to the data sheet [rad]
+    rest_curvature: Any = 0.0  # rest curvature of the rod in addition to the stated one [1/L]
+    taper: Any = 0.0  # taper of the rod in addition to the stated one
+    stem: Any = 0.0  # rigid piece between pivot and rod in addition to the stated one [L]
+    length: Any = 1.0  # over the stated one; its rest curvature, and what is added to it, are then per that length
+    # Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
+    # after the last given one are not shifted.
     base_shifts: Any = None
-    """Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
-    after the last given one are not shifted."""

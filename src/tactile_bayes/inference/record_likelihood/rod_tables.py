@@ -18,30 +18,20 @@ if TYPE_CHECKING:
 
 __all__ = ["RodTables"]
 
+# Ranges of tables: distances from the stated taper and rest curvature [1/L], three and four standard deviations of the
+# default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and
+# for uneven curvature that of the rest curvature.
 _TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
-"""Ranges of tables: distances from the stated taper and rest curvature [1/L], three and four standard deviations of the
-default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and for
-uneven curvature that of the rest curvature."""
-
-_LENGTHS = 0.9, 1.1
-"""Lengths over the stated one in tables of a cone whose length varies: ten standard deviations of the default prior."""
-
+_LENGTHS = 0.9, 1.1  # over the stated one, in tables of a cone: ten deviations of the default prior
+# Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where the base is
+# carried.
 _FRICTION_ANGLES = (0.0, 0.5), (0.5, MAX_FRICTION_ANGLE)
-"""Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where the base is
-carried."""
 
 
 class RodTables:
-    """Tables of a rod, each made for the first rig that needs it, and kept.
+    """Tables of the stated rod, each made for the first rig that needs it, and kept.
 
-    Parameters
-    ----------
-    rod : Rod
-        The stated rod.
-    friction : float
-        The stated coefficient.
-    is_carried : bool
-        Whether a drive carries the base in any sweep: first contact then decides in which sense friction acts.
+    Where a drive carries the base, first contact decides in which sense friction acts.
     """
 
     def __init__(self, rod: Rod, friction: float, is_carried: bool) -> None:

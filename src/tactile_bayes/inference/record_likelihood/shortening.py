@@ -20,33 +20,17 @@ from tactile_bayes.record import CHANNELS, base_of_sample, carried_sweeps, prese
 
 __all__ = ["MOST_SAMPLES", "is_long", "shortened", "thinned"]
 
-MOST_SAMPLES = 2000
-"""Largest number of samples that the likelihood takes one by one."""
-
-_BINS = 700
-"""Number of bins of the drive angle in all sweep segments, before they are split."""
-
-_FEWEST_BINS = 12
-"""Least number of bins of a segment."""
-
-_MOST_SPLIT = 1.25
-"""Largest number of bins after splitting, over that before."""
-
-_WIDEST = np.radians(2.0)
-"""Largest width of a bin [rad]; loads between events are cubic in it to 1e-6 EI/L."""
-
-_DIVISIBLE = 8
-"""Least number of readings of a bin that is split."""
-
+MOST_SAMPLES = 2000  # largest number of samples that the likelihood takes one by one
+_BINS = 700  # number of bins of the drive angle in all sweep segments, before they are split
+_FEWEST_BINS = 12  # least number of bins of a segment
+_MOST_SPLIT = 1.25  # largest number of bins after splitting, over that before
+_WIDEST = np.radians(2.0)  # largest width of a bin [rad]; loads between events are cubic in it to 1e-6 EI/L
+_DIVISIBLE = 8  # least number of readings of a bin that is split
+# Improvement of a bin by two straight lines in place of one, in variances of the noise for each channel, beyond which
+# it is split: without a bend its mean is 2.
 _BEND = 4.0
-"""Improvement of a bin by two straight lines in place of one, in variances of the noise for each channel, beyond which
-it is split: without a bend its mean is 2."""
-
-_SAME_ANGLE = 1e-12
-"""Standard deviation of drive angles that is rounding [rad]."""
-
-_MARGIN, _MOST_SINGLE = 8, 200
-"""Number of readings on either side of a snap-off that stay single, and the largest number around one."""
+_SAME_ANGLE = 1e-12  # standard deviation of drive angles that is rounding [rad]
+_MARGIN, _MOST_SINGLE = 8, 200  # readings on either side of a snap-off that stay single, and the most around one
 
 
 def is_long(record: xr.Dataset) -> bool:
@@ -55,17 +39,14 @@ def is_long(record: xr.Dataset) -> bool:
 
 
 def shortened(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
-    """Return a record as the likelihood takes it, and the load cell of its samples.
+    """Return a record as the likelihood takes it, and the load cell of its samples; `blocks` of the record states how.
 
     A record of more than `MOST_SAMPLES` is put in blocks of readings at neighbouring drive angles, narrow enough that
     loads are smooth in them, each of which two points of its straight line stand for; readings next to a snap-off stay
     single. The points have the noise of a reading over the root of their number of readings, and what scatters about
-    the line states the noise. For noise
-    whose means have no such distribution (outliers, drift, correlated channels, an encoder with noise or steps, steps
-    above the noise, readings at the end of the range), and where a drive carries the base, every so many readings are
-    taken instead; the drift is then that between them.
-
-    The attribute `blocks` of the result states what was done.
+    the line states the noise. For noise whose means have no such distribution (outliers, drift, correlated channels, an
+    encoder with noise or steps, steps above the noise, readings at the end of the range), and where a drive carries the
+    base, every so many readings are taken instead; the drift is then that between them.
     """
     if not is_long(record):
         return record, cell
@@ -138,12 +119,9 @@ def _slower(cell: LoadCell, every: int) -> LoadCell:
 class _Group(NamedTuple):
     """Samples with one pivot, one side of contact and one direction of the drive."""
 
-    samples: Index
-    """By drive angle, shape (n,)."""
-    sweep_of: Index
-    """Index of the sweep of each of them, among those of the group, shape (n,)."""
-    sweeps: Index
-    """Numbers of these sweeps, in the order of measurement."""
+    samples: Index  # by drive angle, shape (n,)
+    sweep_of: Index  # index of the sweep of each of them, among those of the group, shape (n,)
+    sweeps: Index  # numbers of these sweeps, in the order of measurement
     direction: str
     side: str
 

@@ -12,14 +12,9 @@ from tactile_bayes.numerics import chebyshev
 
 __all__ = ["Anchor"]
 
-_NODE, _WEIGHT = np.polynomial.legendre.leggauss(24)
-"""Nodes and weights, on [−1, 1], of the quadrature between vertex and anchor."""
-
-_SLOPE_ANGLES = np.linspace(-1.4, 1.4, 57)
-"""Slope angles that may be the anchor's [rad]."""
-
-_LARGEST = 50.0
-"""Bound of the change of the logarithm of a radius, far beyond any prior."""
+_NODE, _WEIGHT = np.polynomial.legendre.leggauss(24)  # of the quadrature between vertex and anchor
+_SLOPE_ANGLES = np.linspace(-1.4, 1.4, 57)  # slope angles that may be the anchor's [rad]
+_LARGEST = 50.0  # bound of the change of the logarithm of a radius, far beyond any prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,17 +24,10 @@ class Anchor:
     A record that touches a contour beside its vertex determines an arc. The vertex is as far from it as the integral of
     the unknown radii between them says, which is linear in their logarithms only near a centre. Farther away an arc
     that should stay where it is moves, unless the vertex moves as well.
-
-    Parameters
-    ----------
-    slope_angle : float
-        [rad].
-    centre : ndarray, shape (nodes,)
-        Logarithms of the radii, at the nodes of interpolation, around which the map is linear.
     """
 
     slope_angle: float
-    centre: Floats
+    centre: Floats  # logarithms of the radii, at the nodes of interpolation, around which the map is linear
 
     @classmethod
     def best(cls, centre: Floats, radii: Floats, vertex: Floats) -> Anchor:

@@ -16,7 +16,6 @@ from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
-from tactile_bayes.inference.starts.contour_optimum import certainly_loaded
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.rig.parameters import MAY_VANISH
@@ -24,25 +23,14 @@ from tactile_bayes.rig.parameters import MAY_VANISH
 __all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_names", "scale_names", "split"]
 
 _OF_ROUGHNESS = ("amplitude", "length_scale")
-
+# Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
+# of the further ones.
 _STEP, _LARGEST_STEP = 1e-5, 0.01
-"""Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
-of the further ones."""
-
-_FURTHER_DIFFERENCES = 2
-"""Number of times that differences are taken again."""
-
-_MIN_CHANGE = 0.03
-"""Smallest significant singular value of the linearised residuals, in standard deviations per prior scale."""
-
-_MIN_WIDTH = 0.01
-"""Smallest standard deviation of a snap-off, over half a step of the drive angle."""
-
-_FAR_DOWN = -35.0
-"""Standard normal number of which, and of all below, a truncation at less changes nothing."""
-
-_HUBER_THRESHOLD = 4.0
-"""Residual in standard deviations from which Huber's loss is linear."""
+_FURTHER_DIFFERENCES = 2  # number of times that differences are taken again
+_MIN_CHANGE = 0.03  # least singular value of residuals that counts, in deviations per prior scale
+_MIN_WIDTH = 0.01  # smallest standard deviation of a snap-off, over half a step of the drive angle
+_FAR_DOWN = -35.0  # standard normal number of which, and of all below, a truncation at less changes nothing
+_HUBER_THRESHOLD = 4.0  # residual in standard deviations from which Huber's loss is linear
 
 
 class LinearPrior(NamedTuple):
@@ -90,12 +78,9 @@ def joined(model: ContourModel, scales: Floats, linear: Floats) -> Floats:
 class _SmoothNoise(NamedTuple):
     """White noise that is as harmful as a discrepancy to what changes slowly along a sweep, the shape of a contour."""
 
-    size: Floats
-    """Root mean square of the largest load in contact over the noise, for each parameter of the noise."""
-    step: float
-    """Distance of samples."""
-    longest: float
-    """Length of a sweep in contact."""
+    size: Floats  # root mean square of the largest load in contact over the noise, for each parameter of the noise
+    step: float  # distance of samples
+    longest: float  # length of a sweep in contact
 
     @classmethod
     def at(cls, observer: Observer, point: Floats) -> _SmoothNoise:
@@ -135,7 +120,7 @@ class Observer:
 
     def __init__(self, model: ContourModel) -> None:
         self.model = model
-        self.loaded = certainly_loaded(model)
+        self.loaded = model.certainly_loaded
         if not np.isfinite(model.zero[model.present]).all():  # hardly any sample is unloaded
             self.loaded = loaded_samples(model.measured, model.noise.stated_cell)
         stated = np.asarray(model.likelihood.load_cell.noise)
@@ -186,39 +171,21 @@ class Observer:
 class _Observations(NamedTuple):
     """Linearised observations: as few combinations of readings and snap-offs as carry all information."""
 
-    slopes: Floats
-    """Over the log-radii at the nodes and the other parameters, shape (observations, k)."""
-    values: Floats
-    """At zero parameters, with the noise of the scales, shape (observations,)."""
-    kinds: Index
-    """Kinds of noise, the last of which is that of snap-offs, shape (observations,)."""
-    readings: Floats
-    """Number of readings of each other kind."""
-    scatter: Floats
-    """Robust standard deviation of these readings from those at the centre."""
+    slopes: Floats  # over the log-radii at the nodes and the other parameters, shape (observations, k)
+    values: Floats  # at zero parameters, with the noise of the scales, shape (observations,)
+    kinds: Index  # kinds of noise, the last of which is that of snap-offs, shape (observations,)
+    readings: Floats  # number of readings of each other kind
+    scatter: Floats  # robust standard deviation of these readings from those at the centre
 
 
 class NormalApproximation:
     """Normal distribution of the linear parameters, given amplitude and length scale of the random radius, and noise.
 
     It is exact if loads and snap-offs are linear in the logarithms of the radii and in the rig, and priors are normal.
-    Loads are rather linear in parameters with the vertex moved by `bent`, if what the record touches is beside it. The
-    dependence on the length scale is tabulated at those of the random radius, and interpolated. Parameters that may
-    vanish, like friction, have the positive part of the distribution alone.
-
-    Parameters
-    ----------
-    observer : Observer
-        Residuals of the record.
-    prior : LinearPrior
-        Distribution of the linear parameters.
-    scales, linear : ndarray, shape (scales,), (d,)
-        Point at which loads and snap-offs are linearised.
-
-    Attributes
-    ----------
-    white : slice
-        Place of the white noise among the scales.
+    Loads are linearised at a point, `scales` and `linear`; they are rather linear in parameters with the vertex moved
+    by `bent`, if what the record touches is beside it. The dependence on the length scale is tabulated at those of the
+    random radius, and interpolated. Parameters that may vanish, like friction, have the positive part of the
+    distribution alone.
     """
 
     def __init__(self, observer: Observer, prior: LinearPrior, scales: Floats, linear: Floats) -> None:
@@ -435,10 +402,8 @@ def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: 
 class _Lines(NamedTuple):
     """Linearised residuals with unit noise, whose signs are those of measured less expected values."""
 
-    slopes: Floats
-    """Slopes of the expected values, over changes of the parameters in prior scales, shape (n, k)."""
-    values: Floats
-    """At the centre, shape (n,)."""
+    slopes: Floats  # slopes of the expected values, over changes of the parameters in prior scales, shape (n, k)
+    values: Floats  # at the centre, shape (n,)
 
     @classmethod
     def of(cls, residual: Floats, steps: Floats, axes: Floats) -> _Lines:

@@ -21,23 +21,12 @@ from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
 __all__ = ["whitening_at"]
 
-_ROUNDS = 20
-"""Largest number of linearisations."""
-
-_GAINED = 0.5
-"""Smallest gain in log-density of a round for another one to follow."""
-
-_DAMPINGS: Floats = np.power(10.0, np.arange(15))
-"""Dampings of steps that are tried beside the full one."""
-
-_MAX_LOG_STEP = 0.7
-"""Largest change of the logarithm of a scale in a round."""
-
-_MIN_BOUND_DISTANCE = 1e-3
-"""Smallest distance of the logarithm of a scale from its bounds."""
-
-_DRAWS = 4000
-"""Number of draws from a prior for its mean and standard deviation."""
+_ROUNDS = 20  # largest number of linearisations
+_GAINED = 0.5  # smallest gain in log-density of a round for another one to follow
+_DAMPINGS: Floats = np.power(10.0, np.arange(15))  # dampings of steps that are tried beside the full one
+_MAX_LOG_STEP = 0.7  # largest change of the logarithm of a scale in a round
+_MIN_BOUND_DISTANCE = 1e-3  # smallest distance of the logarithm of a scale from its bounds
+_DRAWS = 4000  # number of draws from a prior for its mean and standard deviation
 
 
 def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, deadline: Deadline = NEVER) -> Whitening:

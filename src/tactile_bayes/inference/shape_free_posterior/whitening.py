@@ -9,21 +9,17 @@ from functools import cached_property
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.ensembles import whitened_moves
-from tactile_bayes.inference.ensembles.moves import Moves
+from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation, joined, split
 
 __all__ = ["Whitening"]
 
-_FAR = 4.0
-"""Largest distance of the logarithm of a scale from its starting value; the density is zero beyond."""
-
-_LARGEST = 50.0
-"""Bound of the logarithm of a radius, far beyond any prior."""
+_FAR = 4.0  # largest distance of the logarithm of a scale from its starting value; the density is zero beyond
+_LARGEST = 50.0  # bound of the logarithm of a radius, far beyond any prior
 
 
 @dataclass(frozen=True, eq=False)
-class Whitening:
+class Whitening(Coordinates):
     """A change of variables by a normal approximation, whose quality affects efficiency, not exactness.
 
     Given the scales (amplitude and length scale of the random radius, and the noise), the approximation gives mean and
@@ -34,12 +30,9 @@ class Whitening:
     """
 
     approximation: NormalApproximation
-    scales: Floats
-    """Amplitude, length scale and noise at the centre of the walkers' starting points, shape (bent,)."""
-    mean: Floats
-    """Posterior mean of the parameters as the approximation standardises them, shape (d,): zero if it is exact."""
-    root: Floats
-    """Root of their posterior covariance, shape (d, d): one if the approximation is exact."""
+    scales: Floats  # amplitude, length scale and noise at the centre of the walkers' starting points, shape (bent,)
+    mean: Floats  # of the posterior, as the approximation standardises it, shape (d,): zero if that is exact
+    root: Floats  # root of their posterior covariance, shape (d, d): one if the approximation is exact
 
     @property
     def bent(self) -> int:
@@ -86,10 +79,6 @@ class Whitening:
     def standardised(self, mean: Floats, root: Floats) -> Whitening:
         """Return the coordinates in which those after the first `bent` have been standardised by mean and root."""
         return replace(self, mean=self.mean + self.root @ mean, root=self.root @ root)
-
-    def moves(self) -> Moves:
-        """Return the moves of an ensemble, with their shares."""
-        return whitened_moves(self.bent)
 
     def _parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Return parameters and log-determinants as `parameters` does, of all coordinates at once."""

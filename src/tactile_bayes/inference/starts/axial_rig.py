@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.least_squares import descend
 from tactile_bayes.record import CHANNELS, carried_sweeps, frame_of, present_channels
 
 __all__ = ["axial_rig"]
 
-_THRESHOLDS = (1e4, 1e3, 1e2, 1e1, 1.0)
-"""Residuals, in standard deviations, beyond which the loss is linear, of successive searches."""
-
-_ROUNDING = 1e-6
-"""Share of the force to which the axial force of a sample is believed."""
-
-_SAMPLES_PER_PARAMETER = 2
-"""Least number of loaded samples for each parameter."""
-
+_ROUNDING = 1e-6  # share of the force to which the axial force of a sample is believed
+_SAMPLES_PER_PARAMETER = 2  # least number of loaded samples for each parameter
+# Parts of the names of parameters by which the axial force does not follow from a sample's moment in this form.
 _NOT_LINEAR = ("rest_curvature", "taper", "stem", "drift", "moment_curve")
-"""Parts of the names of parameters by which the axial force does not follow from a sample's moment in this form."""
 
 
 def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
@@ -35,19 +28,9 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
 
     Shapes: loaded (samples,).
     """
-    names, likelihood = model.nuisances.names, model.likelihood
-    rod = likelihood.rod
-    if (
-        not names
-        or np.count_nonzero(loaded) < _SAMPLES_PER_PARAMETER * len(names)
-        or len(present_channels(model.measured)) < len(CHANNELS)
-        or carried_sweeps(model.measured)
-        or not rod.is_uniform
-        or rod.mean_rest_curvature != 0.0
-        or rod.stem > 0.0
-        or any(part in name for name in names for part in _NOT_LINEAR)
-    ):
+    if not _is_determined(model, loaded):
         return None
+    names, likelihood = model.nuisances.names, model.likelihood
     middle = np.array([float(model.priors[name].median()) for name in names])  # type: ignore[attr-defined]
     spread = np.array([float(model.priors[name].std()) for name in names])
     readings, deviation = likelihood.measured[loaded], model.deviation
@@ -56,35 +39,43 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
     turning = frame_of(model.measured) == "turning"
 
     def residuals(steps: Floats) -> Floats:
-        """Return axial forces less those that follow from the moments, in standard deviations, and the steps."""
-        values = {name: np.array([value]) for name, value in zip(names, middle + spread * steps, strict=True)}
+        """Return axial forces less those that follow from the moments, in standard deviations, (n, samples)."""
+        values = dict(zip(names, (middle + spread * steps).T, strict=True))
         rig = model.nuisances.rig(values)
         # Readings are affine functions of loads, known by their values at no load and at unit loads.
-        none_and_units = np.vstack([np.zeros(3), np.eye(3)])[None]
-        read = likelihood.load_cell.expected(model.nuisances.sensed(none_and_units, values, likelihood.load_cell))[0]
-        loads = np.linalg.solve((read[1:] - read[0]).T, (readings - read[0]).T)
-        moment, force_x, force_y = loads
-        if turning:
-            axial = force_x
-        else:
-            there = angle - sign * (likelihood.misread(rig)[0, loaded] + rig.suspension_compliance * moment)
+        none_and_units = np.tile(np.vstack([np.zeros(3), np.eye(3)]), (len(steps), 1, 1))
+        read = likelihood.load_cell.expected(model.nuisances.sensed(none_and_units, values, likelihood.load_cell))
+        slopes, left = read[:, 1:] - read[:, :1], readings - read[:, :1]
+        loads = np.linalg.solve(np.swapaxes(slopes, 1, 2), np.swapaxes(left, 1, 2))
+        moment, force_x, force_y = np.moveaxis(loads, 1, 0)
+        compliance, friction, rigidity = (
+            np.reshape(v, (-1, 1)) for v in (rig.suspension_compliance, rig.friction, rig.rigidity_scale)
+        )
+        axial = force_x
+        if not turning:
+            there = angle - sign * (likelihood.misread(rig)[:, loaded] + compliance * moment)
             axial = sign * force_x * np.cos(there) + force_y * np.sin(there)
         force = np.hypot(force_x, force_y)
-        slope = np.sin(np.arctan(rig.friction))
-        surplus = axial + force * slope - moment**2 / (2.0 * rig.rigidity_scale)
-        noise = np.sqrt(deviation[1] ** 2 + np.square(deviation[0] * moment) + np.square(_ROUNDING * force))
-        return np.append(surplus / noise, steps)
+        surplus = axial + force * np.sin(np.arctan(friction)) - moment**2 / (2.0 * rigidity)
+        return surplus / np.sqrt(deviation[1] ** 2 + np.square(deviation[0] * moment) + np.square(_ROUNDING * force))
 
-    def bent(steps: Floats, threshold: float) -> Floats:
-        """Return residuals whose squares are the pseudo-Huber loss for the record, and quadratic for the priors."""
-        found = residuals(steps)
-        scaled = found[: -steps.size] / threshold
-        found[: -steps.size] = np.sign(scaled) * np.sqrt(2.0 * (np.sqrt(1.0 + scaled**2) - 1.0))
-        return found
-
-    steps = np.zeros(len(names))
-    for threshold in _THRESHOLDS:
-        steps = least_squares(bent, steps, args=(threshold,)).x
+    none = np.zeros(len(names))
+    steps = descend(residuals, none, none, np.ones(len(names))).point
     which = [model.names.index(name) for name in names]
     found = np.clip(middle + spread * steps, model.ends.low[which], model.ends.high[which])
     return dict(zip(names, found.tolist(), strict=True))
+
+
+def _is_determined(model: ContourModel, loaded: Flags) -> bool:
+    """Return True if the rod and what is unknown of the rig have that redundancy, with enough loaded samples."""
+    names, rod = model.nuisances.names, model.likelihood.rod
+    return (
+        bool(names)
+        and bool(np.count_nonzero(loaded) >= _SAMPLES_PER_PARAMETER * len(names))
+        and len(present_channels(model.measured)) == len(CHANNELS)
+        and not carried_sweeps(model.measured)
+        and rod.is_uniform
+        and rod.mean_rest_curvature == 0.0
+        and rod.stem <= 0.0
+        and not any(part in name for name in names for part in _NOT_LINEAR)
+    )

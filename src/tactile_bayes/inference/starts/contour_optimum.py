@@ -7,95 +7,59 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri
 
-from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import Logarithms
+from tactile_bayes.inference.least_squares import Optimum, descend, optima
 from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.parameters.nuisances import BIASES
 from tactile_bayes.inference.starts.axial_rig import axial_rig
-from tactile_bayes.inference.starts.start import Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.rig.corrected import corrected
 
-__all__ = [
-    "ContourOptimum",
-    "certainly_loaded",
-    "contact_fit",
-    "fitted_noise",
-    "optima_of",
-    "optimum_of",
-]
+__all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
 
 _PRIOR_DRAWS = 1000
+# Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
+# early, since a sample at an event is loaded or not.
 _CANDIDATES = 24
-"""Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
-early, since a sample at an event is loaded or not."""
-
-_EVENT_TOLERANCE = 0.1
-"""Distance of an event outside its bracket that counts as a residual of one, over the width of the bracket."""
-
-_FALSE_ALARM = 1e-7
-"""Probability that noise alone makes an unloaded sample look loaded."""
-
-_MAX_LOG_DISTANCE = 12.0
-"""Largest distance of the logarithm of a positive parameter from its prior median during a search, in prior spreads."""
-
-_MISSING_EVENT_RESIDUAL = 1000.0
-"""Residual of an event that does not occur."""
-
-_MAX_RELATIVE_SD = 2.0
-"""Largest standard deviation of a contact normal to the contour, over the median one, for a fit of the contour."""
-
+_EVENT_TOLERANCE = 0.1  # distance outside its bracket that counts as a residual of one, over its width
+_MAX_LOG_DISTANCE = 12.0  # of the log of a parameter from its prior median in a search, in prior spreads
+_MISSING_EVENT_RESIDUAL = 1000.0  # residual of an event that does not occur
+_MAX_RELATIVE_SD = 2.0  # of a contact normal to the contour, over the median one, for a fit
+# Gain in coarse log-likelihood beyond the end of a prior above which the prior is reported as too narrow, and the cost
+# per residual there below which the gain is believed.
 _MIN_GAIN, _MAX_COST = 100.0, 5.0
-"""Gain in coarse log-likelihood beyond the end of a prior above which the prior is reported as too narrow, and the cost
-per residual there below which the gain is believed."""
-
-_DISCREPANCY_SPREAD = 0.4
-"""Standard deviation of the logarithms of scale and length of a discrepancy, before they are known."""
-
-_MAX_RESIDUAL = 100.0
-"""Largest residual in standard deviations from which a discrepancy is estimated."""
-
-_MAX_TRIED = 9
-"""Number of searches after which the best optimum is taken though it does not explain the record."""
-
-_MAX_COST_RATIO = 0.9
-"""Largest share of the cost that a search from Step 2's contacts may leave for its result to be taken."""
+_DISCREPANCY_SPREAD = 0.4  # deviation of the logs of its scale and length, before they are known
+_MAX_RESIDUAL = 100.0  # largest residual in standard deviations from which a discrepancy is estimated
+_MAX_TRIED = 9  # number of searches after which the best optimum is taken though it does not explain the record
+_MAX_COST_RATIO = 0.9  # share of the cost that a search from Step 2's contacts may leave to be taken
 
 
 class ContourOptimum(NamedTuple):
     """Robust least-squares solution for all parameters."""
 
-    point: Floats
-    """Shape (parameters,)."""
-    covariance: Floats
-    """Coarse posterior covariance of the model's coordinates, shape (parameters, parameters)."""
-    cost: float
-    """Robust least-squares cost."""
-    fits: bool
-    """True if the assumed noise explains the residuals."""
-    beyond: str = ""
-    """Parameters that fit the record far better beyond the ends of their priors, as text; else empty."""
+    point: Floats  # shape (parameters,)
+    covariance: Floats  # coarse posterior covariance of the model's coordinates, shape (parameters, parameters)
+    cost: float  # robust least-squares cost
+    fits: bool  # True if the assumed noise explains the residuals
+    beyond: str = ""  # parameters that fit the record far better beyond the ends of their priors, as text; else empty
 
 
 class Brackets(NamedTuple):
     """Drive angles as read, in the sweep frame, between which contact begins or ends; one entry per event."""
 
-    segment: Index
-    """Number of the sweep segment."""
-    ends: Index
-    """0 for first contact, 1 for snap-off."""
+    segment: Index  # number of the sweep segment
+    ends: Index  # 0 for first contact, 1 for snap-off
     low: Floats
     high: Floats
-    width: Floats
-    """Distance outside that counts as a residual of one [rad]."""
+    width: Floats  # distance outside that counts as a residual of one [rad]
 
     def at(self, events: Floats) -> Floats:
         """Select the bracketed events from all events, (n, segments, 2), as (n, events); NaN if one does not occur."""
@@ -123,20 +87,12 @@ def event_brackets(model: ContourModel) -> Brackets:
             width = _EVENT_TOLERANCE * (angle[after] - angle[before])
             rows.append((of_sample[before], ends, angle[before], angle[after], width))
     found = {row[0] for row in rows}
-    for segment, (before, first, last, after) in enumerate(segments.event_samples(certainly_loaded(model))):
+    for segment, (before, first, last, after) in enumerate(segments.event_samples(model.certainly_loaded)):
         if segment not in found and before >= 0 and after >= 0:  # contact is too brief for its loads to show events
             width = _EVENT_TOLERANCE * (angle[after] - angle[before]) / 2.0
             rows += [(segment, 0, -np.inf, angle[first], width), (segment, 1, angle[last], angle[after], width)]
     columns = np.array(rows, dtype=float).reshape(-1, 5).T
     return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
-
-
-def certainly_loaded(model: ContourModel) -> Flags:
-    """Return True for samples whose load noise does not explain, each taken by itself, above the zero of the record."""
-    measured, present = model.likelihood.measured[:, model.present], model.present
-    zero = np.where(np.isfinite(model.zero[present]), model.zero[present], np.median(measured, axis=0))
-    squared_distance = np.square((measured - zero) / model.deviations[:, present]).sum(axis=1)
-    return np.asarray(squared_distance > chdtri(np.count_nonzero(present), _FALSE_ALARM))
 
 
 def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
@@ -256,7 +212,7 @@ class _Search:
 
     def by_axial_rig(self) -> Optimum | None:
         """Optimum of the search from Step 2's contacts with the rig that axial forces show; None without."""
-        rig = axial_rig(self.model, certainly_loaded(self.model))
+        rig = axial_rig(self.model, self.model.certainly_loaded)
         fitted = None if rig is None else contact_fit(self.model, rig)
         if rig is None or fitted is None:
             return None

@@ -13,25 +13,18 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
+from tactile_bayes.inference.coordinates.flank import FlankCoordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import (
-    ANYTHING,
-    Coordinates,
-    Ends,
-    Mixture,
-    Proposal,
-    Proposing,
-    SamplerSettings,
-    approximate,
-    in_coordinates,
-    learn_coordinates,
-    scatter_walkers,
-    standardise,
-)
+from tactile_bayes.inference.densities import ANYTHING, Ends, Mixture, Proposal
+from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
+from tactile_bayes.inference.importance import approximate
 from tactile_bayes.inference.misfit import what_to_try
+from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
+from tactile_bayes.inference.starts.cloud import Cloud, gather
 from tactile_bayes.inference.starts.contour_optimum import (
     ContourOptimum,
     contact_fit,
@@ -39,65 +32,39 @@ from tactile_bayes.inference.starts.contour_optimum import (
     optima_of,
     optimum_of,
 )
-from tactile_bayes.inference.starts.flank_coordinates import FlankCoordinates
-from tactile_bayes.inference.starts.start import Cloud, gather
+from tactile_bayes.inference.starts.pilot import learn_coordinates, standardise
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
-__all__ = ["Walk", "walk_of"]
+__all__ = ["Walk", "flank_at_contacts", "walk_of"]
 
+# Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
+# noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable.
 _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7
-"""Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
-noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable."""
-
-_MANY_SAMPLES = 100
-"""Number of loaded samples from which an optimum that explains the record is taken for the only one."""
-
-_MAX_SEARCHES = 9
-"""Number of searches after which no other begins, unless none of them explains a record of few loaded samples."""
-
+_MANY_SAMPLES = 100  # loaded ones, from which an optimum that explains the record is taken for the only one
+_MAX_SEARCHES = 9  # after which no other begins, unless none of them explains a record of few loaded samples
+# Searches that end in known modes, after which no other mode is expected: for a record of many loaded samples, and for
+# any record if the posterior is nearly normal around the last mode found.
 _REPEATS, _REPEATS_FEW_SAMPLES = 2, 4
-"""Number of searches that end in known modes, after which no other mode is expected: for a record of many loaded
-samples, and for any record if the posterior is nearly normal around the last mode found."""
-
-_EFFICIENT = 0.35
-"""Efficiency of a proposal above which the posterior is nearly normal around it."""
-
+_EFFICIENT = 0.35  # efficiency of a proposal above which the posterior is nearly normal around it
+# Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred: a
+# ridge that bends beyond the draws of the importance sampling looks straight.
 _FLANK_EFFICIENCY = 0.4
-"""Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred:
-a ridge that bends beyond the draws of the importance sampling looks straight."""
-
-_PILOT_WALKERS = 6
-"""Largest number of walkers per parameter in the pilot run that learns coordinates."""
-
-_SCALE_DRAWS = 500
-"""Number of draws from which the prior scale of a coordinate, or the extent of a proposal, is estimated."""
-
-_MAX_EXCESS_COST = 100.0
-"""Cost above the smallest one from which an optimum is disregarded."""
-
-_MODE_RADIUS = 3.0
-"""Distance from a mode, over that of typical points of its proposal, below which an optimum belongs to it."""
-
-_MAX_LOG_MASS_RATIO = 9.0
-"""Logarithm of the ratio of two masses from which the smaller mode is left out: one draw in ten thousand."""
-
-_LIKELIEST = 3
-"""Number of draws of the prior from which a mode is sought, if the record's contact points do not lead to one."""
-
-_POOR_MISFIT = 2.0
-"""Mean square of the standardised residuals above which a further search is made."""
+_PILOT_WALKERS = 6  # per parameter in the pilot run that learns coordinates, at most
+_SCALE_DRAWS = 500  # from which the prior scale of a coordinate, or the extent of a proposal, is estimated
+_MAX_EXCESS_COST = 100.0  # above the smallest cost, from which an optimum is disregarded
+_MODE_RADIUS = 3.0  # distance from a mode, over that of typical points of its proposal, within which an optimum is its
+_MAX_LOG_MASS_RATIO = 9.0  # from which the smaller mode is left out: one draw in ten thousand
+_LIKELIEST = 3  # draws of the prior from which a mode is sought, if the record's contact points do not lead to one
+_POOR_MISFIT = 2.0  # mean square of the standardised residuals above which a further search is made
 
 
 class Walk(NamedTuple):
     """Starting points of the walkers, and the coordinates in which they are sampled."""
 
-    start: Floats
-    """Shape (ensemble, walker, coordinate)."""
+    start: Floats  # (ensemble, walker, coordinate)
     coordinates: Coordinates
-    log_evidence: float = -np.inf
-    """Coarse log-evidence of the model, up to a constant of the number of parameters."""
-    beyond: str = ""
-    """Parameters that fit the record far better beyond the ends of their priors, as text."""
+    log_evidence: float = -np.inf  # coarse one of the model, up to a constant of the number of parameters
+    beyond: str = ""  # parameters that fit the record far better beyond the ends of their priors, as text
 
 
 def walk_of(
@@ -107,95 +74,122 @@ def walk_of(
 
     After the deadline every search ends with its present step, and walkers start at any point of finite density.
     """
-    rng = np.random.default_rng(seed)
-    if isinstance(model.family, ShapeFreeFamily):
-        return _whitened(model, seed, rng, settings, deadline)
-    return _scattered(model, seed, rng, settings, deadline)
+    start = _Start(model, seed, np.random.default_rng(seed), settings, deadline)
+    return start.whitened() if isinstance(model.family, ShapeFreeFamily) else start.scattered()
 
 
-def _whitened(
-    model: ContourModel,
-    seed: np.random.SeedSequence,
-    rng: np.random.Generator,
-    settings: SamplerSettings,
-    deadline: Deadline,
-) -> Walk:
-    """Return the start in nearly standard normal coordinates, with no more walkers than span them."""
-    whitening = _best_whitening(model, rng, deadline)
-    try:
-        return _whitened_around(model, whitening, whitening.middle, seed, rng, settings, deadline)
-    except InferenceError as error:
-        if not deadline.has_passed:
-            raise _nothing_describes(model, "shape-free contour") from error
-    # Time is up, and nothing near where the search ended is possible: what is, however far from the record, will do.
-    drawn, _ = model.draw_prior(rng, _SCALE_DRAWS, deadline)
-    point = drawn[np.argmax(model.log_probability(drawn))]
-    whitening = whitening_at(model, point, rng, deadline)
-    return _whitened_around(model, whitening, whitening.of(point[None])[0], seed, rng, settings, deadline)
+class _Start(NamedTuple):
+    """What the start of a posterior's walkers depends on."""
 
+    model: ContourModel
+    seed: np.random.SeedSequence
+    rng: np.random.Generator
+    settings: SamplerSettings
+    deadline: Deadline
 
-def _best_whitening(model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> Whitening:
-    """Return coordinates at the best mode that the first starting points lead to of which one explains the record."""
-    best: tuple[tuple[bool, float, float], Whitening] | None = None
-    for points in _starting_points(model, rng, deadline):
-        for point in points:
-            if best is None or not deadline.has_passed:
-                whitening = whitening_at(model, point, rng, deadline)
-                misfit = _misfit(model, whitening.centre)
-                rank = misfit < _POOR_MISFIT, float(model.log_probability(whitening.centre[None])[0]), -misfit
-                if best is None or rank > best[0]:
-                    best = rank, whitening
-        if best is not None and (best[0][0] or deadline.has_passed):
-            break
-    assert best is not None  # a search has a result, or raises
-    return best[1]
+    def whitened(self) -> Walk:
+        """Return the start in nearly standard normal coordinates, with no more walkers than span them."""
+        model, rng, deadline = self.model, self.rng, self.deadline
+        whitening = self._best_whitening()
+        try:
+            return self._whitened_around(whitening, whitening.middle)
+        except InferenceError as error:
+            if not deadline.has_passed:
+                raise _nothing_describes(model, "shape-free contour") from error
+        # Time is up, and nothing near where the search ended is possible: what is, however far off, will do.
+        drawn, _ = model.draw_prior(rng, _SCALE_DRAWS, deadline)
+        point = drawn[np.argmax(model.log_probability(drawn))]
+        whitening = whitening_at(model, point, rng, deadline)
+        return self._whitened_around(whitening, whitening.of(point[None])[0])
 
+    def _best_whitening(self) -> Whitening:
+        """Return coordinates at the best mode to which the first points lead of which one explains the record."""
+        best: tuple[tuple[bool, float, float], Whitening] | None = None
+        for points in self._starting_points():
+            for point in points:
+                if best is None or not self.deadline.has_passed:
+                    whitening = whitening_at(self.model, point, self.rng, self.deadline)
+                    misfit, centre = _misfit(self.model, whitening.centre), whitening.centre[None]
+                    rank = misfit < _POOR_MISFIT, float(self.model.log_probability(centre)[0]), -misfit
+                    if best is None or rank > best[0]:
+                        best = rank, whitening
+            if best is not None and (best[0][0] or self.deadline.has_passed):
+                break
+        assert best is not None  # a search has a result, or raises
+        return best[1]
 
-def _starting_points(model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> Iterator[Iterable[Floats]]:
-    """Yield parameters fitted to Step 2's contacts, the likeliest of some draws of the prior, and those of a search."""
-    by_contacts = contact_fit(model)
-    if by_contacts is not None:
-        of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
-        rest = (model.prior_medians(model.nuisances.names), of_white, model.prior_medians(model.noise.of_discrepancy))
-        yield [np.concatenate([by_contacts, *rest])]
-    drawn, _ = model.draw_prior(rng, _SCALE_DRAWS, deadline)
-    yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
-    yield [optimum_of(model, rng, deadline).point]
+    def _starting_points(self) -> Iterator[Iterable[Floats]]:
+        """Yield parameters fitted to Step 2's contacts, the likeliest of some draws of the prior, those of a search."""
+        model = self.model
+        by_contacts = contact_fit(model)
+        if by_contacts is not None:
+            of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
+            of_rig, of_discrepancy = map(model.prior_medians, (model.nuisances.names, model.noise.of_discrepancy))
+            yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
+        drawn, _ = model.draw_prior(self.rng, _SCALE_DRAWS, self.deadline)
+        yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
+        yield [optimum_of(model, self.rng, self.deadline).point]
 
+    def _whitened_around(self, whitening: Whitening, centre: Floats) -> Walk:
+        """Return the start around a centre, in whitening coordinates."""
+        noise, count, deadline = self.model.noise, centre.size, self.deadline
+        log_probability = in_coordinates(self.model.log_probability, whitening)
+        spread = np.full(count, _WHITENED_SPREAD)
+        spread[: whitening.bent] = _ROUGHNESS_SPREAD
+        spread[2 : 2 + len(noise.of_white)] = _NOISE_SPREAD
+        cloud = gather(log_probability, centre, np.diag(np.square(spread)), self.rng, deadline)
+        if not cloud.is_possible:
+            raise InferenceError("nothing near is possible")
+        start = scatter_walkers(
+            lambda points: np.where(log_probability(points) > cloud.floor_by(deadline), 0.0, -np.inf),
+            cloud.draw,
+            parameters=count,
+            seed=self.seed,
+            settings=replace(self.settings, walkers=self.settings.walkers or max(48, 2 * count)),
+        )
+        # If posteriors are standard normal in these coordinates, evidences differ as densities at the centre.
+        log_evidence = float(log_probability(whitening.middle[None])[0])
+        rest = slice(whitening.bent, None)
+        whitening, start = standardise(self.model.log_probability, whitening, start, rest, self.rng, deadline)
+        return Walk(start, whitening, log_evidence)
 
-def _whitened_around(
-    model: ContourModel,
-    whitening: Whitening,
-    centre: Floats,
-    seed: np.random.SeedSequence,
-    rng: np.random.Generator,
-    settings: SamplerSettings,
-    deadline: Deadline,
-) -> Walk:
-    """Return the start around a centre, in whitening coordinates."""
-    log_probability = in_coordinates(model.log_probability, whitening)
-    spread = np.full(centre.size, _WHITENED_SPREAD)
-    spread[: whitening.bent] = (
-        [_ROUGHNESS_SPREAD] * 2
-        + [_NOISE_SPREAD] * len(model.noise.of_white)
-        + [_ROUGHNESS_SPREAD] * len(model.noise.of_discrepancy)
-    )
-    cloud = gather(log_probability, centre, np.diag(np.square(spread)), rng, deadline)
-    if not cloud.is_possible:
-        raise InferenceError("nothing near is possible")
-    count = len(spread)
-    start = scatter_walkers(
-        lambda points: np.where(log_probability(points) > cloud.floor_by(deadline), 0.0, -np.inf),
-        cloud.draw,
-        parameters=count,
-        seed=seed,
-        settings=replace(settings, walkers=settings.walkers or max(48, 2 * count)),
-    )
-    # If posteriors are standard normal in these coordinates, their evidences differ as their densities at the centre.
-    log_evidence = float(log_probability(whitening.middle[None])[0])
-    rest = slice(whitening.bent, None)
-    whitening, start = standardise(model.log_probability, whitening, start, rest, rng, deadline)
-    return Walk(start, whitening, log_evidence)
+    def scattered(self) -> Walk:
+        """Return walkers scattered twice as widely as normal approximations of the modes, which serve as proposals."""
+        model, rng, deadline = self.model, self.rng, self.deadline
+        modes = _Modes(model, rng, deadline).found_by_search()
+        if len({mode.coordinates.digest for mode in modes}) > 1:
+            modes = [mode.usual or mode for mode in modes]
+        common = modes[0].coordinates
+        proposal = Mixture(tuple(mode.proposal for mode in modes))
+
+        def floor() -> float:
+            return min(mode.cloud.floor_by(deadline) for mode in modes)
+
+        def draw(rng: np.random.Generator, count: int) -> Floats:
+            counts = rng.multinomial(count, proposal.shares)
+            points = [mode.cloud.draw(rng, int(each)) for mode, each in zip(modes, counts, strict=True)]
+            return common.parameters(np.concatenate(points)[rng.permutation(count)])[0]
+
+        try:
+            start = scatter_walkers(
+                lambda points: np.where(model.log_probability(points) > floor(), 0.0, -np.inf),
+                draw,
+                parameters=len(model.names),
+                seed=self.seed,
+                settings=self.settings,
+            )
+        except InferenceError as error:
+            point = modes[0].optimum.point
+            best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
+            raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
+        coordinates = common.with_proposal(proposal)
+        # Beside a discrepancy the posterior is a funnel, which no linear change of coordinates straightens.
+        if proposal.efficiency < _EFFICIENT and not model.noise.of_discrepancy and not deadline.has_passed:
+            size = len(model.names)
+            pilot, scale = start.reshape(-1, size)[: _PILOT_WALKERS * size], _prior_scale(model, common, rng)
+            coordinates = learn_coordinates(model.log_probability, coordinates, pilot, scale, rng, deadline)
+        log_evidence = float(logsumexp([mode.proposal.log_mass for mode in modes]))
+        return Walk(coordinates.of(start), coordinates, log_evidence, modes[0].optimum.beyond)
 
 
 def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> InferenceError:
@@ -219,144 +213,108 @@ class _Mode(NamedTuple):
     optimum: ContourOptimum
     cloud: Cloud
     proposal: Proposal
-    coordinates: Proposing
-    """Coordinates of the cloud and the proposal."""
-    usual: _Mode | None = None
-    """The mode in the model's own coordinates, if those are others."""
-
-    @property
-    def flank(self) -> FlankCoordinates | None:
-        return self.coordinates if isinstance(self.coordinates, FlankCoordinates) else None
+    coordinates: Coordinates  # of the cloud and the proposal
+    usual: _Mode | None = None  # the mode in the model's own coordinates, if those are others
 
 
-def _scattered(
-    model: ContourModel,
-    seed: np.random.SeedSequence,
-    rng: np.random.Generator,
-    settings: SamplerSettings,
-    deadline: Deadline,
-) -> Walk:
-    """Return walkers scattered twice as widely as normal approximations of the modes, which then serve as proposals."""
-    modes = _modes(model, rng, deadline)
-    if len({mode.coordinates.digest for mode in modes}) > 1:
-        modes = [mode.usual or mode for mode in modes]
-    common = modes[0].coordinates
-    proposal = Mixture(tuple(mode.proposal for mode in modes))
+class _Modes:
+    """Modes of the posterior that were found so far."""
 
-    def floor() -> float:
-        return min(mode.cloud.floor_by(deadline) for mode in modes)
+    def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
+        self.model, self.rng, self.deadline = model, rng, deadline
+        self.found: list[_Mode] = []
 
-    def draw(rng: np.random.Generator, count: int) -> Floats:
-        counts = rng.multinomial(count, proposal.shares)
-        points = [mode.cloud.draw(rng, int(each)) for mode, each in zip(modes, counts, strict=True)]
-        return common.parameters(np.concatenate(points)[rng.permutation(count)])[0]
+    def found_by_search(self) -> list[_Mode]:
+        """Return modes of the posterior, that with the most mass first.
 
-    try:
-        start = scatter_walkers(
-            lambda points: np.where(model.log_probability(points) > floor(), 0.0, -np.inf),
-            draw,
-            parameters=len(model.names),
-            seed=seed,
-            settings=settings,
-        )
-    except InferenceError as error:
-        point = modes[0].optimum.point
-        best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
-        raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
-    coordinates = common.with_proposal(proposal)
-    # Beside a discrepancy the posterior is a funnel, which no linear change of coordinates straightens.
-    if proposal.efficiency < _EFFICIENT and not model.noise.of_discrepancy and not deadline.has_passed:
-        size = len(model.names)
-        pilot, scale = start.reshape(-1, size)[: _PILOT_WALKERS * size], _prior_scale(model, common, rng)
-        coordinates = learn_coordinates(model.log_probability, coordinates, pilot, scale, rng, deadline)
-    log_evidence = float(logsumexp([mode.proposal.log_mass for mode in modes]))
-    return Walk(coordinates.of(start), coordinates, log_evidence, modes[0].optimum.beyond)
+        There is one if it explains a record of many loaded samples; else there are all to which searches lead, except
+        those of little mass.
+        """
+        found = self.found
+        for optimum in sorted(self._not_explaining(), key=lambda one: one.cost):
+            least = min((mode.optimum.cost for mode in found), default=optimum.cost)
+            late = found and self.deadline.has_passed
+            if optimum.cost < least + _MAX_EXCESS_COST and not late and not self._is_known(optimum):
+                found.append(self._around(optimum))
+        if not found:
+            raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
+        found.sort(key=lambda mode: -mode.proposal.log_mass)
+        least_mass = found[0].proposal.log_mass - _MAX_LOG_MASS_RATIO
+        return [mode for mode in found if mode is found[0] or mode.proposal.log_mass > least_mass]
+
+    def _not_explaining(self) -> list[ContourOptimum]:
+        """Search, find the modes of optima that explain the record, and return the other optima."""
+        others, repeats = [], 0
+        many_samples = bool(np.count_nonzero(~self.model.found["unloaded"].values) >= _MANY_SAMPLES)
+        for tried, optimum in enumerate(optima_of(self.model, self.rng, self.deadline), start=1):
+            if not optimum.fits:
+                others.append(optimum)
+            elif self._is_known(optimum):
+                repeats += 1
+            else:
+                self.found.append(self._around(optimum))
+            if self._are_all(repeats, tried, many_samples):
+                break
+        return others
+
+    def _are_all(self, repeats: int, tried: int, many_samples: bool) -> bool:
+        """Return True if no further search is worth while, after so many, of which so many ended in known modes."""
+        normal = bool(self.found) and self.found[-1].proposal.efficiency > _EFFICIENT
+        if many_samples and (normal or repeats == _REPEATS):
+            return True
+        if normal and repeats == _REPEATS_FEW_SAMPLES:
+            return True
+        return tried >= _MAX_SEARCHES and (bool(self.found) or many_samples)
+
+    def _is_known(self, optimum: ContourOptimum) -> bool:
+        """Return True if an optimum belongs to a mode that was found before."""
+        point = optimum.point[None]
+        far = _MODE_RADIUS * np.sqrt(point.size)
+        return any(np.linalg.norm(mode.proposal.steps(mode.coordinates.of(point))) < far for mode in self.found)
+
+    def _around(self, optimum: ContourOptimum) -> _Mode:
+        """Approximate a mode around an optimum, in the coordinates in which the posterior is nearer to a normal one.
+
+        Modes on the same flank share the coordinates of the first.
+        """
+        model, point = self.model, optimum.point
+        usual = self._in(model.coordinates, optimum, optimum.covariance, model.walked_ends)
+        if usual.proposal.efficiency > _EFFICIENT or self.deadline.has_passed:
+            return usual
+        flanks = dict.fromkeys([*(mode.coordinates for mode in self.found), flank_at_contacts(model, point)])
+        for flank in flanks:  # each once, since modes share them
+            if not isinstance(flank, FlankCoordinates):
+                continue
+            covariance = flank.covariance(point, optimum.covariance)
+            if not np.isfinite(covariance).all():  # the vertex is too near, or on the other side
+                continue
+            mode = self._in(flank, optimum, covariance)._replace(usual=usual)
+            is_better = bool(self.found) or mode.proposal.efficiency > _FLANK_EFFICIENCY * usual.proposal.efficiency
+            if is_better and not flank.reach_vertex(mode.proposal.draw(self.rng, _SCALE_DRAWS)[0]):
+                return mode
+        return usual
+
+    def _in(
+        self, coordinates: Coordinates, optimum: ContourOptimum, covariance: Floats, ends: Ends = ANYTHING
+    ) -> _Mode:
+        target, centre = in_coordinates(self.model.log_probability, coordinates), coordinates.of(optimum.point[None])[0]
+        cloud = gather(target, centre, covariance, self.rng, self.deadline, ends)
+        proposal = approximate(target, cloud.centre, cloud.narrow_covariance, self.rng, self.deadline, ends)
+        return _Mode(optimum, cloud, proposal, coordinates)
 
 
-def _prior_scale(model: ContourModel, coordinates: Proposing, rng: np.random.Generator) -> Floats:
+def _prior_scale(model: ContourModel, coordinates: Coordinates, rng: np.random.Generator) -> Floats:
     """Return half the width of the central two thirds of each coordinate's prior."""
     draws = np.stack([model.priors[name].rvs(_SCALE_DRAWS, random_state=rng) for name in model.names], axis=1)
     low, high = np.nanquantile(coordinates.of(draws), [0.16, 0.84], axis=0)
     return np.asarray(0.5 * (high - low))
 
 
-def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> list[_Mode]:
-    """Return modes of the posterior, that with the most mass first.
-
-    There is one if it explains a record of many loaded samples; else there are all to which searches lead, except those
-    of little mass.
-    """
-    found: list[_Mode] = []
-    unexplained: list[ContourOptimum] = []
-    many_samples = np.count_nonzero(~model.found["unloaded"].values) >= _MANY_SAMPLES
-    repeats = 0
-    for tried, optimum in enumerate(optima_of(model, rng, deadline), start=1):
-        if not optimum.fits:
-            unexplained.append(optimum)
-        elif _is_known(optimum, found):
-            repeats += 1
-        else:
-            found.append(_mode(model, optimum, found, rng, deadline))
-        normal = bool(found) and found[-1].proposal.efficiency > _EFFICIENT
-        if many_samples and (normal or repeats == _REPEATS):
-            break
-        if normal and repeats == _REPEATS_FEW_SAMPLES:
-            break
-        if tried >= _MAX_SEARCHES and (found or many_samples):
-            break
-    for optimum in sorted(unexplained, key=lambda one: one.cost):
-        least = min((mode.optimum.cost for mode in found), default=optimum.cost)
-        late = found and deadline.has_passed
-        if optimum.cost < least + _MAX_EXCESS_COST and not late and not _is_known(optimum, found):
-            found.append(_mode(model, optimum, found, rng, deadline))
-    if not found:
-        raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
-    found.sort(key=lambda mode: -mode.proposal.log_mass)
-    least_mass = found[0].proposal.log_mass - _MAX_LOG_MASS_RATIO
-    return [mode for mode in found if mode is found[0] or mode.proposal.log_mass > least_mass]
-
-
-def _is_known(optimum: ContourOptimum, found: list[_Mode]) -> bool:
-    """Return True if an optimum belongs to a mode that was found before."""
-    point = optimum.point[None]
-    far = _MODE_RADIUS * np.sqrt(point.size)
-    return any(np.linalg.norm(mode.proposal.steps(mode.coordinates.of(point))) < far for mode in found)
-
-
-def _mode(
-    model: ContourModel, optimum: ContourOptimum, found: list[_Mode], rng: np.random.Generator, deadline: Deadline
-) -> _Mode:
-    """Approximate a mode around an optimum, in the coordinates in which the posterior is nearer to a normal one.
-
-    Modes on the same flank share the coordinates of the first.
-    """
-    usual = _mode_in(model, optimum, model.coordinates, optimum.covariance, rng, deadline, model.walked_ends)
-    if usual.proposal.efficiency > _EFFICIENT or deadline.has_passed:
-        return usual
-    flanks = [*(mode.flank for mode in found), FlankCoordinates.at_contacts(model, optimum.point)]
-    for flank in dict.fromkeys(flanks):  # each once, since modes share them
-        if flank is None:
-            continue
-        covariance = flank.covariance(optimum.point, optimum.covariance)
-        if not np.isfinite(covariance).all():  # the vertex is too near, or on the other side
-            continue
-        mode = _mode_in(model, optimum, flank, covariance, rng, deadline)._replace(usual=usual)
-        is_better = bool(found) or mode.proposal.efficiency > _FLANK_EFFICIENCY * usual.proposal.efficiency
-        if is_better and not flank.reach_vertex(mode.proposal.draw(rng, _SCALE_DRAWS)[0]):
-            return mode
-    return usual
-
-
-def _mode_in(
-    model: ContourModel,
-    optimum: ContourOptimum,
-    coordinates: Proposing,
-    covariance: Floats,
-    rng: np.random.Generator,
-    deadline: Deadline,
-    ends: Ends = ANYTHING,
-) -> _Mode:
-    target = in_coordinates(model.log_probability, coordinates)
-    cloud = gather(target, coordinates.of(optimum.point[None])[0], covariance, rng, deadline, ends)
-    proposal = approximate(target, cloud.centre, cloud.narrow_covariance, rng, deadline, ends)
-    return _Mode(optimum, cloud, proposal, coordinates)
+def flank_at_contacts(model: ContourModel, point: Floats) -> FlankCoordinates | None:
+    """Return coordinates of a flank at the middle of the contacts predicted at a point, shape (parameters,)."""
+    if not FlankCoordinates.describe(model.family.name):
+        return None
+    at = point[None]
+    events = events_of(model.likelihood, model.contours(at), model.rig(at), exact=False)
+    x = float(np.mean([events["first_contact_x"], events["snap_off_contact_x"]]))
+    return FlankCoordinates.at(model.family.name, model.names, model.coordinates, point, x)

@@ -16,22 +16,18 @@ from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import (
-    check_function,
-    check_numbers,
-    check_path,
-    check_whole_number,
-)
+from tactile_bayes.checks import check_function, check_numbers, check_path, check_whole_number
 from tactile_bayes.errors import InferenceError, RecordError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import identity_of
+from tactile_bayes.inference.densities import effective_number, normalised
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings
-from tactile_bayes.inference.ensembles.identity import changes
+from tactile_bayes.inference.ensembles.checkpoint import changes
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import STREAMED, provenance
-from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, WIDER, Particles, effective_number
+from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, WIDER, Particles
 from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, tree_of
 from tactile_bayes.numerics.random_numbers import Rng, child, seed_sequence, whole_seed
 from tactile_bayes.numerics.selection import resampled
@@ -41,14 +37,9 @@ from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["LEVELS", "Stream", "surprise_after"]
 
-LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
-"""Levels of the quantiles of parameters and of the band."""
-
-_MOST_SURPRISE = 700.0
-"""Largest logarithm of an e-value that is stated, which is finite."""
-
-_PRIOR_DRAWS = 4000
-"""Number of draws from the prior for the share of contours within reach."""
+LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)  # levels of the quantiles of parameters and of the band
+_MOST_SURPRISE = 700.0  # largest logarithm of an e-value that is stated, which is finite
+_PRIOR_DRAWS = 4000  # number of draws from the prior for the share of contours within reach
 
 
 class Stream:
@@ -224,7 +215,7 @@ class Stream:
         """
         state = self._known_state()
         model, random = state.experiment.model, self._random(1, state.updates)
-        left = effective_number(state.log_weights)
+        left = float(effective_number(normalised(state.log_weights)))
         if state.rise > SETTLED:
             fault = "; not converged, they had lost the posterior and are on their way to it: take more from the start"
         elif state.correlation >= DECORRELATED:
@@ -388,7 +379,7 @@ class Stream:
             {
                 "samples": state.record.sizes["sample"],
                 "log_evidence": state.log_integral - np.log(state.share),
-                "effective_number": effective_number(state.log_weights),
+                "effective_number": float(effective_number(normalised(state.log_weights))),
                 "correlation": state.correlation,
                 "log_density_shift": state.shift,
                 "log_density_rise": state.rise,

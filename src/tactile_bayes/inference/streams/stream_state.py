@@ -21,9 +21,7 @@ from tactile_bayes.tasks.documents import read_json
 __all__ = ["StoredState", "StreamState", "read_tree", "state_in", "tree_of"]
 
 _KIND = "stream of tactile-bayes"
-
 _FORMAT = 2
-
 _HOW = "begin a new stream, or put a copy of the file back"
 
 
@@ -33,27 +31,18 @@ class StreamState:
 
     record: xr.Dataset
     experiment: Experiment
-    points: Floats
-    """Particles, shape (n, parameters of the model)."""
-    values: Floats
-    """Logarithm of prior times likelihood of the particles, shape (n,)."""
-    log_weights: Floats
-    """Shape (n,), normalised."""
+    points: Floats  # particles, shape (n, parameters of the model)
+    values: Floats  # logarithm of prior times likelihood of the particles, shape (n,)
+    log_weights: Floats  # shape (n,), normalised
+    # Logarithms of the products of ratios of `Particles`, each from one of the blocks on and with the prior weight of
+    # that block, summed over these; shape (factors,).
     log_products: Floats
-    """Logarithms of the products of ratios of `Particles`, each from one of the blocks on and with the prior weight of
-    that block, summed over these; shape (factors,)."""
-    log_integral: float
-    """Logarithm of the integral of prior times likelihood."""
-    share: float
-    """Share of the prior within reach."""
-    correlation: float
-    """Correlation of the last steps of any update; NaN if there were none."""
-    shift: float
-    """Largest one of all updates, as of `Particles`."""
-    rise: float
-    """That of the last stage of any update, as of `Particles`; 0 if there was none."""
-    surprise: float
-    """Logarithm of the largest e-value so far."""
+    log_integral: float  # logarithm of the integral of prior times likelihood
+    share: float  # share of the prior within reach
+    correlation: float  # correlation of the last steps of any update; NaN if there were none
+    shift: float  # largest one of all updates, as of `Particles`
+    rise: float  # that of the last stage of any update, as of `Particles`; 0 if there was none
+    surprise: float  # logarithm of the largest e-value so far
     updates: int
     evaluations: int
     seconds: float

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.equilibrium import (
+    BY_FORCE,
+    NO_FORCE,
     SETTLED,
     Balance,
-    Equilibrium,
-    Loaded,
     Scene,
     balance,
     in_phase,
@@ -23,16 +23,16 @@ from tactile_bayes.mechanics.branches.leg import first_equilibrium
 from tactile_bayes.mechanics.branches.limits import Approach, approach, arrival
 from tactile_bayes.mechanics.branches.line import line_of, only_turns, pose_at
 from tactile_bayes.mechanics.branches.outline import Outline, from_base
+from tactile_bayes.mechanics.branches.phase import touching
 from tactile_bayes.mechanics.branches.slip import NOT_SLIPPING, slip
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.reachability import Reachability
 
 __all__ = ["Beginning", "beginning"]
 
 _TOUCHES, _TOUCHES_TWICE = int(Reachability.TOUCHES), int(Reachability.TOUCHES_TWICE)
 _SLIPS_OFF, _STICKS = int(Reachability.SLIPS_OFF), int(Reachability.STICKS)
-
-_BY_FORCE, _NO_FORCE = Equilibrium(0.0, 0.0, 1.0), Equilibrium(0.0, 0.0, 0.0)
 
 _NOT_TURNED = 1e-3
 """Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried."""
@@ -45,11 +45,10 @@ class Beginning(NamedTuple):
     """A `Reachability`."""
     near: Approach
     scene: Scene
-    """With the line of the drive on which first contact lies, and the friction that the rod has there."""
+    """With the phase, the line of the drive, and the friction that the rod has there."""
     line: int
     seen: Outline
     """Relative to the base."""
-    loaded: Loaded
     state: Balance
 
 
@@ -70,12 +69,12 @@ def beginning(scene: Scene, lines: Floats | None, first_step: float, slides: boo
     """
     near, scene, line, seen = _arrive(scene, lines, first_step)
     if near.reach != _TOUCHES:
-        return Beginning(near.reach, near, scene, line, seen, in_phase(scene, near.tip_first), nowhere())
-    reach, scene, loaded, state = _first_state(scene, lines, seen, near, slides)
+        return Beginning(near.reach, near, scene, line, seen, nowhere())
+    reach, scene, state = _first_state(scene, lines, seen, near, slides)
     least_psi1 = tangential_psi1(scene) - (0.0 if lines is None else _NOT_TURNED)
-    if reach == _TOUCHES and loaded.tip and state.at.q < least_psi1:
+    if reach == _TOUCHES and scene.phase == TIP and state.at.q < least_psi1:
         reach = _TOUCHES_TWICE
-    return Beginning(reach, near, scene, line, seen, loaded, state)
+    return Beginning(reach, near, scene, line, seen, state)
 
 
 @compiled
@@ -90,36 +89,35 @@ def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> _Arrived:
 @compiled
 def _first_state(
     scene: Scene, lines: Floats | None, seen: Outline, near: Approach, slides: bool
-) -> tuple[int, Scene, Loaded, Balance]:
+) -> tuple[int, Scene, Balance]:
     """State at first contact, with the friction that it has: it opposes the slip of the rod along the contour.
 
     A tip that is carried head-on does not slip to first order: rounding would decide the sense.
     """
-    loaded = in_phase(scene, near.tip_first)
-    begin = _unloaded(loaded, lines, seen, near)
-    if not loaded.tip and lines is not None and begin.at.q > 1.0:  # the approach is not exact
+    scene = in_phase(scene, touching(near.tip_first))
+    begin = _unloaded(scene, lines, seen, near)
+    if scene.phase == TANGENTIAL and lines is not None and begin.at.q > 1.0:  # the approach is not exact
         near = Approach(near.reach, near.distance, near.begin, True, near.low)
-        loaded = in_phase(scene, True)
-        begin = _unloaded(loaded, lines, seen, near)
+        scene = in_phase(scene, TIP)
+        begin = _unloaded(scene, lines, seen, near)
     delta = scene.rig.friction_angle
     if slides and delta > 0.0:
-        slipping = slip(loaded, begin)
-        if loaded.tip and not only_turns(scene.line) and not abs(slipping) > NOT_SLIPPING:
-            return _STICKS, scene, loaded, begin
+        slipping = slip(scene, begin)
+        if scene.phase == TIP and not only_turns(scene.line) and not abs(slipping) > NOT_SLIPPING:
+            return _STICKS, scene, begin
         if slipping > NOT_SLIPPING:
             scene = with_friction(scene, -delta)
-            loaded = in_phase(scene, loaded.tip)
-            begin = _unloaded(loaded, lines, seen, near)
-            if not slip(loaded, begin) > 0.0:
-                return _STICKS, scene, loaded, begin
-    pushed = lines is None or begin.travel_rate * begin.tangent.force > 0.0
-    return _TOUCHES if pushed else _SLIPS_OFF, scene, loaded, begin
+            begin = _unloaded(scene, lines, seen, near)
+            if not slip(scene, begin) > 0.0:
+                return _STICKS, scene, begin
+    pushed = lines is None or begin.rates.travel * begin.tangent.force > 0.0
+    return _TOUCHES if pushed else _SLIPS_OFF, scene, begin
 
 
 @compiled
-def _unloaded(loaded: Loaded, lines: Floats | None, seen: Outline, near: Approach) -> Balance:
+def _unloaded(scene: Scene, lines: Floats | None, seen: Outline, near: Approach) -> Balance:
     """State without force at first contact."""
-    guessed = first_equilibrium(loaded, seen, near)
+    guessed = first_equilibrium(scene, seen, near)
     if lines is None:
-        return balance(loaded, guessed)[0]
-    return settle(loaded, guessed, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+        return balance(scene, guessed)[0]
+    return settle(scene, guessed, NO_FORCE, BY_FORCE, 0.0, SETTLED)

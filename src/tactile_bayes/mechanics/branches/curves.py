@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.equilibrium import Loaded
+from tactile_bayes.mechanics.branches.equilibrium import Scene
 from tactile_bayes.mechanics.branches.line import drive_angle_at
+from tactile_bayes.mechanics.branches.phase import on_rod
 from tactile_bayes.mechanics.branches.series import Nodes, crossing, nodes_of, value, value_and_slope, weighted
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.beam import bending
@@ -179,17 +180,13 @@ def left_of(angle: float, course: Course) -> float:
 
 
 @compiled
-def largest_curvature(stop: float, loaded: Loaded, curves: Curves) -> float:
+def largest_curvature(scene: Scene, stop: float, curves: Curves) -> float:
     """Largest change of the rod's curvature from its rest curvature up to a position on a stretch [1/L], from values at
     the nodes."""
-    nodes, values, curvature, series = curves.on.nodes, curves.values, curves.bend, curves.series
-    angle, moment, rest = value(series[ANGLE], stop), value(series[0], stop), value(series[REST], stop)
-    at_stop = _bent(loaded, angle, moment, value(series[1], stop), value(series[2], stop), rest)
-    best, count = 0, 0
+    nodes, curvature = curves.on.nodes, curves.bend
+    at_stop, best, count = _bent(scene, stop, curves.series), 0, 0
     while count < nodes.size and nodes[count] < stop:
-        curvature[count] = _bent(
-            loaded, values[ANGLE, count], values[0, count], values[1, count], values[2, count], values[REST, count]
-        )
+        curvature[count] = _bent(scene, nodes[count], curves.series)
         best = count if curvature[count] > curvature[best] else best
         count += 1
     if best == 0 or best >= count - 1:
@@ -203,7 +200,9 @@ def largest_curvature(stop: float, loaded: Loaded, curves: Curves) -> float:
 
 
 @compiled
-def _bent(loaded: Loaded, driven: float, moment: float, force_x: float, force_y: float, rest: float) -> float:
-    """Largest change of curvature between pivot and contact [1/L]."""
-    slope = drive_angle_at(loaded.line, driven) - loaded.compliance * moment
-    return bending(loaded.beam, slope, moment, force_x, force_y, 1.0 if loaded.tip else rest)
+def _bent(scene: Scene, way: float, series: Floats) -> float:
+    """Largest change of curvature between pivot and contact at a position [1/L]."""
+    moment, force_x = value_and_slope(series[0], series[1], way)
+    force_y, rest = value_and_slope(series[2], series[REST], way)
+    slope = drive_angle_at(scene.line, value(series[ANGLE], way)) - scene.rig.compliance * moment
+    return bending(scene.beam, slope, moment, force_x, force_y, on_rod(scene.phase, rest, 0.0)[1])

@@ -23,15 +23,19 @@ from typing import NamedTuple
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.line import Line, components, line_of, off_line
 from tactile_bayes.mechanics.branches.outline import Outline, Place, narrower, place
+from tactile_bayes.mechanics.branches.phase import is_possible, limit, on_rod, sliding, turning
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import Beam, beam_pose, is_far_from_table, rubbed_otherwise
 from tactile_bayes.mechanics.poses.pose import Pose
 
 __all__ = [
+    "BY_FORCE",
+    "NO_FORCE",
     "SETTLED",
     "Balance",
     "Equilibrium",
-    "Loaded",
+    "Rates",
     "Rig",
     "Scene",
     "balance",
@@ -42,21 +46,20 @@ __all__ = [
     "on_line",
     "settle",
     "settle_at",
+    "settle_at_limit",
     "tangential_psi1",
     "times",
     "with_friction",
 ]
 
 _MOST_STEPS = 25
+"""Newton steps of a search; those that converge take two to six."""
 
 _MOST_TURN, _MOST_LOADING = 0.4, 1.0
 """Largest changes of q, and of f over 1 + f, in a step."""
 
-_ASTRAY, _LEAST_PSI1, _MOST_PSI1 = 1.5, -0.5 * math.pi, 1.5 * math.pi
-"""Largest arc length [L] at which tangential contact is sought, and the ψ1 between which tip contact is."""
-
 SETTLED = 1e-8
-"""Step, over the largest, after which a first-order correction leaves rounding errors only."""
+"""Step, over the largest, after which a first-order correction leaves rounding errors only: its square."""
 
 
 class Equilibrium(NamedTuple):
@@ -67,18 +70,7 @@ class Equilibrium(NamedTuple):
     force: float
 
 
-class Loaded(NamedTuple):
-    """A rod that slides along a contour in one phase."""
-
-    outline: Outline
-    beam: Beam
-    friction_angle: float
-    compliance: float
-    tip: bool
-    psi1: float
-    """ψ1 in tangential contact [rad]."""
-    line: Line | None
-    """Drive that carries the base; None for a rotation about a pivot that rests."""
+_BY_Q, BY_FORCE, NO_FORCE = Equilibrium(0.0, 1.0, 0.0), Equilibrium(0.0, 0.0, 1.0), Equilibrium(0.0, 0.0, 0.0)
 
 
 class Rig(NamedTuple):
@@ -98,7 +90,7 @@ class Rig(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """All that an equilibrium depends on: one contour in the sweep frame, the rod, and the rig."""
+    """All that an equilibrium depends on: one contour in the sweep frame, the rod, the rig, and the phase."""
 
     outline: Outline
     beam: Beam
@@ -106,7 +98,17 @@ class Scene(NamedTuple):
     exact: bool
     """True if events are computed to rounding."""
     line: Line | None
-    """As in `Loaded`; then the origin is the base at the beginning of the drive."""
+    """Drive that carries the base, which is at the origin at its beginning; None for a rotation about a pivot."""
+    phase: int
+
+
+class Rates(NamedTuple):
+    """Derivatives of travel and loads along the tangent."""
+
+    travel: float
+    moment: float
+    x: float
+    y: float
 
 
 class Balance(NamedTuple):
@@ -120,11 +122,7 @@ class Balance(NamedTuple):
     force_y: float
     tangent: Equilibrium
     """Null vector of the equations, in no particular length."""
-    travel_rate: float
-    """Derivatives of the travel and the loads along it."""
-    moment_rate: float
-    x_rate: float
-    y_rate: float
+    rates: Rates
 
 
 class _Equations(NamedTuple):
@@ -142,11 +140,9 @@ class _Equations(NamedTuple):
 
 
 @compiled
-def in_phase(scene: Scene, tip: bool) -> Loaded:
-    """Rod in one phase of contact."""
-    rig = scene.rig
-    psi1 = tangential_psi1(scene)
-    return Loaded(scene.outline, scene.beam, rig.friction_angle, rig.compliance, tip, psi1, scene.line)
+def in_phase(scene: Scene, phase: int) -> Scene:
+    """Scene in a phase of contact."""
+    return Scene(scene.outline, scene.beam, scene.rig, scene.exact, scene.line, phase)
 
 
 @compiled
@@ -160,7 +156,7 @@ def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
     """Scene with another line of the drive."""
     if lines is None:
         return scene
-    return Scene(scene.outline, scene.beam, scene.rig, scene.exact, line_of(lines, k))
+    return Scene(scene.outline, scene.beam, scene.rig, scene.exact, line_of(lines, k), scene.phase)
 
 
 @compiled
@@ -168,35 +164,29 @@ def with_friction(scene: Scene, angle: float) -> Scene:
     """Scene with friction that acts in the other sense."""
     _, compliance, offset, sign, moment_unit, force_unit = scene.rig
     rig = Rig(angle, compliance, offset, sign, moment_unit, force_unit)
-    return Scene(scene.outline, rubbed_otherwise(scene.beam), rig, scene.exact, scene.line)
+    return Scene(scene.outline, rubbed_otherwise(scene.beam), rig, scene.exact, scene.line, scene.phase)
 
 
 @compiled
-def balance(loaded: Loaded, at: Equilibrium) -> tuple[Balance, _Equations]:
+def balance(scene: Scene, at: Equilibrium) -> tuple[Balance, _Equations]:
     """Loads and tangent at a point near the branch."""
-    delta, p, q, force = loaded.friction_angle, at.p, at.q, max(at.force, 0.0)
-    psi1, length = (q, 1.0) if loaded.tip else (loaded.psi1, q)
-    spot = narrower(loaded.outline, place(loaded.outline, p), length)
+    delta, force = scene.rig.friction_angle, max(at.force, 0.0)
+    psi1, length = on_rod(scene.phase, at.q, tangential_psi1(scene))
+    spot = narrower(scene.outline, place(scene.outline, at.p), length)
     sin_delta, cos_delta = math.sin(delta), math.cos(delta)
     sin, cos = spot.sin * cos_delta + spot.cos * sin_delta, spot.cos * cos_delta - spot.sin * sin_delta
-    rod = beam_pose(loaded.beam, psi1, length, force, loaded.tip)
+    rod = beam_pose(scene.beam, psi1, length, force, scene.phase == TIP)
     angle = math.atan2(sin, cos) + psi1 + rod[0].turn
-    equations = _equations(loaded, loaded.line, spot, _Force(force, sin, cos), rod, angle)
+    equations = _equations(scene, scene.line, spot, _Force(force, sin, cos), rod, angle)
     tangent, moment = _cross(equations.by_one, equations.by_two), equations.moment
-    turning = force * spot.bend * tangent.p
-    found = Balance(
-        at,
-        equations.travel,
-        moment,
-        -force * sin,
-        force * cos,
-        tangent,
+    turned = force * spot.bend * tangent.p
+    rates = Rates(
         dot(equations.travel_by, tangent),
         dot(equations.moment_by, tangent),
-        -sin * tangent.force - cos * turning,
-        cos * tangent.force - sin * turning,
+        -sin * tangent.force - cos * turned,
+        cos * tangent.force - sin * turned,
     )
-    return found, equations
+    return Balance(at, equations.travel, moment, -force * sin, force * cos, tangent, rates), equations
 
 
 class _Force(NamedTuple):
@@ -209,13 +199,13 @@ class _Force(NamedTuple):
 
 @compiled
 def _equations(
-    loaded: Loaded, line: Line | None, spot: Place, contact: _Force, rod: tuple[Pose, Pose, Pose], angle: float
+    scene: Scene, line: Line | None, spot: Place, contact: _Force, rod: tuple[Pose, Pose, Pose], angle: float
 ) -> _Equations:
     """Equations for a drive, with a base at an angle before the turn of the suspension."""
     here, by_q, by_force = rod
     force, sin, cos = contact
-    compliance, closer = loaded.compliance, 0.0 if loaded.tip else loaded.outline.narrowing
-    by_tip = 1.0 if loaded.tip else 0.0
+    compliance, by_psi1 = scene.rig.compliance, turning(scene.phase)
+    closer = sliding(scene.phase) * scene.outline.narrowing
     sin_delta, cos_delta = spot.cos * sin - spot.sin * cos, spot.cos * cos + spot.sin * sin
     if line is None:
         along, across = spot.x * cos + spot.y * sin, spot.y * cos - spot.x * sin
@@ -225,7 +215,7 @@ def _equations(
         moment_by = Equilibrium(force * by_u.p, force * lever_by_q, along)
         travel_by = Equilibrium(
             spot.bend + compliance * moment_by.p,
-            by_q.turn + by_tip + compliance * moment_by.q,
+            by_q.turn + by_psi1 + compliance * moment_by.q,
             by_force.turn + compliance * along,
         )
         moment = force * along
@@ -241,7 +231,7 @@ def _equations(
         line,
         -closer * spot.sin - by_q.u * cos + by_q.v * sin,
         closer * spot.cos - by_q.u * sin - by_q.v * cos,
-        by_q.turn + by_tip + compliance * moment_by.q,
+        by_q.turn + by_psi1 + compliance * moment_by.q,
     )
     by_load = components(
         line,
@@ -264,7 +254,7 @@ def _equations(
 
 @compiled
 def settle(
-    loaded: Loaded, start: Equilibrium, origin: Equilibrium, normal: Equilibrium, level: float, settled: float
+    scene: Scene, start: Equilibrium, origin: Equilibrium, normal: Equilibrium, level: float, settled: float
 ) -> Balance:
     """Equilibrium where normal · (z − origin) = level for z = (p, q, f), by Newton's method from a guess.
 
@@ -272,10 +262,10 @@ def settle(
     and rates have an error of its size. NaN where the method does not converge.
     """
     at = start
-    if _is_astray(loaded, at):
+    if _is_astray(scene, at):
         return nowhere()
     for _ in range(_MOST_STEPS):
-        found, equations = balance(loaded, at)
+        found, equations = balance(scene, at)
         one, two, bend = equations.miss_one, equations.miss_two, equations.bend
         off = dot(normal, less(at, origin)) - level
         det = dot(normal, found.tangent)
@@ -288,7 +278,7 @@ def settle(
             break
         share = min(1.0, 1.0 / largest) if largest > 0.0 else 1.0
         at = Equilibrium(at.p - share * dp, at.q - share * dq, at.force - share * df)
-        if _is_astray(loaded, at):
+        if _is_astray(scene, at):
             break
         if largest <= settled and abs(dp) * bend <= settled:
             change, before = Equilibrium(dp, dq, df), found.at.force
@@ -297,40 +287,35 @@ def settle(
             share, turn = (-df / before if before > 0.0 else 0.0), -bend * dp
             force_x = found.force_x + share * found.force_x - turn * found.force_y
             force_y = found.force_y + share * found.force_y + turn * found.force_x
-            return Balance(
-                at,
-                travel,
-                moment,
-                force_x,
-                force_y,
-                found.tangent,
-                found.travel_rate,
-                found.moment_rate,
-                found.x_rate,
-                found.y_rate,
-            )
+            return Balance(at, travel, moment, force_x, force_y, found.tangent, found.rates)
     return nowhere()
 
 
 @compiled
-def _is_astray(loaded: Loaded, at: Equilibrium) -> bool:
+def _is_astray(scene: Scene, at: Equilibrium) -> bool:
     """Return whether a rod without a closed form is sought too far away: it takes long and leads nowhere."""
-    if loaded.beam.varied is None:
+    if scene.beam.varied is None:
         return False
-    if not (_LEAST_PSI1 <= at.q <= _MOST_PSI1 if loaded.tip else 0.0 <= at.q <= _ASTRAY):
-        return True
-    return is_far_from_table(loaded.beam, 1.0 if loaded.tip else at.q, at.force)
+    arclength = on_rod(scene.phase, at.q, 0.0)[1]
+    return not is_possible(scene.phase, at.q) or is_far_from_table(scene.beam, arclength, at.force)
 
 
 @compiled
-def settle_at(loaded: Loaded, p: float, start: Equilibrium) -> Balance:
+def settle_at_limit(scene: Scene, start: Equilibrium) -> Balance:
+    """Equilibrium where the phase ends."""
+    end = Equilibrium(0.0, limit(scene.phase, tangential_psi1(scene))[0], 0.0)
+    return settle(scene, start, end, _BY_Q, 0.0, SETTLED)
+
+
+@compiled
+def settle_at(scene: Scene, p: float, start: Equilibrium) -> Balance:
     """Equilibrium at a parameter of the contour, where its curvature may be infinite; NaN if none is found.
 
     Tangent and rates need not be finite.
     """
     at = Equilibrium(p, start.q, start.force)
     for _ in range(_MOST_STEPS):
-        equations = balance(loaded, at)[1]
+        equations = balance(scene, at)[1]
         one, two, by_one, by_two = equations.miss_one, equations.miss_two, equations.by_one, equations.by_two
         det = by_one.q * by_two.force - by_one.force * by_two.q
         dq, df = (one * by_two.force - two * by_one.force) / det, (by_one.q * two - by_two.q * one) / det
@@ -340,7 +325,7 @@ def settle_at(loaded: Loaded, p: float, start: Equilibrium) -> Balance:
         share = min(1.0, 1.0 / largest) if largest > 0.0 else 1.0
         at = Equilibrium(p, at.q - share * dq, at.force - share * df)
         if largest <= SETTLED:
-            return balance(loaded, at)[0]
+            return balance(scene, at)[0]
     return nowhere()
 
 
@@ -348,7 +333,8 @@ def settle_at(loaded: Loaded, p: float, start: Equilibrium) -> Balance:
 def nowhere() -> Balance:
     """Balance of NaN."""
     nothing = Equilibrium(math.nan, math.nan, math.nan)
-    return Balance(nothing, math.nan, math.nan, math.nan, math.nan, nothing, math.nan, math.nan, math.nan, math.nan)
+    rates = Rates(math.nan, math.nan, math.nan, math.nan)
+    return Balance(nothing, math.nan, math.nan, math.nan, math.nan, nothing, rates)
 
 
 @compiled

@@ -14,7 +14,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.curves import ANGLE, REST, Curves, curves_of
-from tactile_bayes.mechanics.branches.equilibrium import Balance, Equilibrium, Loaded, dot, less, settle, times
+from tactile_bayes.mechanics.branches.equilibrium import Balance, Equilibrium, Rates, Scene, dot, less, settle, times
 from tactile_bayes.mechanics.branches.limits import Approach, touch
 from tactile_bayes.mechanics.branches.outline import Outline, place
 from tactile_bayes.mechanics.branches.series import value_and_slope, weighted
@@ -53,7 +53,6 @@ class Leg(NamedTuple):
     along: Equilibrium
     """Change of the coordinates along the tangent at the beginning; its product with the normal is 1."""
     normal: Equilibrium
-    tip: bool
 
 
 class LegCurves(NamedTuple):
@@ -107,69 +106,55 @@ def _onward(nodes: Floats) -> Floats:
 
 
 @compiled
-def first_equilibrium(loaded: Loaded, outline: Outline, found: Approach) -> Equilibrium:
+def first_equilibrium(scene: Scene, outline: Outline, found: Approach) -> Equilibrium:
     """Equilibrium without force at first contact with an outline relative to the base."""
-    at, chord = touch(outline, loaded.beam, found.begin, found.tip_first)
+    at, chord = touch(outline, scene.beam, found.begin, found.tip_first)
     if found.tip_first:
-        bearing = math.atan2(at.y, at.x) if loaded.line is None else math.atan2(-at.x, at.y) + 0.5 * math.pi
-        psi1 = bearing + chord.at_point - math.atan2(at.sin, at.cos) - loaded.friction_angle
+        bearing = math.atan2(at.y, at.x) if scene.line is None else math.atan2(-at.x, at.y) + 0.5 * math.pi
+        psi1 = bearing + chord.at_point - math.atan2(at.sin, at.cos) - scene.rig.friction_angle
         return Equilibrium(found.begin, psi1, 0.0)
     return Equilibrium(found.begin, chord.arclength, 0.0)
 
 
 @compiled
-def leg_from(loaded: Loaded, begin: Balance, before: Equilibrium, length: float) -> Leg:
+def leg_from(scene: Scene, begin: Balance, before: Equilibrium, length: float) -> Leg:
     """Leg from an equilibrium in the sense of the direction before.
 
     Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f.
     """
-    spot, tangent = place(loaded.outline, begin.at.p + math.copysign(NUDGE, before.p)), begin.tangent
+    spot, tangent = place(scene.outline, begin.at.p + math.copysign(NUDGE, before.p)), begin.tangent
     by_p, loading = spot.speed * spot.speed + spot.bend * spot.bend, 1.0 + begin.at.force
-    by_force = _BY_FORCE if loaded.line is None else _BY_FORCE_ON_LINE
+    by_force = _BY_FORCE if scene.line is None else _BY_FORCE_ON_LINE
     across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
     size = length / math.sqrt(dot(across, tangent))
     if dot(across, before) < 0.0:
         size = -size
     along = times(size, tangent)
     scale = 1.0 / (size * dot(across, tangent))
-    return Leg(begin.at, along, times(scale, across), loaded.tip)
+    return Leg(begin.at, along, times(scale, across))
 
 
 @compiled
 def shortened(leg: Leg, share: float) -> Leg:
     """First part of a leg."""
-    along, normal = leg.along, leg.normal
-    return Leg(
-        leg.begin,
-        times(share, along),
-        Equilibrium(normal.p / share, normal.q / share, normal.force / share),
-        leg.tip,
-    )
+    normal = leg.normal
+    across = Equilibrium(normal.p / share, normal.q / share, normal.force / share)
+    return Leg(leg.begin, times(share, leg.along), across)
 
 
 @compiled
-def settle_on(loaded: Loaded, leg: Leg, way: float, start: Equilibrium, settled: float) -> Balance:
+def settle_on(scene: Scene, leg: Leg, way: float, start: Equilibrium, settled: float) -> Balance:
     """Equilibrium at a position on a leg; tangent and rates are derivatives by the position."""
-    return _by_way(leg, settle(loaded, start, leg.begin, leg.normal, way, settled))
+    return _by_way(leg, settle(scene, start, leg.begin, leg.normal, way, settled))
 
 
 @compiled
 def _by_way(leg: Leg, found: Balance) -> Balance:
     """Equilibrium with tangent and rates by the position on a leg."""
-    tangent = found.tangent
+    at, travel, moment, force_x, force_y, tangent, rates = found
     scale = 1.0 / dot(leg.normal, tangent)
-    return Balance(
-        found.at,
-        found.travel,
-        found.holding_moment,
-        found.force_x,
-        found.force_y,
-        times(scale, tangent),
-        scale * found.travel_rate,
-        scale * found.moment_rate,
-        scale * found.x_rate,
-        scale * found.y_rate,
-    )
+    by_way = Rates(scale * rates.travel, scale * rates.moment, scale * rates.x, scale * rates.y)
+    return Balance(at, travel, moment, force_x, force_y, times(scale, tangent), by_way)
 
 
 @compiled
@@ -216,7 +201,7 @@ def guess(work: LegCurves, way: float) -> Equilibrium:
 
 @compiled
 def sample_leg(
-    loaded: Loaded, leg: Leg, begin: Balance, before: Balance, known: float, settled: float, work: LegCurves
+    scene: Scene, leg: Leg, begin: Balance, before: Balance, known: float, settled: float, work: LegCurves
 ) -> tuple[bool, Balance, Balance]:
     """Fit the series of a leg, unless the branch does not cut all planes, and return the equilibria at its last nodes.
 
@@ -235,14 +220,14 @@ def sample_leg(
             else:
                 start = _cubic(leg, found, before, work.nodes[k])
             older, old = old, found
-            found = settle_on(loaded, leg, work.nodes[k], start, settled)
+            found = settle_on(scene, leg, work.nodes[k], start, settled)
             if not math.isfinite(found.travel):
                 return False, begin, before
-        at_nodes[0, k], at_nodes[0, half + k] = found.holding_moment, found.moment_rate
-        at_nodes[1, k], at_nodes[1, half + k] = found.force_x, found.x_rate
-        at_nodes[2, k], at_nodes[2, half + k] = found.force_y, found.y_rate
+        at_nodes[0, k], at_nodes[0, half + k] = found.holding_moment, found.rates.moment
+        at_nodes[1, k], at_nodes[1, half + k] = found.force_x, found.rates.x
+        at_nodes[2, k], at_nodes[2, half + k] = found.force_y, found.rates.y
         at_nodes[REST, k], at_nodes[REST, half + k] = found.at.q, found.tangent.q
-        at_nodes[ANGLE, k], at_nodes[ANGLE, half + k] = found.travel, found.travel_rate
+        at_nodes[ANGLE, k], at_nodes[ANGLE, half + k] = found.travel, found.rates.travel
         at_nodes[PLACE, k], at_nodes[PLACE, half + k] = found.at.p, found.tangent.p
     for c in range(PLACE):
         weighted(work.fit, at_nodes[c], series[c])

@@ -8,15 +8,25 @@ import math
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.curves import ANGLE, REST, Accuracy
-from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, Equilibrium, Loaded, dot, less, settle
+from tactile_bayes.mechanics.branches.equilibrium import (
+    BY_FORCE,
+    NO_FORCE,
+    SETTLED,
+    Balance,
+    Equilibrium,
+    Scene,
+    dot,
+    less,
+    settle,
+    tangential_psi1,
+)
 from tactile_bayes.mechanics.branches.leg import NUDGE, PLACE, Leg, LegCurves, guess, settle_on
 from tactile_bayes.mechanics.branches.line import Line
+from tactile_bayes.mechanics.branches.phase import limit
 from tactile_bayes.mechanics.branches.series import crossing, value, weighted
 from tactile_bayes.mechanics.compiler import compiled
 
 __all__ = ["change_of_phase", "end_of_line", "first_knot", "polished_fold", "release", "share_of"]
-
-_BY_FORCE, _NO_FORCE = Equilibrium(0.0, 0.0, 1.0), Equilibrium(0.0, 0.0, 0.0)
 
 _WEAK = 0.5
 """Share of its force that a leg loses along its tangent for a release to be looked for on it."""
@@ -37,36 +47,35 @@ def first_knot(leg: Leg, knots: Floats, low: float, work: LegCurves) -> tuple[fl
 
 
 @compiled
-def change_of_phase(leg: Leg, psi1: float, accuracy: Accuracy, work: LegCurves) -> float:
+def change_of_phase(scene: Scene, accuracy: Accuracy, work: LegCurves) -> float:
     """Position at which the phase changes; above 1 if it does not."""
-    curves, limit, sign = work.curves, 1.0, 1.0
-    if leg.tip:
-        limit, sign = psi1, -1.0
+    curves = work.curves
     on, rest = curves.on, curves.series[REST]
+    end, sense = limit(scene.phase, tangential_psi1(scene))
     weighted(on.on_grid, rest, curves.on_grid)
     for cell in range(1, on.grid.size):
-        if sign * (curves.on_grid[cell] - limit) > 0.0:
+        if sense * (curves.on_grid[cell] - end) > 0.0:
             weighted(on.slopes, rest, work.rest_slope)
             left, right = on.grid[cell - 1], on.grid[cell]
-            if not leg.tip:
+            if sense > 0.0:
                 left, right = right, left
-            return crossing(rest, work.rest_slope, limit, left, right, 0.5 * (left + right), accuracy.last_step)
+            return crossing(rest, work.rest_slope, end, left, right, 0.5 * (left + right), accuracy.last_step)
     return 2.0
 
 
 @compiled
-def polished_fold(loaded: Loaded, leg: Leg, stop: float, work: LegCurves) -> float:
+def polished_fold(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> float:
     """Position at which the exact derivative of the drive angle vanishes, by secants from the interpolant."""
     curves = work.curves
     weighted(curves.on.slopes, curves.series[ANGLE + 1], curves.bend)
     bend = value(curves.bend, stop)
-    at_stop, last = settle_on(loaded, leg, stop, guess(work, stop), SETTLED).travel_rate, 2e-2
+    at_stop, last = settle_on(scene, leg, stop, guess(work, stop), SETTLED).rates.travel, 2e-2
     for _ in range(7):
         step = at_stop / bend
         if not abs(step) < 0.5 * last:
             break
         new = min(max(stop - step, 0.0), 1.0)
-        at_new = settle_on(loaded, leg, new, guess(work, new), SETTLED).travel_rate
+        at_new = settle_on(scene, leg, new, guess(work, new), SETTLED).rates.travel
         bend = (at_new - at_stop) / (new - stop)
         stop, at_stop, last = new, at_new, abs(step)
     return stop
@@ -79,25 +88,26 @@ def share_of(leg: Leg, found: Balance) -> float:
 
 
 @compiled
-def release(loaded: Loaded, leg: Leg) -> float:
+def release(scene: Scene, leg: Leg) -> float:
     """Share of a leg at which the force vanishes; NaN if it hardly falls, or if that is not on the leg."""
     if not leg.along.force < -_WEAK * leg.begin.force:
         return math.nan
     share = -leg.begin.force / leg.along.force
     begin, along = leg.begin, leg.along
     start = Equilibrium(begin.p + share * along.p, begin.q + share * along.q, 0.0)
-    found = settle(loaded, start, _NO_FORCE, _BY_FORCE, 0.0, SETTLED)
+    found = settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED)
     share = share_of(leg, found)
     return share if 0.0 < share <= 1.0 else math.nan
 
 
 @compiled
 def end_of_line(line: Line | None, last: float, accuracy: Accuracy, work: LegCurves) -> float:
-    """Position on a leg, up to a last one, at which the line of the drive ends; above 1 if it does not."""
+    """Position on a leg, up to a last one, at which the line of the drive ends; above 1 if it does not.
+
+    The series has the derivative of the travel."""
     if line is None:
         return 2.0
     series, end = work.curves.series, line.end
     if value(series[ANGLE], last) < end:
         return 2.0
-    weighted(work.curves.on.slopes, series[ANGLE], series[ANGLE + 1])
     return crossing(series[ANGLE], series[ANGLE + 1], end, last, 0.0, 0.5 * last, accuracy.last_step)

@@ -249,14 +249,14 @@ def _arrival_on(outline: Outline, beam: Beam, line: Line, way: float, is_first: 
     size = (line.end - line.travel) / looks
     before, looked = line.travel, _look(outline, beam, line, line.travel)
     nearest, least, gap, change = before, math.inf, looked.gap, 0.0
-    if gap <= 0.0 and (is_first or looked.reach == _CUTS_PIVOT or looked.reach == _TOO_CLOSE):
+    if gap <= 0.0 and (is_first or _is_blocked(looked)):
         return looked, before
     for k in range(1, looks + 1):
         travel = line.travel + k * size
         looked = _look(outline, beam, line, travel)
         if gap > 0.0 and looked.gap <= 0.0:
             found, at = _between(outline, beam, line, before, gap, travel, looked)
-            if found.gap > -_JUMP or found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+            if found.gap > -_JUMP or _is_blocked(found):
                 return found, at
         elif gap > 0.0 and looked.gap < least:
             nearest, least = travel, looked.gap
@@ -264,7 +264,19 @@ def _arrival_on(outline: Outline, beam: Beam, line: Line, way: float, is_first: 
         before, gap = travel, looked.gap
     if least > change:
         return looked, math.nan
-    low, high = max(nearest - size, line.travel), min(nearest + size, line.end)
+    return _grazing(outline, beam, line, max(nearest - size, line.travel), min(nearest + size, line.end))
+
+
+@compiled
+def _is_blocked(found: _Turned) -> bool:
+    """True if the object is where the base is, or too close to it."""
+    return found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE
+
+
+@compiled
+def _grazing(outline: Outline, beam: Beam, line: Line, low: float, high: float) -> tuple[_Turned, float]:
+    """First contact about the least gap between two travels, and its travel; NaN if there is none."""
+    looked = _look(outline, beam, line, high)
     for _ in range(_DEEPEST):
         left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
         at_left, at_right = _look(outline, beam, line, left), _look(outline, beam, line, right)
@@ -285,7 +297,7 @@ def _between(
 ) -> tuple[_Turned, float]:
     """First contact between two travels, at the second of which the unloaded rod would cut the object."""
     settled, at_inside = _LAST * (inside - clear), found.gap
-    if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+    if _is_blocked(found):
         return found, inside
     for k in range(_MOST_HALVINGS):
         share = gap / (gap - at_inside)
@@ -314,7 +326,7 @@ def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int,
         line = line_of(lines, k)
         found, travel = _arrival_on(outline, beam, line, way, k == 0)
         distance = min(distance, found.distance)
-        if found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE:
+        if _is_blocked(found):
             return Approach(found.reach, found.distance, math.nan, True, math.nan), k, travel
         if math.isfinite(travel):
             reach = _BEGINS_INSIDE if k == 0 and travel == line.travel else found.reach

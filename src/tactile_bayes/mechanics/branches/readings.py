@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.mechanics.branches.curves import ANGLE, REST, WAY, Accuracy, Course, Curves, lay_over_angle, left_of
-from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, Scene, in_phase
+from tactile_bayes.mechanics.branches.curves import ANGLE, REST, WAY, Accuracy, Course, lay_over_angle, left_of
+from tactile_bayes.mechanics.branches.equilibrium import (
+    SETTLED,
+    Balance,
+    Equilibrium,
+    Scene,
+    balance,
+    tangential_psi1,
+)
 from tactile_bayes.mechanics.branches.leg import Leg, LegCurves, guess, settle_on
 from tactile_bayes.mechanics.branches.line import drive_angle_at
 from tactile_bayes.mechanics.branches.outline import on_object, place
+from tactile_bayes.mechanics.branches.phase import on_rod
 from tactile_bayes.mechanics.branches.series import at_all, crossing, value, value_and_slope, weighted
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
 __all__ = [
+    "STATE",
     "STATE_COLUMNS",
     "Asked",
     "Followed",
@@ -26,19 +34,26 @@ __all__ = [
     "asked",
     "find_samples",
     "polish_states",
+    "write_event",
     "write_loads",
-    "write_state",
     "write_states",
 ]
 
-STATE_COLUMNS = 13
-"""Numbers that describe a state: phase, parameter, point, slope angle, and the fields of `State`."""
+STATE_COLUMNS = (
+    *("phase", "parameter", "x", "y", "slope_angle", "drive_angle"),
+    *("holding_moment", "force_x", "force_y", "arclength", "tip_angle", "travel"),
+)
+STATE = np.dtype([(name, np.float64) for name in STATE_COLUMNS])
+"""A state in the sweep frame; the drive angle is that of the unloaded rod, without the turn of the suspension."""
 
 _SETTLED = 1e-14
 """Share of a stretch by which an exact state may miss its drive angle; the interpolant corrects for it."""
 
 _NEAR, _MOST_STEPS = 1e-5, 6
 """Newton step, as a share of the stretch, after which the search ends, and the largest number of steps."""
+
+_MOST_HALVINGS = 100
+"""Largest number of steps to an exact state: more than halvings of a stretch to rounding."""
 
 _PAST = 1e-6
 """Share of a stretch by which a step may pass the end."""
@@ -60,12 +75,14 @@ class Found(NamedTuple):
 
     loads: Floats
     """Loads with the sign of the sweep and the rod's rigidity, initially zero, shape (rows, 3)."""
-    states: Floats
-    """States in the sweep frame, initially zero, shape (rows, `STATE_COLUMNS`)."""
+    states: Any
+    """States, initially zero, structured as `STATE`, shape (rows,)."""
     changes: Floats
     """Beginnings of phases, then the end of the last: coordinates p, q and f of the equilibrium, 1 for tip contact, the
     number of the line of the drive, and the friction angle with the sign of its sense, shape (phases + 1, 6); no rows
     if no states are computed."""
+    events: Any
+    """States there, initially zero, structured as `STATE`, shape (phases + 1,)."""
 
 
 class Asked(NamedTuple):
@@ -90,7 +107,7 @@ class Followed(NamedTuple):
     leg: Leg
     accuracy: Accuracy
     course: Course
-    curves: Curves
+    work: LegCurves
     workspace: Asked
 
 
@@ -132,7 +149,7 @@ def _look_for(part: Followed, count: int) -> None:
 
     Newton's method starts between the nodes of the series, for all samples together; samples for which it does not
     converge are solved one by one."""
-    course, curves, workspace = part.course, part.curves, part.workspace
+    course, curves, workspace = part.course, part.work.curves, part.workspace
     wanted, twice, found, stop = workspace.wanted, workspace.twice, workspace.found, course.stop
     nodes, angles, angle, rate = curves.on.nodes, curves.values[ANGLE], curves.series[ANGLE], curves.series[ANGLE + 1]
     k, before, after, way_before, way_after = 0, -2.0, -2.0, 0.0, 0.0
@@ -167,108 +184,117 @@ def _look_for(part: Followed, count: int) -> None:
 @compiled
 def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
     """Write the loads of the samples on a stretch, from the series."""
-    count, rig, curves, workspace = samples.rows.size, part.scene.rig, part.curves, part.workspace
+    count, workspace = samples.rows.size, part.workspace
     _look_for(part, count)
-    moment, force_x = rig.sign * rig.moment_unit, rig.sign * rig.force_unit
-    at_all(curves.series[:REST], workspace.twice, count, workspace.now, workspace.before, workspace.found)
+    at_all(part.work.curves.series[:REST], workspace.twice, count, workspace.now, workspace.before, workspace.found)
     for j in range(count):
-        row = samples.rows[j]
-        out[row, 0], out[row, 1] = moment * workspace.found[0, j], force_x * workspace.found[1, j]
-        out[row, 2] = rig.force_unit * workspace.found[2, j]
+        moment, force_x, force_y = workspace.found[0, j], workspace.found[1, j], workspace.found[2, j]
+        _write_loads(part.scene, moment, force_x, force_y, out[samples.rows[j]])
 
 
 @compiled
-def write_state(found: Balance, tip: bool, scene: Scene, out: Floats) -> None:
-    """Write the columns of a state."""
-    out[5] = drive_angle_at(scene.line, found.travel) - scene.rig.compliance * found.holding_moment
-    out[6], out[7], out[8] = found.holding_moment, found.force_x, found.force_y
-    _write_place(found.at.p, found.at.q, tip, scene, out)
+def _write_loads(scene: Scene, moment: float, force_x: float, force_y: float, out: Floats) -> None:
+    """Write loads with the sign of the sweep and the rod's rigidity."""
+    rig = scene.rig
+    out[0], out[1] = rig.sign * rig.moment_unit * moment, rig.sign * rig.force_unit * force_x
+    out[2] = rig.force_unit * force_y
 
 
 @compiled
-def _write_place(p: float, q: float, tip: bool, scene: Scene, states: Floats) -> None:
-    """Write phase and place of a state."""
+def _write_state(
+    scene: Scene, p: float, q: float, travel: float, moment: float, force_x: float, force_y: float, out: Any
+) -> None:
+    """Write a state."""
     at = place(scene.outline, p)
-    alpha = math.atan2(at.sin, at.cos)
-    states[0] = TIP if tip else TANGENTIAL
-    states[1], states[4] = p, alpha
-    states[2], states[3] = on_object(scene.outline, at)
-    tip_angle = alpha + (scene.rig.friction_angle + q if tip else scene.outline.half_angle)
-    states[9], states[10] = 1.0 if tip else q, tip_angle
-    states[11], states[12] = math.nan, math.nan
+    psi1, arclength = on_rod(scene.phase, q, tangential_psi1(scene))
+    out.phase, out.parameter, out.travel, out.arclength = scene.phase, p, travel, arclength
+    out.x, out.y = on_object(scene.outline, at)
+    out.slope_angle = math.atan2(at.sin, at.cos)
+    out.tip_angle = out.slope_angle + (scene.rig.friction_angle + psi1)
+    out.drive_angle = drive_angle_at(scene.line, travel) - scene.rig.compliance * moment
+    out.holding_moment, out.force_x, out.force_y = moment, force_x, force_y
 
 
 @compiled
-def _note(row: int, p: float, q: float, tip: bool, scene: Scene, out: Found) -> None:
-    """Write phase and place of a state, and the loads of its row."""
-    states, rig = out.states[row], scene.rig
-    _write_place(p, q, tip, scene, states)
-    out.loads[row, 0] = rig.moment_unit * rig.sign * states[6]
-    out.loads[row, 1], out.loads[row, 2] = rig.force_unit * rig.sign * states[7], rig.force_unit * states[8]
+def write_event(scene: Scene, line: int, at: Equilibrium, tip: bool, k: int, out: Found) -> None:
+    """Write an event of a path: its coordinates, and its state."""
+    row, state = out.changes[k], balance(scene, at)[0]
+    row[0], row[1], row[2], row[3], row[4], row[5] = at.p, at.q, at.force, tip, line, scene.rig.friction_angle
+    moment, force_x, force_y = state.holding_moment, state.force_x, state.force_y
+    _write_state(scene, at.p, at.q, state.travel, moment, force_x, force_y, out.events[k])
 
 
 @compiled
-def write_states(samples: Samples, part: Followed, work: LegCurves, out: Found) -> None:
+def write_states(samples: Samples, part: Followed, out: Found) -> None:
     """Write the states of the samples on a leg, from the series."""
-    course, curves, workspace = part.course, part.curves, part.workspace
-    count = samples.rows.size
+    course, work, workspace = part.course, part.work, part.workspace
+    series, count = work.curves.series, samples.rows.size
     # Just before the end of contact the last drive angle matters.
-    off = value(curves.series[ANGLE], course.stop) - course.end
+    off = value(series[ANGLE], course.stop) - course.end
     for j in range(count):
         workspace.wanted[j] += off
     _look_for(part, count)
-    at_all(curves.series[:ANGLE], workspace.twice, count, workspace.now, workspace.before, workspace.found)
+    at_all(series[:ANGLE], workspace.twice, count, workspace.now, workspace.before, workspace.found)
     for j in range(count):
-        row = samples.rows[j]
-        states = out.states[row]
-        driven = drive_angle_at(part.scene.line, workspace.wanted[j] - off)
-        states[5] = driven - part.scene.rig.compliance * workspace.found[0, j]
-        for c in range(3):
-            states[6 + c] = workspace.found[c, j]
-        p = value(work.place, 0.25 * (workspace.twice[j] + 2.0))
-        _note(row, p, workspace.found[REST, j], part.leg.tip, part.scene, out)
+        row, found = samples.rows[j], workspace.found
+        p, travel = value(work.place, 0.25 * (workspace.twice[j] + 2.0)), workspace.wanted[j] - off
+        moment, force_x, force_y = found[0, j], found[1, j], found[2, j]
+        _write_state(part.scene, p, found[REST, j], travel, moment, force_x, force_y, out.states[row])
+        _write_loads(part.scene, moment, force_x, force_y, out.loads[row])
 
 
 @compiled
-def polish_states(samples: Samples, part: Followed, work: LegCurves, out: Found) -> None:
-    """Write exact states at the drive angles of the samples on a leg, by Newton's method in the stretched angle."""
-    scene, leg, course, curves, workspace = part.scene, part.leg, part.course, part.curves, part.workspace
-    stop, steadiness, over_angle = course.stop, course.steadiness, curves.over_angle
-    loaded = in_phase(scene, leg.tip)
+def polish_states(samples: Samples, part: Followed, out: Found) -> None:
+    """Write exact states at the drive angles of the samples on a leg."""
+    scene, course, curves = part.scene, part.course, part.work.curves
+    over_angle = curves.over_angle
     lay_over_angle(part.accuracy, course, curves)
     weighted(curves.on.slopes, over_angle[WAY], curves.bend)
     for j in range(samples.rows.size):
-        row, target = samples.rows[j], 0.25 * (workspace.twice[j] + 2.0)
-        way, pace = value_and_slope(over_angle[WAY], curves.bend, target)
-        way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle falls again
-        low, high, before = 0.0, stop, stop
-        for _ in range(100):
-            state = settle_on(loaded, leg, way, guess(work, way), SETTLED)
-            # Rounding may undo the very first contact.
-            turned = 1.0 - left_of(state.travel, course) if math.isfinite(state.travel) else 0.0
-            missing = target - turned
-            if abs(missing) <= _SETTLED or not high > low:
-                break
-            if missing > 0.0:
-                low = way
-            else:
-                high = way
-            rate = state.travel_rate
-            newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (course.end - course.begin) / rate
-            # Much nearer to the end than the target the rate may be zero or rounding: take the interpolant's rate.
-            new = way + missing * (newton if newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target) else pace)
-            if not (low < new < high and abs(new - way) <= 0.5 * before):
-                new = 0.5 * (low + high)
-            before = abs(new - way)
-            if new == way or not before > 0.0:
-                break
-            way = new
+        row, target = samples.rows[j], 0.25 * (part.workspace.twice[j] + 2.0)
+        state = _polished(part, target)
         if not math.isfinite(state.travel):
             continue
         # The digits of a position are limited: the interpolant corrects for the remaining distance to the angle.
-        reached = 1.0 - left_of(state.travel, course)
-        states = out.states[row]
-        write_state(state, leg.tip, scene, states)
+        reached, loads = 1.0 - left_of(state.travel, course), part.workspace.found[:, 0]
         for c in range(3):
-            states[6 + c] += value(over_angle[c], target) - value(over_angle[c], reached)
-        _note(row, state.at.p, state.at.q, leg.tip, scene, out)
+            loads[c] = value(over_angle[c], target) - value(over_angle[c], reached)
+        moment, force_x = state.holding_moment + loads[0], state.force_x + loads[1]
+        force_y = state.force_y + loads[2]
+        out_state = out.states[row]
+        _write_state(scene, state.at.p, state.at.q, state.travel, moment, force_x, force_y, out_state)
+        out_state.drive_angle = drive_angle_at(scene.line, state.travel) - scene.rig.compliance * state.holding_moment
+        _write_loads(scene, moment, force_x, force_y, out.loads[row])
+
+
+@compiled
+def _polished(part: Followed, target: float) -> Balance:
+    """State at a stretched drive angle, by Newton's method in it."""
+    course, curves = part.course, part.work.curves
+    stop, steadiness = course.stop, course.steadiness
+    way, pace = value_and_slope(curves.over_angle[WAY], curves.bend, target)
+    way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle falls again
+    low, high, before = 0.0, stop, stop
+    state = settle_on(part.scene, part.leg, way, guess(part.work, way), SETTLED)
+    for _ in range(_MOST_HALVINGS):
+        # Rounding may undo the very first contact.
+        turned = 1.0 - left_of(state.travel, course) if math.isfinite(state.travel) else 0.0
+        missing = target - turned
+        if abs(missing) <= _SETTLED or not high > low:
+            break
+        if missing > 0.0:
+            low = way
+        else:
+            high = way
+        rate = state.rates.travel
+        newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (course.end - course.begin) / rate
+        # Much nearer to the end than the target the rate may be zero or rounding: take the interpolant's rate.
+        new = way + missing * (newton if newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target) else pace)
+        if not (low < new < high and abs(new - way) <= 0.5 * before):
+            new = 0.5 * (low + high)
+        before = abs(new - way)
+        if new == way or not before > 0.0:
+            break
+        way = new
+        state = settle_on(part.scene, part.leg, way, guess(part.work, way), SETTLED)
+    return state

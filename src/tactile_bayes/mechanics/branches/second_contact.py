@@ -7,9 +7,11 @@ import math
 
 from tactile_bayes.mechanics.branches.curves import REST
 from tactile_bayes.mechanics.branches.equilibrium import Equilibrium, Scene, tangential_psi1
-from tactile_bayes.mechanics.branches.leg import PLACE, Leg, LegCurves, guess
+from tactile_bayes.mechanics.branches.leg import PLACE, LegCurves, guess
 from tactile_bayes.mechanics.branches.outline import Outline, Place, ends, is_inside, narrower, place
+from tactile_bayes.mechanics.branches.phase import on_rod
 from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import free_end, from_tip, loaded_part, rest_curvature
 from tactile_bayes.mechanics.poses.forward_table import PARTS
 
@@ -22,7 +24,7 @@ _ACROSS = 0.5 * math.pi
 
 
 @inlined
-def second_contact(scene: Scene, seen: Outline, leg: Leg, goes_on: bool, stop: float, work: LegCurves) -> float:
+def second_contact(scene: Scene, seen: Outline, goes_on: bool, stop: float, work: LegCurves) -> float:
     """Contact up to a position on a leg at which a rod curved toward the object would touch it twice; NaN without one.
 
     Unless the branch is exact, it is wholly looked for at the beginning and the end only.
@@ -35,17 +37,17 @@ def second_contact(scene: Scene, seen: Outline, leg: Leg, goes_on: bool, stop: f
             break
         p, q = work.at_nodes[PLACE, k], work.at_nodes[REST, k]
         force = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k])
-        if _touches_twice(scene, leg.tip, Equilibrium(p, q, force), scene.exact or k == 0, low, high):
+        if _touches_twice(scene, Equilibrium(p, q, force), scene.exact or k == 0, low, high):
             return p
     at = guess(work, stop)
-    return at.p if _touches_twice(scene, leg.tip, at, True, low, high) else math.nan
+    return at.p if _touches_twice(scene, at, True, low, high) else math.nan
 
 
 @inlined
-def folded_over(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> float:
+def folded_over(scene: Scene, stop: float, work: LegCurves) -> float:
     """Contact up to a position on a leg at which the tip lies along the contour with the other side of the rod; NaN
     without one. Beyond it, the rod beside its tip would be in the object."""
-    if not leg.tip:
+    if scene.phase != TIP:
         return math.nan
     most = math.pi - scene.rig.friction_angle - scene.outline.half_angle
     for k in range(work.nodes.size):
@@ -58,15 +60,15 @@ def folded_over(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> float:
 
 
 @inlined
-def _touches_twice(scene: Scene, tip: bool, at: Equilibrium, wholly: bool, low: float, high: float) -> bool:
+def _touches_twice(scene: Scene, at: Equilibrium, wholly: bool, low: float, high: float) -> bool:
     """True if a rod touches the object at another point too, between the ends of the contour.
 
     In tangential contact the free end has its rest shape. It is in the object at once where the contour is less
     curved than the rod, or further on, at its tip, which is looked for if all is. In tip contact it may be the loaded
     part.
     """
-    outline, beam, q = scene.outline, scene.beam, at.q
-    spot = narrower(outline, place(outline, at.p), 1.0 if tip else q)
+    outline, beam, q, tip = scene.outline, scene.beam, at.q, scene.phase == TIP
+    spot = narrower(outline, place(outline, at.p), on_rod(scene.phase, q, 0.0)[1])
     if not tip and spot.bend <= rest_curvature(beam, q) * spot.speed:
         return True
     if not wholly:

@@ -19,27 +19,20 @@ from tactile_bayes.mechanics.branches.branch import (
 )
 from tactile_bayes.mechanics.branches.clearance import travel_into
 from tactile_bayes.mechanics.branches.curves import Accuracy
-from tactile_bayes.mechanics.branches.equilibrium import (
-    Equilibrium,
-    Rig,
-    Scene,
-    balance,
-    in_phase,
-    on_line,
-    with_friction,
-)
+from tactile_bayes.mechanics.branches.equilibrium import Rig, Scene
 from tactile_bayes.mechanics.branches.limits import clear_angle
 from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_of
 from tactile_bayes.mechanics.branches.outline import Half, Outline, mirrored
-from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS, Found, Samples, write_state
+from tactile_bayes.mechanics.branches.readings import STATE, STATE_COLUMNS, Found, Samples
 from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_of, varied_of
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLES, Tables, prepare
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.rods.profile import Profile
 from tactile_bayes.tasks import in_parts
 
-__all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
+__all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_sweeps"]
 
 _SAME_ANGLE = 1e-5
 """Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
@@ -129,9 +122,11 @@ class Solutions(NamedTuple):
     loads: Floats
     """Loads in the laboratory frame [EI/L, EI/L² for a rigidity of 1], 0 out of contact, shape (contours, rows, 3)."""
     states: Floats
-    """States as in `Found`, shape (contours, rows or 0, columns)."""
+    """States with the columns of `STATE`, shape (contours, rows or 0, columns)."""
     changes: Floats
     """Events as in `Found`, shape (sweeps, phases + 1 or 0, 6)."""
+    event_states: Floats
+    """States there, shape (sweeps, phases + 1 or 0, columns)."""
     phases: Index
     """Number of phases."""
     reach: NDArray[np.int8]
@@ -165,7 +160,7 @@ def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
     return np.dtype([(name, kinds.get(name, np.float64)) for name in names], align=True)
 
 
-_SWEEP, _EVENTS = _side_by_side(Sweeps._fields), _side_by_side(Solutions._fields[3:])
+_SWEEP, _EVENTS = _side_by_side(Sweeps._fields), _side_by_side(Solutions._fields[4:])
 
 
 @compiled
@@ -218,7 +213,7 @@ def _scene(
     rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, moment, moment / sweep.relative_length)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
-    return Scene(outline, beam, rig, exact, line)
+    return Scene(outline, beam, rig, exact, line, TIP)
 
 
 @compiled
@@ -250,61 +245,6 @@ def _beam(
                 otherwise = table.slenderness
             break
     return beam_of(0.0, Varied(room, varied.work, own, slenderness, sign, other, otherwise), sweep.stem)
-
-
-@cached
-def _solve_events(
-    shapes: Shapes,
-    varied: Varied | None,
-    known: Tables,
-    sweeps: Any,
-    lines: Floats | None,
-    room: Floats | None,
-    line: Line | None,
-    events: Floats,
-    table: Floats,
-    out: Floats,
-) -> None:
-    """Write the states of events; see `solve_events`."""
-    for i in range(sweeps.size):
-        _place_lines(lines, sweeps[i], room)
-        scene = _scene(shapes, varied, known, sweeps[i], line, True, table)
-        for k in range(events.shape[1]):
-            out[i, k] = math.nan
-            out[i, k, 0] = 0.0
-            if not math.isnan(events[i, k, 0]):
-                tip = events[i, k, 3] > 0.0
-                at = Equilibrium(events[i, k, 0], events[i, k, 1], events[i, k, 2])
-                there = on_line(with_friction(scene, events[i, k, 5]), room, int(events[i, k, 4]))
-                state = balance(in_phase(there, tip), at)[0]
-                write_state(state, tip, there, out[i, k])
-                out[i, k, STATE_COLUMNS] = state.travel
-
-
-def solve_events(
-    shapes: Shapes, sweeps: Sweeps, events: Floats, profile: Profile | None = None, lines: Floats | None = None
-) -> Floats:
-    """States of events of sweeps, and their travel, from their coordinates as in `Found`.
-
-    The phase is `NONE` and the rest NaN for coordinates that are NaN.
-
-    Parameters
-    ----------
-    shapes : Shapes
-    sweeps : Sweeps
-    events : ndarray, shape (sweeps, k, 6)
-    profile : Profile, optional
-    lines : ndarray, optional
-        As in `Segments`.
-
-    Returns
-    -------
-    ndarray, shape (sweeps, k, columns + 1)
-    """
-    out = np.empty((*events.shape[:2], STATE_COLUMNS + 1))
-    table, drive = np.empty(shapes.tables.shape[1:]), _carried(lines)
-    _solve_events(shapes, varied_of(profile), NO_TABLES, _as_sweeps(sweeps), *drive, events, table, out)
-    return out
 
 
 def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line | None]:
@@ -378,8 +318,9 @@ def _solve(
     workspace: BranchWorkspace,
     table: Floats,
     loads: Floats,
-    all_states: Floats,
+    all_states: Any,
     changes: Floats,
+    event_states: Any,
     events: Any,
 ) -> None:
     """Follow the path of every sweep, and write the results of its samples.
@@ -396,8 +337,8 @@ def _solve(
         Workspace for one path.
     table : ndarray, shape (rows, columns)
         Workspace for the table of one contour.
-    loads, all_states, changes, events
-        As in `Solutions`; the events are a structured array.
+    loads, all_states, changes, event_states, events
+        As in `Solutions`; states and events are structured arrays.
     """
     count, knots = shapes.knots.shape[1], workspace.knots
     for i in range(sweeps.size):
@@ -408,7 +349,7 @@ def _solve(
             knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
         samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
-        found = Found(loads[c], all_states[c], changes[i])
+        found = Found(loads[c], all_states[c], changes[i], event_states[i])
         ends = _follow(scene, room, knots, samples, accuracy, tolerance, workspace, found, asks_sliding)
         event.reach, event.distance = ends.reach, ends.distance
         event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
@@ -469,8 +410,8 @@ def solve_sweeps(
     count, rows = shape
     sweep = _as_sweeps(sweeps)
     loads = np.zeros((count, rows, 3))
-    all_states = np.zeros((count, rows if states else 0, STATE_COLUMNS))
-    changes = np.full((sweep.size, MOST_CHANGES + 1 if states else 0, 6), np.nan)
+    all_states, most = np.zeros((count, rows if states else 0), dtype=STATE), MOST_CHANGES + 1 if states else 0
+    changes, event_states = np.full((sweep.size, most, 6), np.nan), np.zeros((sweep.size, most), dtype=STATE)
     events = np.empty(sweep.size, dtype=_EVENTS)
     longest = int(np.diff(segments.first).max(initial=0))
     lines = 0 if segments.lines is None else segments.lines.shape[1]
@@ -493,8 +434,12 @@ def solve_sweeps(
             loads,
             all_states,
             changes[part],
+            event_states[part],
             events[part],
         )
 
     in_parts(solve, sweep.size, _FEWEST)
-    return Solutions(loads, all_states, changes, *(np.ascontiguousarray(events[name]) for name in _EVENTS.names or ()))
+    columns = [one.view(np.float64).reshape(*one.shape, len(STATE_COLUMNS)) for one in (all_states, event_states)]
+    return Solutions(
+        loads, columns[0], changes, columns[1], *(np.ascontiguousarray(events[name]) for name in _EVENTS.names or ())
+    )

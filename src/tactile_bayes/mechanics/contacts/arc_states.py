@@ -98,14 +98,26 @@ def _argument(s: float, c: float, d: float, x: float, y: float, gap: float) -> f
     return double * s / math.sqrt(mean) * series
 
 
+class _Pendulum(NamedTuple):
+    """The elastica through the pivot, as the motion of a pendulum from the pivot on, and its turning point."""
+
+    sin0: float
+    cos0: float
+    square: float
+    """sin²A1 and cos²A1."""
+    complement: float
+    excess: float
+    """sin²A1 − sin²A0."""
+    at_rest: float
+    """κ0²/4."""
+    gap: float
+    """y − x."""
+
+
 @compiled
-def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, curvature: float) -> Found:
-    """Contact that follows from a base wrench, without integration or root search; see `contact_from_wrench`."""
-    force, modulus = math.sqrt(fx * fx + fy * fy), math.nan
-    beta = math.atan2(-fx, fy)
-    psi0 = phi0 - beta
+def _pendulum(psi0: float, moment: float, force: float, curvature: float) -> _Pendulum:
     quarter = 0.25 * math.pi - 0.5 * (psi0 - 2.0 * math.pi * math.floor((psi0 + 0.5 * math.pi) / (2.0 * math.pi)))
-    sin0, cos0, at_pivot = math.sin(quarter), math.cos(quarter), curvature - moment
+    sin0, cos0 = math.sin(quarter), math.cos(quarter)
     excess = 0.25 * moment * (moment - 2.0 * curvature) / force
     root = math.sqrt(abs(excess))
     if excess > 0.0:
@@ -113,31 +125,53 @@ def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, 
     else:
         square, complement = (abs(sin0) - root) * (abs(sin0) + root), cos0 * cos0 - excess
     at_rest = 0.25 * curvature * curvature
-    if force > 0.0:
-        modulus = square + at_rest / force
-    gap = force * complement - at_rest
+    return _Pendulum(sin0, cos0, square, complement, excess, at_rest, force * complement - at_rest)
+
+
+@compiled
+def _reaches_contact(swing: _Pendulum, moment: float, force: float, curvature: float) -> bool:
+    """Return whether the moment rises through zero somewhere."""
+    if not (0.0 < force < math.inf and swing.at_rest < math.inf and swing.square > 0.0 and swing.complement > 0.0):
+        return False
     # A pendulum that turns over does so in one sense.
-    possible = gap > 0.0 or at_pivot * curvature > 0.0
-    possible = possible and square > 0.0 and complement > 0.0 and 0.0 < force < math.inf and at_rest < math.inf
-    if not (possible and (moment > 0.0 or sin0 < 0.0)):
-        return Found(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
-    if gap <= 0.0 and curvature > 0.0 and sin0 < 0.0:
+    if not (swing.gap > 0.0 or (curvature - moment) * curvature > 0.0):
+        return False
+    return moment > 0.0 or swing.sin0 < 0.0
+
+
+@compiled
+def _length(swing: _Pendulum, moment: float, force: float, curvature: float) -> float:
+    """Arc length from the pivot to the contact."""
+    sin0, cos0, at_pivot = swing.sin0, swing.cos0, curvature - moment
+    if swing.gap <= 0.0 and curvature > 0.0 and sin0 < 0.0:
         sin0, cos0 = -sin0, -cos0
-    sin1, cos1, x = math.sqrt(square), math.sqrt(complement), at_rest + force * square
+    sin1, cos1, x = math.sqrt(swing.square), math.sqrt(swing.complement), swing.at_rest + force * swing.square
     one, other = sin0 * cos1, sin1 * cos0
-    apart = -excess / (one + other) if one * other > 0.0 else one - other
-    scale = at_rest + force * other * other
-    arclength = _argument(
+    apart = -swing.excess / (one + other) if one * other > 0.0 else one - other
+    scale = swing.at_rest + force * other * other
+    return _argument(
         0.5 * (curvature * apart + moment * other) / scale,
         (x * cos0 * cos1 + 0.25 * at_pivot * curvature * sin0 * sin1) / scale,
         (0.25 * at_pivot * curvature + force * one * other) / scale,
         x,
         force,
-        gap,
+        swing.gap,
     )
+
+
+@compiled
+def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, curvature: float) -> Found:
+    """Contact that follows from a base wrench, without integration or root search; see `contact_from_wrench`."""
+    force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
+    swing = _pendulum(phi0 - beta, moment, force, curvature)
+    modulus = swing.square + swing.at_rest / force if force > 0.0 else math.nan
+    arclength = math.nan
+    if _reaches_contact(swing, moment, force, curvature):
+        arclength = _length(swing, moment, force, curvature)
     if not is_moderate(arclength, force, curvature):
         return Found(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
-    here = pose(0.5 * math.pi - 2.0 * math.atan2(sin1, cos1), arclength, force, curvature)
+    psi1 = 0.5 * math.pi - 2.0 * math.atan2(math.sqrt(swing.square), math.sqrt(swing.complement))
+    here = pose(psi1, arclength, force, curvature)
     u, v = moment / force, here.v
     x, y = (u * fy + v * fx) / force, (v * fy - u * fx) / force
     return Found(x, y, beta - delta, arclength, phi0 - here.turn, modulus)

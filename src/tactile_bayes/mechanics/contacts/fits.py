@@ -66,10 +66,11 @@ class RawFit(NamedTuple):
     """Contact point, slope angle and arc length, shape (n, 4)."""
     tip_angle: Floats
     covariance: Floats
-    """Covariance of the place to first order, shape (n, 4, 4)."""
+    """Covariance of the place to first order, shape (n, 4, 4), or without rows if there is no noise."""
     bend: Floats
     """Nonlinearity: squared distance, in the metric of the covariance, from the contact to the mean of two contacts one
-    standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,)."""
+    standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,), or (0,)
+    without noise."""
     deviation: Floats
     """Deviation of the contact from one at the tip or along the rod, in its standard deviations, or in L and rad
     without noise, shape (n,)."""

@@ -7,48 +7,32 @@ the rod is bent both ways. Beyond its tip a rod is continued with the rest curva
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, Found
 from tactile_bayes.mechanics.poses.rises import rise
 from tactile_bayes.mechanics.poses.taylor import FARTHEST, FORWARD, State, advance, begin, moved
 from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = ["ProfileContact", "contact_along", "is_exact", "zeros_along"]
-
-
-class ProfileContact(NamedTuple):
-    """Contact of a forward sweep that follows from a base wrench; NaN where there is none."""
-
-    x: float
-    y: float
-    """Contact point relative to the pivot [L]."""
-    slope_angle: float
-    """Slope angle α of the contour [rad]."""
-    arclength: float
-    """Arc length s1 [L]; above 1 the contact lies beyond the tip."""
-    tip_angle: float
-    """Slope φ(s1) of the rod at the contact [rad]."""
+__all__ = ["is_exact", "zeros_along"]
 
 
 _EXACT = 1e-6
 """Arc length [L] and angle [rad] that count as zero in Step 2 without errors."""
 
-_NONE = ProfileContact(math.nan, math.nan, math.nan, math.nan, math.nan)
-
 
 @compiled
 def zeros_along(
     profile: Profile, phi0: float, moment: float, fx: float, fy: float, delta: float, work: Floats
-) -> tuple[ProfileContact, ProfileContact]:
+) -> tuple[Found, Found]:
     """First two points without moment, for drive angle, holding moment, support reaction and friction angle.
 
     The moment rises through zero at one of them and falls at the other, which are returned in this order. There is no
     second one if the first lies beyond the tip.
     """
     force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
-    state, rising, falling = State(phi0 - beta, -moment, 0.0, 0.0), _NONE, _NONE
+    state, rising, falling = State(phi0 - beta, -moment, 0.0, 0.0), NO_CONTACT, NO_CONTACT
     if not (0.0 < force < math.inf and math.isfinite(moment)):
         return rising, falling
     # A force without moment passes through the pivot: the rod must bend away from it before it returns.
@@ -63,27 +47,13 @@ def zeros_along(
             cos, sin = math.cos(beta), math.sin(beta)
             x, y = end.u * cos - end.v * sin, end.u * sin + end.v * cos
             if sense > 0.0:
-                rising = ProfileContact(x, y, beta - delta, at, beta + end.psi)
+                rising = Found(x, y, beta - delta, at, beta + end.psi, math.nan)
             else:
-                falling = ProfileContact(x, y, beta - delta, at, beta + end.psi)
+                falling = Found(x, y, beta - delta, at, beta + end.psi, math.nan)
             if at > 1.0 or (rising.arclength > 0.0 and falling.arclength > 0.0):
                 break
             march, sense = begin(profile, at, FORWARD, State(end.psi, 0.0, end.u, end.v)), -sense
     return rising, falling
-
-
-@compiled
-def contact_along(
-    profile: Profile, phi0: float, moment: float, fx: float, fy: float, delta: float, work: Floats
-) -> ProfileContact:
-    """Contact for drive angle, holding moment, support reaction and friction angle, without errors.
-
-    It is the point at which the moment rises through zero, unless the rod ends at the other one."""
-    rising, falling = zeros_along(profile, phi0, moment, fx, fy, delta, work)
-    is_contact = is_exact(rising.arclength, rising.tip_angle - rising.slope_angle)
-    if not is_contact and is_exact(falling.arclength, math.pi):
-        return falling
-    return rising if is_contact or not falling.arclength < rising.arclength else _NONE
 
 
 @compiled

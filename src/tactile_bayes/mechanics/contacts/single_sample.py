@@ -13,7 +13,7 @@ from tactile_bayes.mechanics.contacts.fits import RawFit, Reading
 from tactile_bayes.mechanics.contacts.states import contact_pair
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, mirrored_by
 
-__all__ = ["Workspace", "descents", "raw_fits"]
+__all__ = ["Room", "Workspace", "descents", "raw_fits"]
 
 _MOST_SWEEPS = 30
 
@@ -172,6 +172,33 @@ def _invert(normal: Floats, i: int, harder: float, inverse: Floats) -> None:
             inverse[a, b] /= math.sqrt(normal[i, a, a] * normal[i, b, b]) * harder
 
 
+class Room(NamedTuple):
+    """Arrays that `raw_fits` writes to."""
+
+    z: Floats
+    """Coordinates of one contact, shape (1, 4)."""
+    errors: Floats
+    """Four independent errors of drive angle and loads, one standard deviation long, in rows, shape (4, 4)."""
+    shifts: Floats
+    """Shifts of the place and of ψ1 by them, of the two points that may be the contact, shape (2, 4, 5)."""
+    matrix: Floats
+    axes: Floats
+    """Shape (3, 3)."""
+    by: Floats
+    """As in `contact_state`."""
+
+
+class _Sample(NamedTuple):
+    """A rod, what is read of it, and its friction."""
+
+    beam: Beam
+    drive_angle: float
+    moment: float
+    force_x: float
+    force_y: float
+    friction_angle: float
+
+
 @cached
 def raw_fits(
     reading: Reading,
@@ -180,109 +207,76 @@ def raw_fits(
     varied: Varied | None,
     stem: float,
     out: RawFit,
-    z: Floats,
-    errors: Floats,
-    changes: Floats,
-    matrix: Floats,
-    axes: Floats,
-    by: Floats,
+    room: Room,
 ) -> None:
-    """Write the contacts of Step 2; see `raw_contacts`."""
+    """Write the contacts of Step 2; see `raw_contacts`. Without noise there is no room for covariances."""
+    has_noise = out.bend.size > 0
     for i in range(delta.size):
-        angle, moment = reading.drive_angle[i], reading.loads[i, 0]
-        force_x, force_y = reading.loads[i, 1], reading.loads[i, 2]
+        loads = reading.loads[i]
         beam = mirrored_by(curvature[i], varied, stem)
-        rising, falling = contact_pair(beam, angle, moment, force_x, force_y, delta[i])
-        out.bend[i] = math.nan
-        for k in range(4):
-            out.place[i, k], out.other[i, k] = math.nan, math.nan
-            for p in range(4):
-                out.covariance[i, k, p] = math.nan
-        _write_errors(reading, i, matrix, axes, errors)
-        out.deviation[i] = _deviation(rising, delta[i], beam, reading, i, z, errors, by, changes)
-        out.other_deviation[i] = _deviation(falling, delta[i], beam, reading, i, z, errors, by, changes)
-        found, other = rising, falling
-        falls = out.other_deviation[i] < out.deviation[i] or math.isnan(rising.arclength)
+        sample = _Sample(beam, reading.drive_angle[i], loads[0], loads[1], loads[2], delta[i])
+        rising, falling = contact_pair(*sample)
+        noisy = has_noise and _write_errors(reading, i, room)
+        deviation = _deviation(rising, sample, noisy, room, 0)
+        other_deviation = _deviation(falling, sample, noisy, room, 1)
+        found, other, falls = rising, falling, other_deviation < deviation or math.isnan(rising.arclength)
         if falls:
             found, other = falling, rising
-            out.deviation[i], out.other_deviation[i] = out.other_deviation[i], out.deviation[i]
+            deviation, other_deviation = other_deviation, deviation
         is_second = falling.arclength < rising.arclength or math.isnan(rising.arclength)
-        if is_second and not out.deviation[i] < (_POSSIBLE if _is_noisy(errors) else _NEAR):
+        if is_second and not deviation < (_POSSIBLE if noisy else _NEAR):
             found = NO_CONTACT
-        out.tip_angle[i] = found.tip_angle
+        out.deviation[i], out.other_deviation[i], out.tip_angle[i] = deviation, other_deviation, found.tip_angle
         for k in range(4):
             out.place[i, k], out.other[i, k] = found[k], other[k]
-        if math.isnan(found.arclength):
-            continue
-        _deviation(found, delta[i], beam, reading, i, z, errors, by, changes)
-        _spread(changes, out.covariance, i)
-        out.bend[i] = 0.0
-        for k in range(4 if reading.angle_deviation[i] > 0.0 else 3):
-            x_off, y_off = -found.x, -found.y
-            for sign in (1.0, -1.0):
-                a, m, fx, fy = sign * errors[k, 0], sign * errors[k, 1], sign * errors[k, 2], sign * errors[k, 3]
-                pair = contact_pair(beam, angle + a, moment + m, force_x + fx, force_y + fy, delta[i])
-                aside = pair[1] if falls else pair[0]
-                x_off, y_off = x_off + 0.5 * aside.x, y_off + 0.5 * aside.y
-            out.bend[i] = _bent(out.bend[i], x_off, y_off, out.covariance, i)
+        if has_noise:
+            _write_spread(found, falls, sample, out, i, room)
 
 
 @compiled
-def _write_errors(reading: Reading, i: int, matrix: Floats, axes: Floats, errors: Floats) -> None:
-    """Write four independent errors of drive angle and loads, one standard deviation long, in rows."""
+def _write_errors(reading: Reading, i: int, room: Room) -> bool:
+    """Write the errors of a sample, and return whether any is not zero."""
+    matrix, axes, errors = room.matrix, room.axes, room.errors
     for a in range(3):
         for b in range(3):
             value = reading.covariance[i, a, b]
             matrix[a, b] = value if math.isfinite(value) else _BEYOND_ALL
     _principal(matrix, axes)
     deviation = reading.angle_deviation[i]
+    noisy = deviation != 0.0
     for k in range(3):
         errors[k, 0], errors[3, k + 1] = 0.0, deviation * reading.leaning[i, k]
         for a in range(3):
             errors[k, a + 1] = axes[a, k]
+            noisy = noisy or axes[a, k] != 0.0
     errors[3, 0] = deviation
+    if not noisy:
+        room.shifts[:] = 0.0
+    return noisy
 
 
 @compiled
-def _is_noisy(errors: Floats) -> bool:
-    """True if any error is not zero."""
-    for k in range(4):
-        for a in range(4):
-            if errors[k, a] != 0.0:
-                return True
-    return False
-
-
-@compiled
-def _deviation(
-    found: Found,
-    delta: float,
-    beam: Beam,
-    reading: Reading,
-    i: int,
-    z: Floats,
-    errors: Floats,
-    by: Floats,
-    changes: Floats,
-) -> float:
+def _deviation(found: Found, sample: _Sample, noisy: bool, room: Room, which: int) -> float:
     """Deviation of a point without moment from a contact at the tip or along the rod, in standard deviations, or in L
-    and rad without noise; infinite for no point. Writes the shifts of place and ψ1 by the errors, in rows."""
+    and rad without noise; infinite for no point. With noise the shifts are written."""
     if math.isnan(found.arclength):
         return math.inf
     turn = found.tip_angle - found.slope_angle
     turn -= 2.0 * math.pi * math.floor(0.5 * turn / math.pi + 0.25)
-    z[0, 0], z[0, 1] = math.hypot(reading.loads[i, 1], reading.loads[i, 2]), turn - delta
-    z[0, 2], z[0, 3] = found.arclength, reading.drive_angle[i]
-    bend = contact_state(z, 0, beam, by)
-    length_variance, turn_variance = 0.0, 0.0
-    for k in range(4):
-        change = moved(z, 0, beam, bend, by, errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3])
-        for p in range(5):
-            changes[k, p] = change[p]
-        length_variance += change[3] * change[3]
-        turn_variance += change[4] * change[4]
     by_length, by_turn = 1.0, 1.0
-    if _is_noisy(errors):
+    if noisy:
+        z, errors, shifts = room.z, room.errors, room.shifts[which]
+        z[0, 0], z[0, 1] = math.hypot(sample.force_x, sample.force_y), turn - sample.friction_angle
+        z[0, 2], z[0, 3] = found.arclength, sample.drive_angle
+        bend = contact_state(z, 0, sample.beam, room.by)
+        length_variance, turn_variance = 0.0, 0.0
+        for k in range(4):
+            error = errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3]
+            shift = moved(z, 0, sample.beam, bend, room.by, *error)
+            for p in range(5):
+                shifts[k, p] = shift[p]
+            length_variance += shift[3] * shift[3]
+            turn_variance += shift[4] * shift[4]
         by_length = 1.0 / max(math.sqrt(length_variance), _SAME)
         by_turn = 1.0 / max(math.sqrt(turn_variance), _SAME)
     ends = math.hypot(by_length * (found.arclength - 1.0), by_turn * max(-turn, turn - math.pi, 0.0))
@@ -291,21 +285,35 @@ def _deviation(
 
 
 @compiled
-def _spread(changes: Floats, covariance: Floats, i: int) -> None:
-    """Store the covariance of a place from its shifts by four independent errors."""
+def _write_spread(found: Found, falls: bool, sample: _Sample, out: RawFit, i: int, room: Room) -> None:
+    """Write the covariance of a place from its shifts, and its bend from the contacts of samples with the errors."""
+    covariance, shifts, errors = out.covariance[i], room.shifts[1 if falls else 0], room.errors
+    is_none = math.isnan(found.arclength)
+    out.bend[i] = math.nan if is_none else 0.0
     for a in range(4):
         for b in range(4):
-            covariance[i, a, b] = 0.0
+            covariance[a, b] = out.bend[i]
             for k in range(4):
-                covariance[i, a, b] += changes[k, a] * changes[k, b]
+                covariance[a, b] += shifts[k, a] * shifts[k, b]
+    if is_none:
+        return
+    for k in range(4 if errors[3, 0] > 0.0 else 3):
+        x, y = -found.x, -found.y
+        for sign in (1.0, -1.0):
+            angle, moment = sample.drive_angle + sign * errors[k, 0], sample.moment + sign * errors[k, 1]
+            force_x, force_y = sample.force_x + sign * errors[k, 2], sample.force_y + sign * errors[k, 3]
+            pair = contact_pair(sample.beam, angle, moment, force_x, force_y, sample.friction_angle)
+            aside = pair[1] if falls else pair[0]
+            x, y = x + 0.5 * aside.x, y + 0.5 * aside.y
+        out.bend[i] = _bent(out.bend[i], x, y, covariance)
 
 
 @compiled
-def _bent(bend: float, x: float, y: float, covariance: Floats, i: int) -> float:
+def _bent(bend: float, x: float, y: float, covariance: Floats) -> float:
     """Larger of two bends, the second that of contacts whose mean is off by (x, y); NaN counts as the largest."""
     if math.isnan(bend) or x * x + y * y < _SAME * _SAME:
         return bend
-    xx, yy, xy = covariance[i, 0, 0], covariance[i, 1, 1], covariance[i, 0, 1]
+    xx, yy, xy = covariance[0, 0], covariance[1, 1], covariance[0, 1]
     shift = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
     return bend if shift <= bend else shift
 

@@ -19,7 +19,6 @@ from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, Found, arc_z
 from tactile_bayes.mechanics.contacts.continuation import NOWHERE, Start, State, continued_state, unloaded_arc
 from tactile_bayes.mechanics.contacts.profile_contact import is_exact, zeros_along
 from tactile_bayes.mechanics.contacts.tables import (
-    AMPLITUDE,
     MOST_FRICTION,
     Tables,
     Workspace,
@@ -43,16 +42,14 @@ from tactile_bayes.mechanics.poses.profile_shape import shape_along
 from tactile_bayes.mechanics.rods.profile import Profile
 
 __all__ = [
-    "arc_contacts",
     "contact",
     "contact_of",
     "contact_pair",
-    "contacts",
     "continued_wrenches",
-    "profile_contacts",
     "profile_shapes",
     "wrenches",
     "write_contact_pairs",
+    "write_contacts",
 ]
 
 _BEYOND = 1e-12
@@ -72,7 +69,7 @@ def _tangential(x: float, y: float, alpha: float, delta: float, workspace: Works
     angle = min(angle, largest)
     m = 0.5 * (1.0 + math.sin(delta))
     if delta <= MOST_FRICTION:
-        guess = math.sqrt(max(angle * series(workspace, AMPLITUDE, angle / largest), 0.0))
+        guess = math.sqrt(max(angle * series(workspace, angle / largest), 0.0))
     else:
         guess = min(math.sqrt(3.0 * angle / math.sqrt(m * (1.0 - m))), math.pi)
     chi, arc, by_chi = tangential_arc(angle, m, guess)
@@ -104,7 +101,7 @@ def _tip_state(x: float, y: float, alpha: float, delta: float, known: Tables, wo
     sin, cos = math.sin(beta), math.cos(beta)
     u, v = x * cos + y * sin, y * cos - x * sin
     deficit, chord_angle = math.sqrt(deficit2), max(math.atan2(u, v), 0.0)
-    angle, share, by_angle, by_share = in_polar(known, deficit, chord_angle, AMPLITUDE, workspace)
+    angle, share, by_angle, by_share = in_polar(known, deficit, chord_angle, workspace)
     chi, epsilon1, arc, by_chi, by_psi1 = tip_arc(
         deficit, chord_angle, math.sqrt(max(angle * by_angle, 0.0)), share * by_share
     )
@@ -234,23 +231,6 @@ def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> F
     return Found(x, y, beta - delta, arc.length / root, tip_angle, modulus)
 
 
-@cached
-def contacts(columns: Floats, out: Floats) -> None:
-    """Write the contacts that follow from base wrenches, mirrored to forward ones.
-
-    Parameters
-    ----------
-    columns : ndarray, shape (n, 5)
-        Drive angle, holding moment and support reaction, friction angle.
-    out : ndarray, shape (n, 6)
-        As `Contact`.
-    """
-    for i in range(columns.shape[0]):
-        found = contact(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
-        for k in range(6):
-            out[i, k] = found[k]
-
-
 @compiled
 def contact_pair(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> tuple[Found, Found]:
     """Points of any rod that may be its contact: the moment rises through zero at the first, and falls at the second.
@@ -280,16 +260,15 @@ def _contact_pair(
         if curvature == 0.0:
             return contact(phi0, moment, fx, fy, delta), NO_CONTACT
         return arc_zeros(phi0, moment, fx, fy, delta, curvature)
-    one, other = zeros_along(varied.profile, phi0, moment, fx, fy, delta, varied.work)
-    return (
-        Found(one.x, one.y, one.slope_angle, one.arclength, one.tip_angle, math.nan),
-        Found(other.x, other.y, other.slope_angle, other.arclength, other.tip_angle, math.nan),
-    )
+    return zeros_along(varied.profile, phi0, moment, fx, fy, delta, varied.work)
 
 
 @compiled
 def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
-    """Contact of any rod that follows from a base wrench without errors, as in `contact_along`."""
+    """Contact of any rod that follows from a base wrench without errors.
+
+    It is the point at which the moment rises through zero, unless the rod ends at the other one.
+    """
     rising, falling = contact_pair(beam, phi0, moment, fx, fy, delta)
     is_contact = is_exact(rising.arclength, rising.tip_angle - rising.slope_angle)
     if not is_contact and is_exact(falling.arclength, math.pi):
@@ -299,23 +278,33 @@ def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, del
 
 
 @cached
+def write_contacts(columns: Floats, curvature: Floats, varied: Varied | None, stem: float, out: Floats) -> None:
+    """Write the contacts that follow from base wrenches, mirrored to forward ones.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, 5)
+        Drive angle, holding moment and support reaction, friction angle.
+    curvature, varied, stem
+        As in `Rods`.
+    out : ndarray, shape (n, 6)
+        As `Contact`.
+    """
+    for i in range(columns.shape[0]):
+        beam = mirrored_by(curvature[i], varied, stem)
+        found = contact_of(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
+        for k in range(6):
+            out[i, k] = found[k]
+
+
+@cached
 def write_contact_pairs(columns: Floats, curvature: Floats, varied: Varied | None, stem: float, out: Floats) -> None:
-    """Write arc length and ψ1 of both points of `contact_pair`, shape (n, 2, 2), for wrenches as in `contacts`."""
+    """Write arc length and ψ1 of both points of `contact_pair`, shape (n, 2, 2); see `write_contacts`."""
     for i in range(columns.shape[0]):
         beam = mirrored_by(curvature[i], varied, stem)
         pair = contact_pair(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
         for k in range(2):
             out[i, k, 0], out[i, k, 1] = pair[k].arclength, pair[k].tip_angle - pair[k].slope_angle - columns[i, 4]
-
-
-@cached
-def profile_contacts(columns: Floats, varied: Varied, out: Floats) -> None:
-    """Write contacts of a rod with a profile as `contacts` does; the last column is −1 for the mirrored rod, else 1."""
-    for i in range(columns.shape[0]):
-        beam = mirrored_by(columns[i, 5], varied, 0.0)
-        found = contact_of(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
-        for k in range(6):
-            out[i, k] = found[k]
 
 
 @cached
@@ -338,13 +327,3 @@ def profile_shapes(wrenches: Floats, varied: Varied, arclengths: Floats, x: Floa
         if math.isnan(end):
             for k in range(arclengths.size):
                 x[i, k], y[i, k] = math.nan, math.nan
-
-
-@cached
-def arc_contacts(columns: Floats, out: Floats) -> None:
-    """Write contacts of arcs as `contacts` does; the rest curvature is the last column."""
-    for i in range(columns.shape[0]):
-        beam = mirrored_by(columns[i, 5], None, 0.0)
-        found = contact_of(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
-        for k in range(6):
-            out[i, k] = found[k]

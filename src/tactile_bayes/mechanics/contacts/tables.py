@@ -1,10 +1,10 @@
-"""Chebyshev tables of the two maps of a straight rod in contact: position of its ends → force, turn, and first guesses.
+"""Chebyshev tables of first guesses for the two maps of a straight rod in contact, from the position of its ends.
 
 In tangential contact they are series in the angle of the chord to the contour's tangent, as a share of the largest
 angle, and in the friction angle. In tip contact they are series in polar coordinates of (chord angle, chord deficit):
 the polar angle, and the radius as a share of the largest radius. Factors that vanish at first contact are divided out.
-Cells become smaller toward the folds of the maps, so that few terms suffice everywhere: loads and drive angles have
-errors of 5e-8 (`tests/`). Tables are computed once a process, from exact arcs, in a few milliseconds.
+Cells become smaller toward the folds of the maps, so that few terms suffice everywhere: errors are some 5e-8. They are
+computed once a process, from exact arcs, in a few milliseconds.
 """
 
 from __future__ import annotations
@@ -22,12 +22,7 @@ from tactile_bayes.mechanics.poses.chord import tangential_arc, tip_arc
 from tactile_bayes.numerics import chebyshev
 
 __all__ = [
-    "AMPLITUDE",
-    "EPSILON1",
-    "FORCE",
     "MOST_FRICTION",
-    "STRETCH",
-    "TURN",
     "Tables",
     "Workspace",
     "in_polar",
@@ -39,10 +34,6 @@ __all__ = [
 
 MOST_FRICTION = 0.58
 """Largest friction angle of the tables [rad]: nearer to the fold of the map the series would be longer."""
-
-FORCE, TURN, AMPLITUDE, STRETCH, EPSILON1 = 0, 1, 2, 3, 3
-"""Tabulated quantities. Tangential contact: force times the square of the chord, turn, and χ², all over the angle; arc
-length over chord. Tip contact: force over the angle, turn less ε1, χ² over the angle, ε1 over the share."""
 
 _TERMS = 10
 """Terms of each series in a cell of tip contact, in angle and in share."""
@@ -69,19 +60,19 @@ class Tables(NamedTuple):
     """Coefficients of all tables."""
 
     tangential: Floats
-    """Tangential contact, shape (4, friction angles, cells, terms)."""
+    """χ² over the angle in tangential contact, shape (friction angles, cells, terms)."""
     radius: Floats
     """Largest radius in tip contact in the angle, shape (angles, terms)."""
     tip: Floats
-    """Tip contact: the tabulated quantities side by side, for one loop over all, shape (angles, shares, terms in the
-    share, 4 · terms in the angle)."""
+    """χ² over the angle and ε1 over the share in tip contact, side by side, for one loop over both, shape (angles,
+    shares, terms in the share, 2 · terms in the angle)."""
 
 
 class Workspace(NamedTuple):
     """Workspace for one state, with the series for one friction angle."""
 
     tangential: Floats
-    """Series of tangential contact in the angle, shape (4, cells, terms)."""
+    """Series of tangential contact in the angle, shape (cells, terms)."""
     by_angle: Floats
     by_share: Floats
     row: Floats
@@ -92,7 +83,7 @@ def workspace() -> Workspace:
     by_angle, by_share = np.empty((2, _TERMS))
     row, tangential = (
         np.empty(max(2 * _TERMS, _TANGENTIAL_TERMS[1])),
-        np.empty((4, _LEVELS.size - 1, _TANGENTIAL_TERMS[0])),
+        np.empty((_LEVELS.size - 1, _TANGENTIAL_TERMS[0])),
     )
     return Workspace(tangential, by_angle, by_share, row)
 
@@ -105,15 +96,15 @@ def tables() -> Tables:
         _in_cells(_SHARES, _TERMS),
         _in_cells(_LEVELS, _TANGENTIAL_TERMS[0]),
     )
-    radius, tip = np.empty(angles.size), np.empty((4, angles.size, shares.size))
+    radius, tip = np.empty(angles.size), np.empty((2, angles.size, shares.size))
     _tabulate_tip(0.5 * np.pi * angles.ravel(), shares.ravel(), 0.5 * np.pi + _MARGIN + MOST_FRICTION, radius, tip)
-    by_share = chebyshev.coefficients(tip.reshape(4, *angles.shape, *shares.shape))
+    by_share = chebyshev.coefficients(tip.reshape(2, *angles.shape, *shares.shape))
     by_both = chebyshev.coefficients(by_share.swapaxes(-1, -2)).transpose(3, 4, 1, 2, 0)
-    tangential = np.empty((4, levels.size, _TANGENTIAL_TERMS[1]))
+    tangential = np.empty((levels.size, _TANGENTIAL_TERMS[1]))
     _tabulate_tangential(levels.ravel(), MOST_FRICTION * chebyshev.nodes(_TANGENTIAL_TERMS[1]), tangential)
-    by_friction = chebyshev.coefficients(tangential.reshape(4, *levels.shape, -1))
+    by_friction = chebyshev.coefficients(tangential.reshape(*levels.shape, -1))
     return Tables(
-        tangential=np.ascontiguousarray(chebyshev.coefficients(by_friction).transpose(2, 1, 3, 0)),
+        tangential=np.ascontiguousarray(chebyshev.coefficients(by_friction).transpose(1, 2, 0)),
         radius=np.ascontiguousarray(chebyshev.coefficients(radius.reshape(angles.shape)).T),
         tip=by_both.reshape(*by_both.shape[:3], -1),
     )
@@ -131,15 +122,12 @@ def _tabulate_tangential(levels: Floats, deltas: Floats, out: Floats) -> None:
         for i in range(levels.size):
             angle = levels[i] * largest
             guess = min(math.sqrt(3.0 * angle / math.sqrt(m * (1.0 - m))), math.pi)
-            chi, arc, _ = tangential_arc(angle, m, guess)
-            chord = math.hypot(arc.length - arc.shortfall, arc.offset)
-            out[FORCE, i, j], out[TURN, i, j] = chord * chord / angle, arc.turn / angle
-            out[AMPLITUDE, i, j], out[STRETCH, i, j] = chi * chi / angle, arc.length / chord
+            out[i, j] = tangential_arc(angle, m, guess)[0] ** 2 / angle
 
 
 @cached
 def _tabulate_tip(angles: Floats, shares: Floats, largest: float, radius: Floats, out: Floats) -> None:
-    """Write the largest radius at every angle, at the largest ε1, and the tabulated quantities, shape (4, angles,
+    """Write the largest radius at every angle, at the largest ε1, and the tabulated quantities, shape (2, angles,
     shares)."""
     m = math.sin(0.5 * largest) ** 2
     for i in range(angles.size):
@@ -159,23 +147,21 @@ def _tabulate_tip(angles: Floats, shares: Floats, largest: float, radius: Floats
                 math.sin(angles[i]) * radius[i] * shares[j],
                 math.cos(angles[i]) * radius[i] * shares[j],
             )
-            chi, epsilon1, arc, _, _ = tip_arc(deficit, chord_angle, chi, epsilon1)
-            out[FORCE, i, j], out[TURN, i, j] = arc.length * arc.length / angles[i], arc.turn - epsilon1
-            out[AMPLITUDE, i, j], out[EPSILON1, i, j] = chi * chi / angles[i], epsilon1 / shares[j]
+            chi, epsilon1, _, _, _ = tip_arc(deficit, chord_angle, chi, epsilon1)
+            out[0, i, j], out[1, i, j] = chi * chi / angles[i], epsilon1 / shares[j]
 
 
 @compiled
 def prepare(known: Tables, friction_angle: float, workspace: Workspace) -> None:
     """Write the series of tangential contact at a friction angle to the workspace."""
-    frictions = known.tangential.shape[1]
+    frictions = known.tangential.shape[0]
     _polynomials(min(friction_angle / MOST_FRICTION, 1.0), frictions, workspace.row)
     workspace.tangential[:] = 0.0
-    for k in range(4):
-        for j in range(frictions):
-            weight = workspace.row[j]
-            for c in range(workspace.tangential.shape[1]):
-                for i in range(workspace.tangential.shape[2]):
-                    workspace.tangential[k, c, i] += weight * known.tangential[k, j, c, i]
+    for j in range(frictions):
+        weight = workspace.row[j]
+        for c in range(workspace.tangential.shape[0]):
+            for i in range(workspace.tangential.shape[1]):
+                workspace.tangential[c, i] += weight * known.tangential[j, c, i]
 
 
 @compiled
@@ -188,14 +174,14 @@ def _cell(ends: Floats, z: float) -> tuple[int, float]:
 
 
 @compiled
-def series(workspace: Workspace, k: int, level: float) -> float:
-    """Tabulated quantity k of tangential contact at a share of the largest angle, by Clenshaw's recurrence."""
+def series(workspace: Workspace, level: float) -> float:
+    """χ² over the angle in tangential contact at a share of the largest angle, by Clenshaw's recurrence."""
     cell, z = _cell(_LEVELS, level)
     twice = 4.0 * z - 2.0
     now, before = 0.0, 0.0
-    for i in range(workspace.tangential.shape[2] - 1, 0, -1):
-        now, before = (workspace.tangential[k, cell, i] - before) + twice * now, now
-    return (workspace.tangential[k, cell, 0] - before) + 0.5 * twice * now
+    for i in range(workspace.tangential.shape[1] - 1, 0, -1):
+        now, before = (workspace.tangential[cell, i] - before) + twice * now, now
+    return (workspace.tangential[cell, 0] - before) + 0.5 * twice * now
 
 
 @compiled
@@ -209,9 +195,9 @@ def _polynomials(z: float, size: int, out: Floats) -> None:
 
 @compiled
 def in_polar(
-    known: Tables, deficit: float, chord_angle: float, first: int, workspace: Workspace
+    known: Tables, deficit: float, chord_angle: float, workspace: Workspace
 ) -> tuple[float, float, float, float]:
-    """Polar angle, share of the largest radius, and two tabulated quantities there, beginning with `first`."""
+    """Polar angle, share of the largest radius, and χ² over the angle and ε1 over the share there."""
     terms = _TERMS
     angle = math.atan2(deficit, chord_angle)
     i, z = _cell(_ANGLES, angle / (0.5 * math.pi))
@@ -222,13 +208,12 @@ def in_polar(
     share = min(math.sqrt(deficit * deficit + chord_angle * chord_angle) / largest, 1.0)
     j, z = _cell(_SHARES, share)
     _polynomials(z, terms, workspace.by_share)
-    begin = first * terms
     for a in range(2 * terms):
         workspace.row[a] = 0.0
     for s in range(terms):
         weight = workspace.by_share[s]
         for a in range(2 * terms):
-            workspace.row[a] += weight * known.tip[i, j, s, begin + a]
+            workspace.row[a] += weight * known.tip[i, j, s, a]
     one, other = 0.0, 0.0
     for a in range(terms):
         one += workspace.row[a] * workspace.by_angle[a]

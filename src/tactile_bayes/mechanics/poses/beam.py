@@ -16,11 +16,19 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.poses.forward_table import PARTS, chord_in, has_parts, is_far, part_in, pose_in, sheet
 from tactile_bayes.mechanics.poses.pose import Pose, by_arclength, pose, pose_and_slopes
-from tactile_bayes.mechanics.poses.profile_pose import at_contact, part_along, pose_along_and_slopes
+from tactile_bayes.mechanics.poses.profile_pose import (
+    at_contact,
+    part_along,
+    pose_along_and_slopes,
+    pose_along_in_phase,
+)
 from tactile_bayes.mechanics.poses.profile_shape import beyond_along, chord_along, largest_bending_along, rest_along
 from tactile_bayes.mechanics.poses.taylor import (
     FORWARD,
@@ -72,13 +80,13 @@ class Varied(NamedTuple):
 
     profile: Profile
     work: Floats
-    sheet: Floats
+    sheet: NDArray[np.void]
     """Coefficients of its pose, from a table."""
     slenderness: float
     """Slenderness of the table; 0 if there are no coefficients."""
     sign: float
     """Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose."""
-    other_sheet: Floats
+    other_sheet: NDArray[np.void]
     other_slenderness: float
     """Coefficients and slenderness for friction that acts in the other sense."""
 
@@ -255,8 +263,7 @@ def _pose(
         )
         if inside:
             return here, by_q, by_force
-    here, by_psi1, by_arclength, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
-    return here, by_psi1 if tip else by_arclength, by_force
+    return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work)
 
 
 @compiled

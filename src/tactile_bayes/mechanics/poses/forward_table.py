@@ -16,9 +16,10 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import cached, compiled
@@ -64,18 +65,6 @@ PARTS, _STEPS = 8, 4
 """Number of parts of a rod between which it is sought in `part_in`, and largest number of steps in each."""
 
 _HALVES = 2 * PARTS * _STEPS
-
-_AT_REST, _POSE = 3 * _MOST_ROWS, 3 * _MOST_ROWS + 2
-"""First rows of a rod's coefficients at rest, of which the mirror image has its own, after those of three phases: tip
-contact, tangential contact up to the tip and beyond it; and of workspace."""
-
-_TURN, _PLIANCE = _POSE + 3, _POSE + 4
-"""Rows with the turn of the rod at rest between its tip and halves of the shortest steps [rad], and EI(0)/EI there, and
-then its largest value."""
-
-_RANGES, _DEPTH = _POSE + 5, 7
-"""Row with the ranges of a table, with sign, taper, bend and friction angle of the rod, and from this column on the
-numbers of terms in ψ1 or s1 of the three phases."""
 
 _MOST_BENT = 0.1
 """Largest f/EI(s), times the square of a step, in `part_in`."""
@@ -178,12 +167,38 @@ NO_TABLES: Tables = (NO_TABLE, NO_TABLE)
 """No tables."""
 
 
-def sheet() -> Floats:
-    """Return an array for the coefficients of one rod and those of one pose; its rows begin where cache lines do."""
-    size = (_RANGES + 1) * _COLUMNS
-    room = np.zeros(size + _CACHE_LINE // 8)
-    begin = -room.ctypes.data % _CACHE_LINE // 8
-    return room[begin : begin + size].reshape(-1, _COLUMNS)
+_SHEET = np.dtype(
+    [
+        (
+            "phases",
+            float,
+            (3, _MOST_ROWS, _COLUMNS),
+        ),  # in tip contact, in tangential contact up to the tip, and beyond it
+        ("at_rest", float, (2, 1, _COLUMNS)),  # of the rod, and of its mirror image
+        ("sums", float, (2, _COLUMNS)),  # workspace for one pose
+        ("outer", float, (3, _MOST)),  # polynomials in taper, bend and friction angle
+        ("turn", float, (_HALVES + 1,)),  # of the rod at rest from its tip to halves of the shortest steps [rad]
+        ("pliance", float, (_HALVES + 1,)),  # EI(0)/EI there
+        ("most_pliance", float),
+        ("least_psi1", float),  # ranges of the table
+        ("most_psi1", float),
+        ("span", float),
+        ("sign", float),  # the rod
+        ("taper", float),
+        ("bend", float),
+        ("friction_angle", float),
+        ("rows", np.intp, (3,)),  # numbers of terms in ψ1 or s1 of the phases
+    ],
+    align=True,
+)
+"""Coefficients of one rod."""
+
+
+def sheet() -> NDArray[np.void]:
+    """Return an array of one `_SHEET`, whose rows begin where cache lines do."""
+    room = np.zeros(_SHEET.itemsize + _CACHE_LINE, dtype=np.uint8)
+    begin = -room.ctypes.data % _CACHE_LINE
+    return room[begin : begin + _SHEET.itemsize].view(_SHEET)
 
 
 def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:
@@ -315,37 +330,46 @@ def _write_chords(profile: Profile, distances: Floats, work: Floats, out: Floats
 
 
 @compiled
-def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet: Floats) -> bool:
+def _is_prepared(table: ForwardTable, profile: Profile, friction_angle: float, own: Any) -> bool:
+    """True if the coefficients of a rod are there."""
+    low, high = table.psi1
+    if not (own.least_psi1 == low and own.most_psi1 == high and own.span == table.span and own.sign == profile.sign):
+        return False
+    return own.taper == profile.taper and own.bend == profile.bend and own.friction_angle == friction_angle
+
+
+@compiled
+def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet: NDArray[np.void]) -> bool:
     """Write the coefficients of one rod, unless they are there, and return False if the table does not hold it."""
-    box, (low, high), own = table.box, table.psi1, sheet[_RANGES]
-    values = profile.taper, profile.bend, friction_angle
-    is_there = own[0] == low and own[1] == high and own[2] == table.span and own[3] == profile.sign
-    if is_there and own[4] == values[0] and own[5] == values[1] and own[6] == values[2]:
+    own, box, values = sheet[0], table.box, (profile.taper, profile.bend, friction_angle)
+    if _is_prepared(table, profile, friction_angle, own):
         return True
     for c in range(3):
         if not box[c, 0] - _ROUNDING <= values[c] <= box[c, 1] + _ROUNDING:
             return False
     for c in range(3):
         x = (2.0 * values[c] - box[c, 0] - box[c, 1]) / (box[c, 1] - box[c, 0]) if box[c, 1] > box[c, 0] else 0.0
-        sheet[_POSE + c, 0], sheet[_POSE + c, 1] = 1.0, x
+        own.outer[c, 0], own.outer[c, 1] = 1.0, x
         for k in range(2, _MOST):
-            sheet[_POSE + c, k] = 2.0 * x * sheet[_POSE + c, k - 1] - sheet[_POSE + c, k - 2]
-    own[0], own[1], own[2], own[3] = low, high, table.span, profile.sign
-    own[4], own[5], own[6] = values
+            own.outer[c, k] = 2.0 * x * own.outer[c, k - 1] - own.outer[c, k - 2]
+    own.least_psi1, own.most_psi1 = table.psi1
+    own.span, own.sign, own.friction_angle = table.span, profile.sign, friction_angle
+    own.taper, own.bend = profile.taper, profile.bend
     mirrored = 0 if profile.sign > 0.0 else 1
     for k, phase in enumerate((table.tip, table.tangential, table.beyond)):
-        own[_DEPTH + k] = phase.coefficients.shape[2]
-        _contract(phase, mirrored, sheet, k * _MOST_ROWS)
-    _contract(table.chord, mirrored, sheet, _AT_REST)
-    _contract(table.chord, 1 - mirrored, sheet, _AT_REST + 1)
+        own.rows[k] = phase.coefficients.shape[2]
+        _contract(phase, mirrored, own.outer, own.phases[k])
+    _contract(table.chord, mirrored, own.outer, own.at_rest[0])
+    _contract(table.chord, 1 - mirrored, own.outer, own.at_rest[1])
     _write_parts(profile, sheet)
     return True
 
 
 @compiled
-def _write_parts(profile: Profile, sheet: Floats) -> None:
+def _write_parts(profile: Profile, sheet: NDArray[np.void]) -> None:
     """Write the turn of the rod at rest, by Simpson's rule, and its pliance."""
-    turn, pliance = sheet[_TURN], sheet[_PLIANCE]
+    own = sheet[0]
+    turn, pliance = own.turn, own.pliance
     width, before = 1.0 / _HALVES, rest_curvature_at(profile, cell_at(profile, 1.0, BACKWARD), 1.0)
     turn[0], most = 0.0, 0.0
     for k in range(_HALVES + 1):
@@ -358,39 +382,40 @@ def _write_parts(profile: Profile, sheet: Floats) -> None:
             between = rest_curvature_at(profile, cell_at(profile, middle, BACKWARD), middle)
             turn[k] = turn[k - 1] + (before + 4.0 * between + here) * width / 6.0
             before = here
-    pliance[_HALVES + 1] = most
+    own.most_pliance = most
 
 
 @compiled
-def _contract(terms: Terms, mirrored: int, sheet: Floats, row: int) -> None:
+def _contract(terms: Terms, mirrored: int, outer: Floats, out: Floats) -> None:
     """Write the sum over taper, bend and friction angle, from their polynomials."""
     orders, coefficients = terms.orders, terms.coefficients
     rows = coefficients.shape[2]
-    sheet[row : row + rows] = 0.0
+    out[:rows] = 0.0
     for k in range(orders.shape[0]):
-        weight = sheet[_POSE, orders[k, 0]] * sheet[_POSE + 1, orders[k, 1]] * sheet[_POSE + 2, orders[k, 2]]
+        weight = outer[0, orders[k, 0]] * outer[1, orders[k, 1]] * outer[2, orders[k, 2]]
         for i in range(rows):
             for j in range(_COLUMNS):
-                sheet[row + i, j] += weight * coefficients[mirrored, k, i, j]
+                out[i, j] += weight * coefficients[mirrored, k, i, j]
 
 
 @compiled
 def pose_in(
-    sheet: Floats, slenderness: float, taper: float, psi1: float, arclength: float, force: float, tip: bool
+    sheet: NDArray[np.void], slenderness: float, taper: float, psi1: float, arclength: float, force: float, tip: bool
 ) -> tuple[bool, Pose, Pose, Pose]:
     """True if there is a pose; the pose, and its derivatives by ψ1 or the arc length, and by the force."""
     length, rate = _length(slenderness, taper, arclength)
-    scaled, span = force * length * length, sheet[_RANGES, 2]
+    own = sheet[0]
+    scaled, span = force * length * length, own.span
     z, by_scaled = 2.0 / span * math.log1p(scaled / _SCALE) - 1.0, 2.0 / (span * (_SCALE + scaled))
     phase, begin, by_x, at = 1, 0.0, 2.0, arclength
     if tip:
-        phase, begin, at = 0, sheet[_RANGES, 0], psi1
-        by_x = 2.0 / (sheet[_RANGES, 1] - begin)
+        phase, begin, at = 0, own.least_psi1, psi1
+        by_x = 2.0 / (own.most_psi1 - begin)
     elif arclength > 1.0:
         phase, begin, by_x = 2, 1.0, 2.0 / (_BEYOND * (1.0 - taper))
     x, by_force = (at - begin) * by_x - 1.0, by_scaled * length * length
     inside = -1.0 <= x <= 1.0 and z <= 1.0
-    here, in_x, in_z = _sums(sheet, phase, x, z)
+    here, in_x, in_z = _sums(own.phases[phase], own.rows[phase], x, z, own.sums)
     if tip:
         return inside, here, _times(by_x, in_x), _times(by_force, in_z)
     by_s = 2.0 * by_scaled * force * length * rate
@@ -421,15 +446,15 @@ def _stretched(factor: float, pose: Pose) -> Pose:
 
 
 @compiled
-def _sums(sheet: Floats, phase: int, x: float, z: float) -> tuple[Pose, Pose, Pose]:
+def _sums(rows: Floats, count: int, x: float, z: float, room: Floats) -> tuple[Pose, Pose, Pose]:
     """Three polynomials in two variables, and their derivatives."""
-    at, by, square, power, before = sheet[_POSE], sheet[_POSE + 1], x * x, 1.0, 0.0
+    at, by, square, power, before = room[0], room[1], x * x, 1.0, 0.0
     for j in range(_COLUMNS):
         at[j], by[j] = 0.0, 0.0
-    for i in range(0, int(sheet[_RANGES, _DEPTH + phase]), _GROUP):
-        row, power_1, power_2, power_3 = phase * _MOST_ROWS + i, power * x, power * square, power * square * x
+    for i in range(0, count, _GROUP):
+        power_1, power_2, power_3 = power * x, power * square, power * square * x
         by_0, by_1, by_2, by_3 = i * before, (i + 1) * power, (i + 2) * power_1, (i + 3) * power_2
-        row_0, row_1, row_2, row_3 = sheet[row], sheet[row + 1], sheet[row + 2], sheet[row + 3]
+        row_0, row_1, row_2, row_3 = rows[i], rows[i + 1], rows[i + 2], rows[i + 3]
         for j in range(_COLUMNS):  # several at a time, and nothing stored before all is loaded
             c_0, c_1, c_2, c_3 = row_0[j], row_1[j], row_2[j], row_3[j]
             value = at[j] + (power * c_0 + power_1 * c_1 + power_2 * c_2 + power_3 * c_3)
@@ -446,25 +471,25 @@ def _sums(sheet: Floats, phase: int, x: float, z: float) -> tuple[Pose, Pose, Po
 
 
 @compiled
-def has_parts(sheet: Floats, force: float) -> bool:
+def has_parts(sheet: NDArray[np.void], force: float) -> bool:
     """True if `part_in` holds under a force."""
     return _is_fine(sheet, force, _STEPS)
 
 
 @compiled
-def _is_fine(sheet: Floats, force: float, steps: int) -> bool:
+def _is_fine(sheet: NDArray[np.void], force: float, steps: int) -> bool:
     """True if steps of this number in a part are short enough."""
-    return force * sheet[_PLIANCE, _HALVES + 1] <= _MOST_BENT * (PARTS * steps) ** 2
+    return force * sheet[0].most_pliance <= _MOST_BENT * (PARTS * steps) ** 2
 
 
 @compiled
-def part_in(sheet: Floats, psi1: float, force: float, part: int, before: State) -> State:
+def part_in(sheet: NDArray[np.void], psi1: float, force: float, part: int, before: State) -> State:
     """State of a rod in tip contact at the end of a part, as seen from the tip, from that at its beginning.
 
     Parts are counted from the tip. In place of P stands the turn by which the force has bent the rod. Steps of the
     classical Runge–Kutta method lead over a part, with errors of 4e-4 [L] at most.
     """
-    turn, pliance, steps = sheet[_TURN], sheet[_PLIANCE], 1
+    turn, pliance, steps = sheet[0].turn, sheet[0].pliance, 1
     while steps < _STEPS and not _is_fine(sheet, force, steps):
         steps *= 2
     h, half, k = 1.0 / (PARTS * steps), _STEPS // steps, 2 * _STEPS * (part - 1)
@@ -487,19 +512,19 @@ def part_in(sheet: Floats, psi1: float, force: float, part: int, before: State) 
 
 
 @compiled
-def chord_in(sheet: Floats, mirrored: bool, reach: float, distance: float) -> RestChord:
+def chord_in(sheet: NDArray[np.void], mirrored: bool, reach: float, distance: float) -> RestChord:
     """Chord of a rod or its mirror image at rest, continued beyond its tip as an arc.
 
     There its angle to the rod is exact, and the arc length good enough for a point beside the tip.
     """
-    row = _AT_REST + 1 if mirrored else _AT_REST
+    row = sheet[0].at_rest[1 if mirrored else 0, 0]
     x = 2.0 * min(distance / reach, 1.0) - 1.0
     arclength, bearing, slope, to_bearing, to_slope = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(_TERMS - 1, -1, -1):
         to_bearing, to_slope = to_bearing * x + bearing, to_slope * x + slope
-        arclength = arclength * x + sheet[row, k]
-        bearing = bearing * x + sheet[row, _TERMS + k]
-        slope = slope * x + sheet[row, 2 * _TERMS + k]
+        arclength = arclength * x + row[k]
+        bearing = bearing * x + row[_TERMS + k]
+        slope = slope * x + row[2 * _TERMS + k]
     at_point = slope - bearing
     rate = 2.0 / reach * (to_slope - to_bearing)
     if distance <= reach:
@@ -516,7 +541,7 @@ def chord_in(sheet: Floats, mirrored: bool, reach: float, distance: float) -> Re
 
 @cached
 def _write_errors(
-    profile: Profile, table: ForwardTable, samples: Floats, work: Floats, sheet: Floats, out: Floats
+    profile: Profile, table: ForwardTable, samples: Floats, work: Floats, sheet: NDArray[np.void], out: Floats
 ) -> None:
     """Write the errors of the pose at points of all dimensions, given as shares, for contacts before the thrust, or of
     the chord of the rod at rest, if they are larger."""

@@ -15,6 +15,7 @@ from tactile_bayes.mechanics.poses.rises import peak, rise
 from tactile_bayes.mechanics.poses.taylor import (
     FARTHEST,
     FORWARD,
+    ROUGH,
     March,
     State,
     advance,
@@ -35,8 +36,8 @@ __all__ = [
     "shape_along",
 ]
 
-_SAMPLES = 16
-"""Points of a step at which the bending is compared."""
+_SAMPLES = 48
+"""Points of a rod of length one, and one for each step, at which the bending is compared."""
 
 
 class Chord(NamedTuple):
@@ -157,9 +158,10 @@ def largest_bending_along(
     strain = 0.0
     while march.at < end:
         before = march
-        step, march = advance(profile, before, FORWARD, end, force, work)
-        for k in range(_SAMPLES + 1):
-            x = step.share * k / _SAMPLES
+        step, march = advance(profile, before, FORWARD, end, force, work, ROUGH)
+        count = 2 + int(_SAMPLES * step.share * step.length)
+        for k in range(count):
+            x = step.share * k / (count - 1)
             bending, _ = bending_at(step, moved(before.state, force, step, x, work).load, x, work)
             strain = max(strain, abs(bending) * (1.0 - profile.taper * (before.at + x * step.length)))
     return math.nan if math.isnan(march.state.psi) else strain

@@ -18,7 +18,7 @@ contact and by the force obey the linearised equations, whose series need no oth
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -31,7 +31,10 @@ __all__ = [
     "FARTHEST",
     "FORWARD",
     "MOST_STEPS",
+    "ROUGH",
     "March",
+    "One",
+    "Other",
     "Slope",
     "State",
     "Step",
@@ -52,8 +55,8 @@ __all__ = [
 _TERMS = 24
 """Terms of the series."""
 
-_REMAINDER = 1e-15
-"""Size of the last terms of a slope [rad]."""
+_REMAINDER, ROUGH = 1e-15, 1e-6
+"""Size of the last terms of a slope [rad], and that with which a rod is followed roughly, to a part in a thousand."""
 
 FORWARD, BACKWARD = 1.0, -1.0
 """Directions: from the pivot, and from the contact."""
@@ -109,6 +112,11 @@ class Slope(NamedTuple):
     psi: float
     u: float
     v: float
+
+
+One = TypeVar("One", Slope, None)
+Other = TypeVar("Other", Slope, None)
+"""Derivatives that are followed, or left out."""
 
 
 class Step(NamedTuple):
@@ -219,17 +227,16 @@ def _size(work: Floats, n: int, length: float) -> float:
 
 
 @compiled
-def _is_last(work: Floats, n: int, least: int, length: float) -> bool:
+def _is_last(work: Floats, n: int, least: int, length: float, remainder: float) -> bool:
     """Return whether the terms have become small."""
-    return n >= least and max(_size(work, n, length), _size(work, n - 1, length)) <= _REMAINDER
+    return n >= least and max(_size(work, n, length), _size(work, n - 1, length)) <= remainder
 
 
 @compiled
-def _share(work: Floats, length: float) -> float:
-    """Share of a step on which the series converge; NaN where they are not finite."""
-    last, before = _size(work, _TERMS - 1, length), _size(work, _TERMS - 2, length)
-    size = max((last / _REMAINDER) ** (1.0 / (_TERMS - 1)), (before / _REMAINDER) ** (1.0 / (_TERMS - 2)))
-    return min(1.0, 1.0 / size) if size < math.inf else math.nan
+def _share(work: Floats, length: float, remainder: float) -> float:
+    """Share of a step on which the last terms are as small as a remainder; NaN where they are not finite."""
+    size = max(_size(work, _TERMS - 1, length), _size(work, _TERMS - 2, length)) / remainder
+    return min(1.0, size ** (-1.0 / (_TERMS - 1))) if size < math.inf else math.nan
 
 
 @compiled
@@ -242,6 +249,7 @@ def series(
     force: float,
     start: State,
     work: Floats,
+    remainder: float,
 ) -> Step:
     """Write the series from a point of a cell on, over at most a length."""
     bent, rigid = _expand(profile, cell, arclength, direction, length, work)
@@ -263,9 +271,9 @@ def series(
         work[n + 1, _U], work[n + 1, _V] = share * length * work[n, _COS], share * length * work[n, _SIN]
         work[n + 1, _SIN], work[n + 1, _COS] = share * cos, -share * sin
         load = force * work[n + 1, _U]
-        if _is_last(work, n, least, length):
+        if _is_last(work, n, least, length, remainder):
             return Step(length, 1.0, n + 1, rigid)
-    return Step(length, _share(work, length), _TERMS, rigid)
+    return Step(length, _share(work, length, remainder), _TERMS, rigid)
 
 
 @compiled
@@ -287,7 +295,13 @@ def begin(profile: Profile, arclength: float, direction: float, state: State) ->
 
 @compiled
 def advance(
-    profile: Profile, march: March, direction: float, until: float, force: float, work: Floats
+    profile: Profile,
+    march: March,
+    direction: float,
+    until: float,
+    force: float,
+    work: Floats,
+    remainder: float = _REMAINDER,
 ) -> tuple[Step, March]:
     """Write the series of a step toward an arc length, and return the step and its end; NaN after too many steps."""
     last = profile.edges.size - 1
@@ -295,7 +309,7 @@ def advance(
     edge = math.inf if beside > last else profile.edges[beside]
     end = max(edge, until) if direction < 0.0 else min(edge, until)
     length = direction * (end - march.at)
-    step = series(profile, march.cell, march.at, direction, length, force, march.state, work)
+    step = series(profile, march.cell, march.at, direction, length, force, march.state, work, remainder)
     state = moved(march.state, force, step, step.share, work)
     if step.share < 1.0:
         steps = march.steps + 1
@@ -324,18 +338,20 @@ def slope_series(
     length: float,
     force: float,
     start: State,
-    by_psi1: Slope,
-    by_arclength: Slope,
+    by_psi1: Slope | None,
+    by_arclength: Slope | None,
     by_force: Slope,
     work: Floats,
 ) -> Step:
-    """Write the series of a state and its derivatives from the contact's side of a cell on."""
+    """Write the series of a state and its derivatives from the contact's side of a cell on; None is left out."""
     bent, rigid = _expand(profile, cell, arclength, BACKWARD, length, work)
     inverse, least = 1.0 / work[0, _RIGIDITY], max(bent, rigid, 3)
     work[0, _SIN], work[0, _COS], work[0, _PSI] = math.sin(start.psi), math.cos(start.psi), start.psi
     work[0, _U], work[0, _V] = start.u, start.v
-    work[0, _PSI_1], work[0, _U_1] = by_psi1.psi, by_psi1.u
-    work[0, _PSI_S], work[0, _U_S] = by_arclength.psi, by_arclength.u
+    if by_psi1 is not None:
+        work[0, _PSI_1], work[0, _U_1] = by_psi1.psi, by_psi1.u
+    if by_arclength is not None:
+        work[0, _PSI_S], work[0, _U_S] = by_arclength.psi, by_arclength.u
     work[0, _PSI_F], work[0, _U_F], work[0, _V_F] = by_force.psi, by_force.u, by_force.v
     stiff = force * length
     for n in range(_TERMS):
@@ -344,16 +360,16 @@ def slope_series(
         if n < bent:
             rate += length * work[n, _CURVATURE]
         work[n, _RATE] = rate
-        rate_1 = stiff * _divided(work, rigid, inverse, n, work[n, _U_1], _QUOTIENT_1)
-        rate_s = stiff * _divided(work, rigid, inverse, n, work[n, _U_S], _QUOTIENT_S)
         rate_f = stiff * _divided(work, rigid, inverse, n, work[n, _U_F], _QUOTIENT_F) + length * quotient
         sin, cos, sin_1, sin_s, sin_f, cos_f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(n + 1):
             j = n - k
             sin += work[k, _RATE] * work[j, _SIN]
             cos += work[k, _RATE] * work[j, _COS]
-            sin_1 += work[k, _SIN] * work[j, _PSI_1]
-            sin_s += work[k, _SIN] * work[j, _PSI_S]
+            if by_psi1 is not None:
+                sin_1 += work[k, _SIN] * work[j, _PSI_1]
+            if by_arclength is not None:
+                sin_s += work[k, _SIN] * work[j, _PSI_S]
             sin_f += work[k, _SIN] * work[j, _PSI_F]
             cos_f += work[k, _COS] * work[j, _PSI_F]
         share = _INVERSE[n]
@@ -361,20 +377,36 @@ def slope_series(
         work[n + 1, _PSI] = share * rate
         work[n + 1, _U], work[n + 1, _V] = way * work[n, _COS], way * work[n, _SIN]
         work[n + 1, _SIN], work[n + 1, _COS] = share * cos, -share * sin
-        work[n + 1, _PSI_1], work[n + 1, _PSI_S], work[n + 1, _PSI_F] = share * rate_1, share * rate_s, share * rate_f
-        work[n + 1, _U_1], work[n + 1, _U_S], work[n + 1, _U_F] = -way * sin_1, -way * sin_s, -way * sin_f
-        work[n + 1, _V_F] = way * cos_f
-        if _is_last(work, n, least, length):
+        if by_psi1 is not None:
+            rate_1 = stiff * _divided(work, rigid, inverse, n, work[n, _U_1], _QUOTIENT_1)
+            work[n + 1, _PSI_1], work[n + 1, _U_1] = share * rate_1, -way * sin_1
+        if by_arclength is not None:
+            rate_s = stiff * _divided(work, rigid, inverse, n, work[n, _U_S], _QUOTIENT_S)
+            work[n + 1, _PSI_S], work[n + 1, _U_S] = share * rate_s, -way * sin_s
+        work[n + 1, _PSI_F], work[n + 1, _U_F], work[n + 1, _V_F] = share * rate_f, -way * sin_f, way * cos_f
+        if _is_last(work, n, least, length, _REMAINDER):
             return Step(length, 1.0, n + 1, rigid)
-    return Step(length, _share(work, length), _TERMS, rigid)
+    return Step(length, _share(work, length, _REMAINDER), _TERMS, rigid)
 
 
 @compiled
-def slopes_moved(step: Step, x: float, work: Floats) -> tuple[Slope, Slope, Slope]:
-    """Derivatives at a point of a step by ψ1, arc length and force; of v only the last."""
-    psi_1, psi_s, psi_f, u_1, u_s, u_f, v_f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+def slopes_moved(step: Step, by_psi1: One, by_arclength: Other, work: Floats) -> tuple[One, Other, Slope]:
+    """Derivatives at the end of a step by ψ1, arc length and force, of v only the last; None is left out."""
+    x, psi_f, u_f, v_f = step.share, 0.0, 0.0, 0.0
     for n in range(step.terms, -1, -1):
-        psi_1, u_1 = psi_1 * x + work[n, _PSI_1], u_1 * x + work[n, _U_1]
-        psi_s, u_s = psi_s * x + work[n, _PSI_S], u_s * x + work[n, _U_S]
         psi_f, u_f, v_f = psi_f * x + work[n, _PSI_F], u_f * x + work[n, _U_F], v_f * x + work[n, _V_F]
-    return Slope(psi_1, u_1, 0.0), Slope(psi_s, u_s, 0.0), Slope(psi_f, u_f, v_f)
+    return (
+        _slope_moved(step, by_psi1, _PSI_1, _U_1, work),
+        _slope_moved(step, by_arclength, _PSI_S, _U_S, work),
+        Slope(psi_f, u_f, v_f),
+    )
+
+
+@compiled
+def _slope_moved(step: Step, by: One, psi_column: int, u_column: int, work: Floats) -> One:
+    if by is None:
+        return None
+    psi, u = 0.0, 0.0
+    for n in range(step.terms, -1, -1):
+        psi, u = psi * step.share + work[n, psi_column], u * step.share + work[n, u_column]
+    return Slope(psi, u, 0.0)

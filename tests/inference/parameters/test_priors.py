@@ -8,7 +8,7 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.parameters.matched_priors import matched_priors, mean_log_radius, widened
+from tactile_bayes.inference.parameters.priors import matched_priors, mean_log_radius, widened
 
 
 @pytest.mark.parametrize("name", ["parabola", "circle", "ellipse", "power-law", "parabola/ellipse", "shape-free"])

@@ -3,54 +3,34 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.ensembles.coordinates import Coordinates
-from tactile_bayes.inference.ensembles.mixture import Mixture
-from tactile_bayes.inference.ensembles.moves import Moves, standard_moves
+from tactile_bayes.inference.coordinates.base import Coordinates
+from tactile_bayes.inference.densities import Mixture
 
 __all__ = ["Straightened"]
 
-_MAX_COORDINATE = 1e100
-"""Bound of a coordinate, whose square is finite."""
-
-_CENTRAL_SHARE = 0.1
-"""Share of the draws, nearest to the centre, from which principal directions are estimated."""
-
-_MIN_SIGNIFICANCE = 3.0
-"""Smallest significance of a bend, in standard errors: an uncertain bend would distort the coordinates."""
+_MAX_COORDINATE = 1e100  # whose square is finite
+_CENTRAL_SHARE = 0.1  # of the draws, nearest to the centre, from which principal directions are estimated
+_MIN_SIGNIFICANCE = 3.0  # of a bend, in standard errors: an uncertain bend would distort the coordinates
 
 
 @dataclass(frozen=True, eq=False)
-class Straightened:
+class Straightened(Coordinates):
     """Principal directions, wide ones first, each relative to a quadratic form in those before it; volume-preserving.
 
     If loads are thousands of times their noise, a record determines most directions to a ten-thousandth, and a few,
     such as stiffness and lever, hardly better than the prior. Along these few the second-order shift of the others
     exceeds their width.
-
-    Parameters
-    ----------
-    base : Coordinates
-        Coordinates that are rotated and straightened.
-    mean : ndarray, shape (d,)
-        Centre in the base's coordinates.
-    root : ndarray, shape (d, d)
-        Directions, a column each; one step along each is about a standard deviation.
-    bends : ndarray, shape (d, d, d)
-        Coefficient of a direction, first index, on the product of two before it, the wider one first; zero for other
-        products.
-    proposal : Mixture, optional
-        Distribution of the coordinates that approximates the posterior.
     """
 
     base: Coordinates
-    mean: Floats
-    root: Floats
-    bends: Floats
+    mean: Floats  # centre in the base's coordinates, (d,)
+    root: Floats  # directions, a column each; one step along each is about a standard deviation
+    bends: Floats  # of a direction, first index, on the product of two before it, the wider one first; (d, d, d)
     proposal: Mixture | None = None
 
     @classmethod
@@ -81,11 +61,9 @@ class Straightened:
 
     @property
     def digest(self) -> str:
-        """Identity of the coordinates, as text."""
         arrays = (self.mean, self.root, self.bends)
         content = b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in arrays)
-        proposal = "" if self.proposal is None else self.proposal.digest
-        return f"straightened {hashlib.sha256(content).hexdigest()}, {self.base.digest}, proposal {proposal}"
+        return self._and_proposal(f"straightened {hashlib.sha256(content).hexdigest()}, {self.base.digest}")
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         products = coordinates[:, :, None] * coordinates[:, None, :]
@@ -93,19 +71,12 @@ class Straightened:
         return self.base.parameters(self.mean + turned @ self.root.T)
 
     def of(self, points: Floats) -> Floats:
-        """Return the coordinates of points, shape (..., parameters)."""
         straight = _solved(self.root, self.base.of(points.reshape(-1, points.shape[-1])) - self.mean)
         for k, bend in enumerate(self.bends):
             one, other = np.nonzero(bend)
             bent = straight[:, k] - (straight[:, one] * straight[:, other]) @ bend[one, other]
             straight[:, k] = np.clip(bent, -_MAX_COORDINATE, _MAX_COORDINATE)
         return straight.reshape(points.shape)
-
-    def with_proposal(self, proposal: Mixture) -> Straightened:
-        return replace(self, proposal=proposal)
-
-    def moves(self) -> Moves:
-        return standard_moves(self.proposal)
 
 
 def _solved(root: Floats, deviations: Floats) -> Floats:

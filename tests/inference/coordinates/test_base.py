@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.ensembles import Logarithms, SamplerSettings, sample
-from tactile_bayes.inference.ensembles.proposal import Proposal
+from tactile_bayes.inference.coordinates.base import Logarithms
+from tactile_bayes.inference.densities import Proposal
+from tactile_bayes.inference.ensembles import SamplerSettings, sample
 
 
 def log_probability(points):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tactile_bayes.inference.ensembles import approximate
-from tactile_bayes.inference.ensembles.proposal import Ends, Proposal
+from tactile_bayes.inference.densities import Ends, Proposal
+from tactile_bayes.inference.importance import approximate
 
 MEAN = np.array([1.0, -2.0, 0.5])
 ROOT = np.array([[0.01, 0.0, 0.0], [3.0, 2.0, 0.0], [10.0, -20.0, 50.0]])

@@ -4,16 +4,12 @@ import numpy as np
 import pytest
 
 from helpers.interrupts import interrupted_at
+from tactile_bayes.inference.coordinates.base import Logarithms, in_coordinates
+from tactile_bayes.inference.coordinates.straightened import Straightened
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import (
-    Logarithms,
-    Mixture,
-    Proposal,
-    approximate,
-    in_coordinates,
-    learn_coordinates,
-)
-from tactile_bayes.inference.ensembles.straightened import Straightened
+from tactile_bayes.inference.densities import Mixture, Proposal
+from tactile_bayes.inference.importance import approximate
+from tactile_bayes.inference.starts.pilot import learn_coordinates
 
 SIZE = 6
 POSITIVE = np.arange(SIZE) == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, sample
-from tactile_bayes.inference.ensembles.modes import modes_of
+from tactile_bayes.inference.ensembles.diagnosis import modes_of
 from tactile_bayes.inference.result import sample_stats
 
 MODES = np.array([[-50.0, 3.0], [50.0, 3.0]])

@@ -4,74 +4,55 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
+from tactile_bayes.inference.coordinates.straightened import Straightened
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles.block import Block, make_block
-from tactile_bayes.inference.ensembles.coordinates import Proposing, Standardising, in_coordinates
+from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time
-from tactile_bayes.inference.ensembles.mixture import Mixture
-from tactile_bayes.inference.ensembles.moves import Moves
-from tactile_bayes.inference.ensembles.proposal import Proposal
-from tactile_bayes.inference.ensembles.straightened import Straightened
-from tactile_bayes.inference.ensembles.target import LogProbability
+from tactile_bayes.inference.ensembles.moves import Moves, moves_in
+from tactile_bayes.inference.ensembles.run_state import Block, make_block
 from tactile_bayes.inference.ensembles.walkers import RandomState, first_random_state
+from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
 __all__ = ["learn_coordinates", "standardise"]
 
-Base = TypeVar("Base", bound=Standardising)
-
-_STEPS = (60, 120, 240, 480, 960)
-"""Number of steps of each stage, which samples in the best coordinates so far."""
-
-_STEPS_OF_NORMAL = (40, 80, 160, 320)
-"""Number of steps of each pilot run in coordinates that are nearly standard normal."""
-
+_STEPS = (60, 120, 240, 480, 960)  # of each stage, which samples in the best coordinates so far
+_STEPS_OF_NORMAL = (40, 80, 160, 320)  # of each pilot run in coordinates that are nearly standard normal
+# Gain of mean log-density by a further change of these coordinates, and share of the steps that move a walker, below
+# and above which no further run is made.
 _GOOD_GAIN, _GOOD_MOVING = 0.3, 0.55
-"""Gain of mean log-density by a further change of these coordinates, and share of the steps that move a walker, below
-and above which no further run is made."""
-
-_MIN_VARIANCE = 1e-3
-"""Smallest variance of these coordinates that is believed."""
-
-_MAX_DRAWS = 3000
-"""Largest number of draws from each half of the walkers to which the coordinates of a stage are fitted."""
-
-_GOOD_QUALITY = 0.25
-"""Quality of a proposal from which no further stage is made; it is 0.4 for a normal posterior."""
-
-_QUALITY_DRAWS = 400
-"""Number of draws from the posterior, and from the proposal, by which the quality is estimated."""
-
-_MIN_ACCEPTANCE = 0.02
-"""Lower bound of the acceptance probability at any point, since there are other moves."""
+_MIN_VARIANCE = 1e-3  # of these coordinates that is believed
+_MAX_DRAWS = 3000  # from each half of the walkers to which the coordinates of a stage are fitted
+_GOOD_QUALITY = 0.25  # of a proposal from which no further stage is made; it is 0.4 for a normal posterior
+_QUALITY_DRAWS = 400  # from the posterior, and from the proposal, by which the quality is estimated
+_MIN_ACCEPTANCE = 0.02  # probability at any point, since there are other moves
 
 
 def learn_coordinates(
     log_probability: LogProbability,
-    base: Proposing,
+    base: Coordinates,
     start: Floats,
     scale: Floats,
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
-) -> Proposing:
+) -> Coordinates:
     """Return coordinates with a proposal in them, learned in stages that sample in the best coordinates so far.
 
     The quality of a proposal is estimated at positions of the walkers: its own draws would miss the same parts of the
-    target as the proposal, and a narrow one would look good.
-
-    Shapes: start (walkers, d), scale (d,).
+    target, and a narrow one would look good. Shapes: start (walkers, d), scale (d,).
     """
-    best: Proposing = base
+    best: Coordinates = base
     points = start
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
     for steps in _STEPS:
         density = in_coordinates(log_probability, best)
         coordinates = best.of(points)
-        block = _pilot(density, best.moves(), coordinates, steps, random, deadline)
+        block = _pilot(density, moves_in(best), coordinates, steps, random, deadline)
         (random,) = block.random_states
         late = block.samples[:, block.steps // 2 :]
         points = best.parameters(late[0, -1])[0]
@@ -96,18 +77,15 @@ def learn_coordinates(
 
 def standardise(
     log_probability: LogProbability,
-    base: Base,
+    base: Whitening,
     start: Floats,
     columns: slice,
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
-) -> tuple[Base, Floats]:
-    """Return coordinates that are nearer to standard normal ones than the base's nearly normal ones are, and the start.
+) -> tuple[Whitening, Floats]:
+    """Return coordinates nearer to standard normal than the base's, and the start, (ensembles, walkers, d), in them.
 
-    Each of some pilot runs samples in the coordinates so far, and these are standardised by mean and covariance of its
-    second half.
-
-    Shapes: start (ensembles, walkers, d).
+    Each of some pilot runs samples in those so far, which are standardised by mean and covariance of its second half.
     """
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
     best, start, points = base, start.copy(), start[0]
@@ -115,7 +93,7 @@ def standardise(
         if deadline.has_passed:
             break
         density = in_coordinates(log_probability, best)
-        block = _pilot(density, best.moves(), points, steps, random, deadline)
+        block = _pilot(density, moves_in(best), points, steps, random, deadline)
         (random,), points = block.random_states, block.samples[0, -1].copy()
         late = np.swapaxes(block.samples[0, block.steps // 2 :], 0, 1)
         normal, gain = _cross_validated(late[..., columns])
@@ -132,9 +110,7 @@ class _Normal(NamedTuple):
     """Normal distribution of coordinates that should be nearly standard normal."""
 
     mean: Floats
-    """Shape (k,)."""
     root: Floats
-    """Root of the covariance, shape (k, k)."""
 
     @classmethod
     def fitted(cls, draws: Floats, independent: float) -> _Normal:
@@ -184,19 +160,23 @@ def _pilot(
 ) -> Block:
     """Return the steps of one ensemble; an interrupt is raised."""
     first = Block(start[None, None], density(start)[None, None], (random,))
-    block = make_block(density, moves, first, steps, deadline.moment)
+    block = make_block(density, moves, first, steps, deadline)
     if not block.whole:
         raise KeyboardInterrupt
     return block
 
 
-def _straightened(base: Proposing, draws: Floats, scale: Floats, share: float, efficiency: float = 0.0) -> Straightened:
+def _straightened(
+    base: Coordinates, draws: Floats, scale: Floats, share: float, efficiency: float = 0.0
+) -> Straightened:
     """Return coordinates fitted to draws, with a proposal; a share of the draws counts as independent."""
     found = Straightened.fitted(base, draws, scale, share * len(draws))
     return replace(found, proposal=Mixture((replace(Proposal.fitted(found.of(draws)), efficiency=efficiency),)))
 
 
-def _quality(log_probability: LogProbability, coordinates: Proposing, draws: Floats, rng: np.random.Generator) -> float:
+def _quality(
+    log_probability: LogProbability, coordinates: Coordinates, draws: Floats, rng: np.random.Generator
+) -> float:
     """Return one over the mean number of proposals until acceptance, averaged over draws from the posterior."""
     target, proposal = in_coordinates(log_probability, coordinates), coordinates.proposal
     assert proposal is not None

@@ -6,10 +6,10 @@ import pytest
 from tactile_bayes.calibration.calibrate import calibration_replicate, experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Ellipse, PowerLaw
-from tactile_bayes.inference.ensembles import Logarithms
-from tactile_bayes.inference.ensembles.mixture import Mixture
-from tactile_bayes.inference.ensembles.proposal import Proposal
-from tactile_bayes.inference.starts.flank_coordinates import FlankCoordinates
+from tactile_bayes.inference.coordinates.base import Logarithms
+from tactile_bayes.inference.coordinates.flank import FlankCoordinates
+from tactile_bayes.inference.densities import Mixture, Proposal
+from tactile_bayes.inference.starts.contour_start import flank_at_contacts
 
 PLACE = 0.1
 BASES = {
@@ -107,7 +107,7 @@ def test_of_joined_contours_the_flank_that_was_touched_counts(contour, flank):
     measured = simulate(replicate, np.random.default_rng(1)).measured
     model = replicate.problem_of(measured).model
     point = np.concatenate([[0.7, 1.3, 1.6][: len(model.family.parameters) - 2], [0.3, -0.9]])
-    found = FlankCoordinates.at_contacts(model, np.append(point, model.prior_medians(model.names[point.size :])))
+    found = flank_at_contacts(model, np.append(point, model.prior_medians(model.names[point.size :])))
     assert found is None if flank is None else (found.flank, found.side) == (flank, 1.0)
     if found is not None:
         assert [model.names[k] for k in found.columns] == ["right_w", "right_n", "q", "x_c"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,46 +11,35 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import FLANKS, sides_of
 from tactile_bayes.contours.family import VERTEX
-from tactile_bayes.inference.contour_events import events_of
-from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.ensembles import Logarithms, Mixture
-from tactile_bayes.inference.ensembles.moves import Moves, standard_moves
+from tactile_bayes.inference.coordinates.base import Coordinates, Logarithms
+from tactile_bayes.inference.densities import Mixture
 from tactile_bayes.numerics.differences import central_slopes
 
 __all__ = ["FlankCoordinates"]
 
+# Share of the draws, and distance of the vertex from x over its median: if a larger share is nearer, the vertex may
+# lie on the other side as well, which these coordinates exclude.
 _MAX_SHARE, _NEAR = 0.01, 0.1
-"""Share of the draws, and distance of the vertex from x over its median: if a larger share is nearer, the vertex may
-lie on the other side as well, which these coordinates exclude."""
-
-_STEP = 1e-6
-"""Step of central differences in the model's coordinates."""
+_STEP = 1e-6  # of central differences in the base's coordinates
 
 
 class _AtFlank(NamedTuple):
     """A contour at the horizontal distance u from its vertex, each of shape (n,)."""
 
-    log_slope: Floats
-    """Logarithm of the slope t."""
-    log_shape: Floats
-    """Logarithm of the shape, which slope and curvature leave free."""
-    log_ratio: Floats
-    """Logarithm of t/t′ [length]."""
-    rise: Floats
-    """Height above the vertex [length]."""
+    log_slope: Floats  # logarithm of the slope t
+    log_shape: Floats  # logarithm of what slope and curvature leave free
+    log_ratio: Floats  # logarithm of t/t′ [length]
+    rise: Floats  # height above the vertex [length]
 
 
 class _FromVertex(NamedTuple):
     """A contour as its family describes it, each of shape (n,)."""
 
-    first: Floats
-    """First parameter, in the model's coordinates."""
+    first: Floats  # parameter, in the base's coordinates
     second: Floats
-    u: Floats
-    """Horizontal distance of the vertex [length]."""
+    u: Floats  # horizontal distance of the vertex [length]
     rise: Floats
-    log_jacobian: Floats
-    """Logarithm of the Jacobian determinant of the model's coordinates by those of the flank."""
+    log_jacobian: Floats  # of the base's coordinates by those of the flank
 
 
 class _PowerLawFlank:
@@ -92,7 +82,7 @@ _FLANKS: dict[str, type[_PowerLawFlank] | type[_EllipseFlank]] = {"power-law": _
 
 
 @dataclass(frozen=True, eq=False)
-class FlankCoordinates:
+class FlankCoordinates(Coordinates):
     """Slope, shape, height and slope ratio of a contour at one x, instead of its two sizes, q and x_c.
 
     A record of one flank determines height, slope and curvature at the contacts, but hardly the vertex: the posterior
@@ -101,57 +91,41 @@ class FlankCoordinates:
     t′ is the derivative of t. With u = |x − x_c|, for a power law t = n (u/w)^(n − 1), the shape is n − 1,
     y = q + t u/n and t/t′ = u/(n − 1); for an ellipse with u = a sin τ, t = (b/a) tan τ, the shape is tan τ,
     y = q + b (1 − cos τ) and t/t′ = u cos² τ. They determine the contour on either side of the vertex.
-
-    Parameters
-    ----------
-    flank : str
-        "power-law" or "ellipse".
-    base : Logarithms
-        Coordinates of all parameters.
-    x : float
-        Position at which the coordinates are taken [length].
-    side : float
-        1 if the vertex lies at smaller x, −1 if it lies at larger x.
-    columns : tuple of int
-        Places of the flank's two sizes, q and x_c among the parameters.
-    proposal : Mixture, optional
-        Distribution of coordinates that approximates the posterior.
     """
 
-    flank: str
+    flank: str  # "power-law" or "ellipse"
     base: Logarithms
-    x: float
-    side: float
-    columns: tuple[int, ...] = (0, 1, 2, 3)
+    x: float  # at which the coordinates are taken [length]
+    side: float  # 1 if the vertex lies at smaller x, −1 if it lies at larger x
+    columns: tuple[int, ...] = (0, 1, 2, 3)  # of the flank's two sizes, q and x_c among the parameters
     proposal: Mixture | None = None
 
+    @staticmethod
+    def describe(family: str) -> bool:
+        """Return True for a family with such a flank."""
+        return not set(sides_of(family).values()).isdisjoint(_FLANKS)
+
     @classmethod
-    def at_contacts(cls, model: ContourModel, point: Floats) -> FlankCoordinates | None:
-        """Return coordinates at the middle of the contacts predicted at a point, shape (parameters,).
+    def at(
+        cls, family: str, names: Sequence[str], base: Logarithms, point: Floats, x: float
+    ) -> FlankCoordinates | None:
+        """Return coordinates at x around a point, shape (parameters,).
 
         There are none at the vertex, nor for flanks other than those of a power law or an ellipse.
         """
-        sides = sides_of(model.family.name)
-        if not set(sides.values()) & set(_FLANKS):
-            return None
-        at = point[None]
-        events = events_of(model.likelihood, model.contours(at), model.rig(at), exact=False)
-        x = float(np.mean([events["first_contact_x"], events["snap_off_contact_x"]]))
-        side = float(np.sign(x - point[model.names.index("x_c")]))
+        sides = sides_of(family)
+        side = float(np.sign(x - point[names.index("x_c")]))
         prefix = "" if len(sides) == 1 else "right_" if side > 0.0 else "left_"
         if abs(side) != 1.0 or sides[prefix] not in _FLANKS:
             return None
-        names = [*(f"{prefix}{name}" for name in FLANKS[sides[prefix]].table), *VERTEX]
-        return cls(sides[prefix], model.coordinates, x, side, tuple(map(model.names.index, names)))
+        own = [*(f"{prefix}{name}" for name in FLANKS[sides[prefix]].table), *VERTEX]
+        return cls(sides[prefix], base, x, side, tuple(map(names.index, own)))
 
     @property
     def digest(self) -> str:
-        """Identity of the coordinates, as text."""
-        proposal = "" if self.proposal is None else self.proposal.digest
-        return f"flank of a {self.flank}, side {self.side:g} at {self.x!r}, {self.base.digest}, proposal {proposal}"
+        return self._and_proposal(f"flank of a {self.flank}, side {self.side:g} at {self.x!r}, {self.base.digest}")
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
-        """Return parameters, shape (n, parameters), and the logarithm of the Jacobian determinant, shape (n,)."""
         log_slope, log_shape, height, log_ratio = coordinates[:, self.columns].T
         based = coordinates.copy()
         with np.errstate(over="ignore", invalid="ignore"):  # infinite parameters are impossible
@@ -181,11 +155,3 @@ class FlankCoordinates:
         """Return True if the vertex may lie on the other side as well, according to draws, shape (n, parameters)."""
         distances = np.abs(self.parameters(coordinates)[0][:, self.columns[-1]] - self.x)
         return bool(np.quantile(distances, _MAX_SHARE) < _NEAR * np.median(distances))
-
-    def with_proposal(self, proposal: Mixture) -> FlankCoordinates:
-        """Return the same coordinates with a distribution that approximates the posterior."""
-        return replace(self, proposal=proposal)
-
-    def moves(self) -> Moves:
-        """Return the moves of an ensemble, with their shares."""
-        return standard_moves(self.proposal)

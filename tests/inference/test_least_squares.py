@@ -1,11 +1,10 @@
-"""Where walkers start: optimum and cloud, for problems whose answer is known."""
+"""Robust least squares, for problems whose answer is known."""
 
 import numpy as np
 import pytest
-from scipy import stats
 
-from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.starts.start import gather, optima
+from tactile_bayes.inference.deadline import Deadline
+from tactile_bayes.inference.least_squares import optima
 
 DESIGN = np.random.default_rng(1).normal(size=(50, 2))
 TRUE = np.array([3.0, -0.02])
@@ -86,55 +85,6 @@ def test_to_be_far_from_the_prior_costs_its_square():
     assert found.point[0] / SPREAD[0] == pytest.approx(robust, rel=1e-4)
 
 
-COVARIANCE = np.array([[1.0, 0.6], [0.6, 0.5]]) * 1e-4
-
-
-def gaussian(points):
-    return np.atleast_1d(stats.multivariate_normal([1.0, 2.0], COVARIANCE).logpdf(points))
-
-
-def test_a_good_guess_is_kept_and_its_cloud_is_twice_as_wide():
-    cloud = gather(gaussian, np.array([1.0, 2.0]), COVARIANCE, np.random.default_rng(1))
-    np.testing.assert_array_equal(cloud.centre, [1.0, 2.0])
-    np.testing.assert_allclose(cloud.root @ cloud.root.T, 4.0 * COVARIANCE)
-    # Hardly any point misses the floor: χ² of two degrees above 2 · 24 / 4 is rarer than 0.3 %.
-    points = cloud.draw(np.random.default_rng(2), 1000)
-    assert np.mean(gaussian(points) > cloud.floor) > 0.98
-
-
-@pytest.mark.parametrize("width", [1e-2, 1.0, 100.0])
-def test_a_bad_guess_is_mended(width):
-    guess = np.array([1.0, 2.0]) + 0.3 * np.array([1.0, -1.0])
-    cloud = gather(gaussian, guess, width * np.eye(2), np.random.default_rng(1))
-    points = cloud.draw(np.random.default_rng(2), 1000)
-    good = points[gaussian(points) > cloud.floor]
-    assert len(good) > 300
-    # Nothing hopeless: all within √(2 (12 · 2 + some)) standard deviations, yet at least as wide as the target.
-    assert gaussian(good).min() > gaussian(np.array([1.0, 2.0])) - 24.0 - 5.0
-    assert np.all(good.std(axis=0) > 0.8 * np.sqrt(np.diag(COVARIANCE)))
-
-
-def test_a_sharp_peak_is_not_left_for_what_lies_around_it():
-    """Nearly all points of a wide cloud are hopeless beside its centre: it shrinks, and does not move away."""
-
-    def sharp(points):
-        apart = np.abs(points - np.array([1.0, 2.0])).max(axis=1)
-        return np.where(apart < 1e-3, gaussian(points), -1e5 - 1e3 * points[:, 0])
-
-    cloud = gather(sharp, np.array([1.0, 2.0]), np.eye(2), np.random.default_rng(1))
-    points = cloud.draw(np.random.default_rng(2), 1000)
-    assert np.mean(sharp(points) > -100.0) > 0.3
-
-
-def test_a_wall_is_respected():
-    def walled(points):
-        return np.where(points[:, 0] > 1.0, gaussian(points), -np.inf)
-
-    cloud = gather(walled, np.array([0.5, 2.0]), np.eye(2), np.random.default_rng(1))
-    points = cloud.draw(np.random.default_rng(2), 1000)
-    assert np.mean(walled(points) > cloud.floor) > 0.15
-
-
 def test_a_search_that_ends_beyond_what_is_possible_goes_on_inside():
     """Of two parameters that are told apart by the data the one at its end stays there, the other moves freely."""
     data = DESIGN @ (TRUE / SPREAD)
@@ -163,21 +113,3 @@ def test_past_the_deadline_one_candidate_has_to_do():
     inside = best_optimum(linear(data), np.array([first]), MIDDLE, SPREAD, low, deadline=PASSED)
     assert inside.beyond is None
     assert np.all(inside.point > low)
-
-
-def test_past_the_deadline_a_cloud_is_left_as_wide_as_it_is_and_has_no_floor():
-    far = np.array([1.0, 2.0]) + 0.3 * np.array([1.0, -1.0])
-    cloud = gather(gaussian, far, np.eye(2), np.random.default_rng(1), PASSED)
-    np.testing.assert_array_equal(cloud.centre, far)
-    np.testing.assert_allclose(cloud.root @ cloud.root.T, 4.0 * np.eye(2), rtol=1e-12)
-    assert cloud.floor_by(PASSED) == -np.inf
-    assert cloud.floor_by(NEVER) == cloud.floor > -np.inf
-
-
-def test_past_the_deadline_a_cloud_is_sought_as_long_as_little_of_it_is_possible():
-    def walled(points):
-        return np.where(np.abs(points - [1.0, 2.0]).max(axis=1) < 1e-4, 0.0, -np.inf)
-
-    cloud = gather(walled, np.array([1.0, 2.0]), np.eye(2), np.random.default_rng(1), PASSED)
-    points = cloud.draw(np.random.default_rng(2), 10_000)
-    assert np.mean(np.isfinite(walled(points))) > 0.02  # more than 6 of 120 were: 1 % of seeds, if it is less

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.ensembles import standardise
-from tactile_bayes.inference.ensembles.moves import whitened_moves
+from tactile_bayes.inference.starts.pilot import standardise
 
 _SIZE, _BENT, _WALKERS = 12, 2, 100
 
@@ -18,6 +17,7 @@ class _Shifted:
     mean: np.ndarray = field(default_factory=lambda: np.zeros(_SIZE))
     root: np.ndarray = field(default_factory=lambda: np.eye(_SIZE))
     digest = "shifted"
+    bent = _BENT
 
     def parameters(self, coordinates):
         there = self.mean + coordinates[:, _BENT:] @ self.root.T
@@ -26,9 +26,6 @@ class _Shifted:
     def of(self, points):
         standard = np.linalg.solve(self.root, (points[:, _BENT:] - self.mean).T).T
         return np.hstack([points[:, :_BENT], standard])
-
-    def moves(self):
-        return whitened_moves(_BENT)
 
     def standardised(self, mean, root):
         return replace(self, mean=self.mean + self.root @ mean, root=self.root @ root)

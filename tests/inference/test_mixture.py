@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tactile_bayes.inference.ensembles.mixture import Mixture
-from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends, Proposal
+from tactile_bayes.inference.densities import ANYTHING, Ends, Mixture, Proposal
 
 MEAN = np.array([1.0, -2.0, 0.5])
 ROOT = np.array([[0.01, 0.0, 0.0], [3.0, 2.0, 0.0], [10.0, -20.0, 50.0]])

@@ -1,0 +1,307 @@
+"""Densities of proposals (normal, Student's t, mixtures of these, between bounds), and weights of draws."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.special import gammaln, ndtr
+
+from tactile_bayes.arrays import Flags, Floats
+
+__all__ = [
+    "ANYTHING",
+    "WIDENING",
+    "Ends",
+    "LogProbability",
+    "Mixture",
+    "Proposal",
+    "Random",
+    "effective_number",
+    "flattened",
+    "normalised",
+]
+
+LogProbability = Callable[[Floats], Floats]
+WIDENING = 1.1  # scale over that of the fitted points: too wide a proposal costs less than too narrow a one
+_FREEDOM = 10.0  # degrees of freedom: tails are heavier than normal ones, at little cost
+_MAX_REDRAWS = 40  # times that points out of bounds are drawn again
+# Truncation points of a normal distribution, in standard deviations from its mean: truncation farther below has no
+# effect, and farther above most draws would be lost.
+_CUTS = np.linspace(-4.0, 1.0, 101)
+_ROUNDS = 10  # of expectation and maximisation
+_PRIOR_POINTS, _PRIOR_WIDTH = (
+    5.0,
+    0.3,
+)  # points that the prior of a part's covariance weighs; its width over that of all
+
+
+class Random(Protocol):
+    """Common methods of NumPy's generators, new and legacy."""
+
+    def standard_normal(self, size: tuple[int, int], /) -> Floats: ...
+
+    def chisquare(self, df: float, size: int, /) -> Floats: ...
+
+    def multinomial(self, n: int, pvals: Floats, /) -> NDArray[np.int_]: ...
+
+    def permutation(self, x: int, /) -> NDArray[np.int_]: ...
+
+
+# ---- weights
+
+
+def normalised(logs: Floats) -> Floats:
+    """Return weights of sum one from their logarithms, shape (n,)."""
+    with np.errstate(invalid="ignore"):  # −inf less the largest remains −inf
+        weights = np.exp(logs - logs.max())
+    return np.asarray(weights / weights.sum())
+
+
+def effective_number(weights: Floats) -> Floats:
+    """Return the effective number (Kish's) of weights of sum one along the first axis."""
+    return np.asarray(1.0 / np.sum(weights**2, axis=0))
+
+
+def flattened(logs: Floats, least: float) -> Floats:
+    """Return weights of sum one from their logarithms, shape (n,), made more equal until `least` are effective."""
+    power = 1.0
+    while effective_number(weights := normalised(power * logs)) < least:
+        power *= 0.8
+    return weights
+
+
+# ---- densities
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Bounds of each coordinate of a target, shape (parameters,) each, or () for all coordinates."""
+
+    low: Floats
+    high: Floats
+
+    def hold(self, points: Floats) -> Flags:
+        """Return True for points, shape (n, parameters), within the bounds."""
+        return np.asarray(((points > self.low) & (points < self.high)).all(axis=1))
+
+    def drawn(self, draw: Callable[[int], Floats], count: int) -> Floats:
+        """Return draws within the bounds; others are drawn again, up to a largest number of times."""
+        points = draw(count)
+        for _ in range(_MAX_REDRAWS):
+            out = np.flatnonzero(~self.hold(points))
+            if not out.size:
+                break
+            points[out] = draw(out.size)
+        return points
+
+
+ANYTHING = Ends(np.array(-np.inf), np.array(np.inf))
+
+
+class _Density:
+    """Draws within bounds with their log-density, from draws without bounds."""
+
+    ends: Ends
+
+    def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
+        """Return points within the bounds, shape (count, parameters), and their `log_density`."""
+        points = self.ends.drawn(lambda count: self.draw_unbounded(random, count), count)
+        return points, self.log_density(points)
+
+    def draw_unbounded(self, random: Random, count: int) -> Floats:
+        """Return points of the distribution without bounds, shape (count, parameters)."""
+        raise NotImplementedError
+
+    def log_density(self, points: Floats) -> Floats:
+        """Return the log-density without bounds at points, (n, parameters), up to a constant of their number."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal(_Density):
+    """Multivariate Student's t distribution between bounds; normal for infinite degrees of freedom."""
+
+    mean: Floats  # (parameters,)
+    root: Floats  # lower-triangular Cholesky factor of the scale matrix
+    efficiency: float = 0.0  # effective share of draws when weighted by the target
+    log_mass: float = -np.inf  # log of the target's integral where it is covered, up to a constant of their number
+    ends: Ends = ANYTHING
+    freedom: float = _FREEDOM
+
+    @classmethod
+    def fitted(cls, points: Floats, weights: Floats | None = None, ends: Ends = ANYTHING) -> Proposal:
+        """Fit a proposal to points, shape (n, parameters), with weights of sum one, in any units of the parameters.
+
+        The points are assumed to come from a normal distribution that is truncated at the lower bounds.
+        """
+        weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
+        mean = weights @ points
+        centred = points - mean
+        deviation = np.sqrt(weights @ centred**2)
+        _refuse_constant(deviation, np.abs(mean))
+        standard = centred / deviation
+        correlation = (weights[:, None] * standard).T @ standard / (1.0 - np.sum(weights**2))
+        above = (mean - ends.low) / deviation
+        for j in np.flatnonzero(above < -_CUTS[0]):
+            shift, extra = _untruncated(above[j], correlation[j, j])
+            along = correlation[:, j] / correlation[j, j]
+            mean = mean + deviation * along * shift
+            correlation = correlation + extra * np.outer(along, along)
+        return cls(mean, WIDENING * deviation[:, None] * np.linalg.cholesky(correlation), ends=ends)
+
+    @property
+    def digest(self) -> str:
+        """Identity of the proposal, as text."""
+        return hashlib.sha256(self.mean.tobytes() + self.root.tobytes() + repr(self.efficiency).encode()).hexdigest()
+
+    @property
+    def constant(self) -> float:
+        """What `log_density` lacks."""
+        size, nu = self.mean.size, self.freedom
+        if math.isinf(nu):
+            return -0.5 * size * math.log(2.0 * math.pi)
+        return float(gammaln(0.5 * (nu + size)) - gammaln(0.5 * nu) - 0.5 * size * math.log(math.pi * nu))
+
+    def draw_unbounded(self, random: Random, count: int) -> Floats:
+        steps = random.standard_normal((count, self.mean.size))
+        if math.isfinite(self.freedom):
+            steps = steps / np.sqrt(random.chisquare(self.freedom, count) / self.freedom)[:, None]
+        return np.asarray(self.mean + steps @ self.root.T)
+
+    def log_density(self, points: Floats) -> Floats:
+        squares = np.sum(self.steps(points) ** 2, axis=1)
+        if math.isinf(self.freedom):
+            return np.asarray(-0.5 * squares - self._log_volume)
+        power = -0.5 * (self.freedom + self.mean.size)
+        return np.asarray(power * np.log1p(squares / self.freedom) - self._log_volume)
+
+    def steps(self, points: Floats) -> Floats:
+        """Return the standardised points, shape (n, parameters): relative to the mean, in units of the scale."""
+        return np.asarray((points - self.mean) @ self._inverse.T)
+
+    @cached_property
+    def _inverse(self) -> Floats:
+        return np.asarray(solve_triangular(self.root, np.eye(self.mean.size), lower=True))
+
+    @cached_property
+    def _log_volume(self) -> float:
+        return float(np.log(np.diag(self.root)).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture(_Density):
+    """Several proposals, each for a mode of the target, or a piece of its ridge."""
+
+    parts: tuple[Proposal, ...]
+
+    @classmethod
+    def fitted(cls, points: Floats, bent: Sequence[int], parts: int, ends: Ends = ANYTHING) -> Mixture:
+        """Fit a mixture to points, shape (n, parameters), that lie along a bent ridge.
+
+        Its parts are normal distributions of the columns `bent`, found by expectation and maximisation; given these,
+        the other columns are the same normal distribution everywhere, with a mean that is linear in them. Parts begin
+        as slices of equal numbers along the longest direction.
+        """
+        deviation = points.std(axis=0)
+        _refuse_constant(deviation, np.abs(points).max(axis=0))
+        mean, standard = points.mean(axis=0), (points - points.mean(axis=0)) / deviation
+        slopes = np.linalg.lstsq(standard[:, bent], standard, rcond=None)[0]  # of the columns `bent`, themselves
+        rest = standard - standard[:, bent] @ slopes
+        left = rest.T @ rest / len(points)
+        left[bent] = left[:, bent] = 0.0
+        found = []
+        for size, middle, covariance in zip(*_pieces(standard[:, bent], parts), strict=True):
+            root = WIDENING * deviation[:, None] * np.linalg.cholesky(slopes.T @ covariance @ slopes + left)
+            found.append(Proposal(mean + deviation * (middle @ slopes), root, log_mass=float(np.log(size)), ends=ends))
+        return cls(tuple(found))
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return self.parts[0].mean.size
+
+    @property
+    def ends(self) -> Ends:  # type: ignore[override]
+        return self.parts[0].ends
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Shares of the parts, in proportion to the target's integral; equal if no integral is known."""
+        masses = np.array([part.log_mass for part in self.parts])
+        return normalised(masses if np.any(np.isfinite(masses)) else np.zeros(masses.size))
+
+    @property
+    def efficiency(self) -> float:
+        """Efficiency of the mixture, as if each part covered its own mode alone."""
+        each = np.array([part.efficiency for part in self.parts])
+        return float(1.0 / np.sum(self.shares / each)) if np.all(each > 0.0) else 0.0
+
+    def with_efficiency(self, efficiency: float) -> Mixture:
+        """Return the mixture with another efficiency for all parts."""
+        return Mixture(tuple(replace(part, efficiency=efficiency) for part in self.parts))
+
+    @property
+    def digest(self) -> str:
+        """Identity of the mixture, as text."""
+        return hashlib.sha256("".join(part.digest for part in self.parts).encode()).hexdigest()
+
+    def draw_unbounded(self, random: Random, count: int) -> Floats:
+        counts = random.multinomial(count, self.shares)
+        parts = [part.draw_unbounded(random, int(each)) for part, each in zip(self.parts, counts, strict=True)]
+        return np.concatenate(parts)[random.permutation(count)]
+
+    def log_density(self, points: Floats) -> Floats:
+        with np.errstate(divide="ignore"):  # a part without mass has no share
+            shares = np.log(self.shares)
+        each = [share + part.log_density(points) for share, part in zip(shares, self.parts, strict=True)]
+        return np.asarray(np.logaddexp.reduce(each))
+
+
+def _refuse_constant(deviation: Floats, size: Floats) -> None:
+    """Raise numpy.linalg.LinAlgError if a deviation, shape (d,), is no more than rounding of numbers of a size."""
+    if not np.all(deviation > 1e-12 * size):
+        raise np.linalg.LinAlgError("a parameter is the same in all points")
+
+
+def _untruncated(above: float, variance: float) -> tuple[float, float]:
+    """Return the changes of mean and variance that undo the truncation of a normal distribution.
+
+    Its lower bound lies `above` below the truncated mean; all numbers are in truncated standard deviations.
+    """
+    mills = np.exp(-0.5 * _CUTS**2) / (np.sqrt(2.0 * np.pi) * ndtr(-_CUTS))
+    narrow = np.sqrt(1.0 - mills * (mills - _CUTS))
+    cut = np.interp(-above, -(mills - _CUTS) / narrow, _CUTS)
+    scale = 1.0 / np.interp(cut, _CUTS, narrow)
+    return float(-above - cut * scale), float(variance * (scale**2 - 1.0))
+
+
+def _pieces(points: Floats, count: int) -> tuple[Floats, Floats, Floats]:
+    """Return shares, (count,), means, (count, k), and covariances, (count, k, k), of a mixture of normal distributions.
+
+    A covariance is drawn toward that of all points, made narrower, by as many points as the prior weighs.
+    """
+    whole = np.cov(points.T).reshape(2 * points.shape[1:])
+    along = points @ np.linalg.eigh(whole)[1][:, -1]
+    shares = np.eye(count)[np.argsort(np.argsort(along, kind="stable"), kind="stable") * count // len(points)].T
+    for _ in range(_ROUNDS):
+        sizes = shares.sum(axis=1) + 1e-9
+        means = shares @ points / sizes[:, None]
+        off = points - means[:, None]
+        covariances = (shares[:, None] * off.swapaxes(1, 2)) @ off
+        covariances += _PRIOR_POINTS * _PRIOR_WIDTH**2 * whole
+        covariances /= (sizes + _PRIOR_POINTS)[:, None, None]
+        roots = np.linalg.cholesky(covariances)
+        squares = np.sum(np.square(off @ np.linalg.inv(roots).swapaxes(1, 2)), axis=2)
+        volumes = np.log(np.diagonal(roots, axis1=1, axis2=2)).sum(axis=1)
+        logs = (np.log(sizes) - volumes)[:, None] - 0.5 * squares
+        shares = np.exp(logs - logs.max(axis=0))
+        shares /= shares.sum(axis=0)
+    return sizes / sizes.sum(), means, covariances

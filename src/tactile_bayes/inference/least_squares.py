@@ -1,0 +1,132 @@
+"""Robust least squares by damped Gauss–Newton steps, within priors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.numerics.differences import central_slopes
+
+__all__ = ["Optimum", "descend", "optima"]
+
+Residuals = Callable[[Floats], Floats]
+_HUBER_THRESHOLD = 2.0  # residual, in standard deviations, beyond which the loss of the final search grows linearly
+_THRESHOLD_FACTOR = 0.2  # from one search to the next; the first threshold is the root mean square of residuals
+_MOST_EVALUATIONS = 40  # of the residuals in a search
+# Relative change of cost or point below which a search ends: the final one, and those before it.
+_FINAL_TOLERANCE, _EARLY_TOLERANCE = 1e-4, 1e-2
+_GAIN = 1.0  # least gain in cost for which a search is repeated from where it ended
+_INSIDE = 1e-3  # distance from a bound at which a bounded search begins, over the scale of the parameter
+_FITS = 0.55  # cost per residual below which the noise explains the record: 0.4 if the estimate of the noise is right
+
+
+class Optimum(NamedTuple):
+    """A robust least-squares solution."""
+
+    point: Floats
+    covariance: Floats  # from the Jacobian, for the stated noise, (d, d)
+    residuals: Floats  # in standard deviations, (k,)
+    cost: float  # robust, with that of the priors
+    beyond: Floats | None = None  # optimum without bounds, if it is out of bounds
+    excess: float = 0.0  # cost above that of the optimum without bounds
+
+    @property
+    def fits(self) -> bool:
+        """True if the estimated noise explains the record."""
+        return self.cost < _FITS * self.residuals.size
+
+
+def optima(
+    residuals: Residuals,
+    candidates: Iterable[Floats],
+    middle: Floats,
+    spread: Floats,
+    low: Floats | float = -np.inf,
+    high: Floats | float = np.inf,
+    deadline: Deadline = NEVER,
+) -> Iterator[Optimum]:
+    """Yield robust least-squares optima, one from each candidate.
+
+    A search may pass through points that are a priori impossible; if it ends at one, it is repeated within the bounds
+    from the nearest possible point.
+
+    Shapes: candidates (d,), middle, spread (d,), low, high (d,).
+    """
+    for candidate in candidates:
+        found = descend(residuals, candidate, middle, spread, deadline=deadline)
+        gain = np.inf
+        while gain > _GAIN and not deadline.has_passed:  # samples may have crossed an event during the search
+            again = descend(residuals, found.point, middle, spread, deadline=deadline)
+            gain = found.cost - again.cost
+            found = again if gain > 0.0 else found
+        if not np.all((found.point > low) & (found.point < high)):
+            inside = np.clip(found.point, low + _INSIDE * spread, high - _INSIDE * spread)
+            bounded = descend(residuals, inside, middle, spread, low, high, deadline)
+            if not deadline.has_passed:  # otherwise the unbounded optimum is unknown
+                bounded = bounded._replace(beyond=found.point, excess=bounded.cost - found.cost)
+            found = bounded
+        yield found
+        if deadline.has_passed:
+            break
+
+
+def descend(
+    residuals: Residuals,
+    start: Floats,
+    middle: Floats,
+    spread: Floats,
+    low: Floats | float = -np.inf,
+    high: Floats | float = np.inf,
+    deadline: Deadline = NEVER,
+) -> Optimum:
+    """Return the robust least-squares optimum from one starting point.
+
+    Arguments are those of `optima`. The search is in units of `spread`, so that it does not depend on those of the
+    record. The loss is 2 (√(1 + z) − 1) of squared residuals z in units of the threshold (pseudo-Huber, `soft_l1` of
+    `scipy.optimize.least_squares`), and quadratic for the priors.
+    """
+
+    def one(point: Floats) -> Floats:
+        return np.append(residuals((point * spread)[None])[0], point - middle / spread)
+
+    def jacobian(point: Floats) -> Floats:
+        """Return central differences, whose step must not be too small for interpolated loads."""
+        slopes = central_slopes(lambda points: residuals(points * spread), point, 1e-4)
+        return np.concatenate([slopes, np.eye(point.size)])
+
+    def loss(squares: Floats) -> Any:
+        """Return the robust loss of the record's residuals, and the quadratic one of the priors', with derivatives."""
+        root = np.sqrt(1.0 + squares)
+        found = np.stack([2.0 * (root - 1.0), 1.0 / root, -0.5 / root**3])
+        own = squares[-start.size :]
+        found[:, -start.size :] = own, np.ones(own.size), np.zeros(own.size)
+        return found
+
+    bounds = np.broadcast_to(low / spread, start.shape), np.broadcast_to(high / spread, start.shape)
+    point, scale, robust = start / spread, np.inf, cast(Any, loss)
+    while scale > _HUBER_THRESHOLD:  # far from the optimum a quadratic loss converges faster
+        typical = float(np.sqrt(np.mean(np.square(one(point)))))
+        scale = max(_HUBER_THRESHOLD, min(typical, _THRESHOLD_FACTOR * scale))
+        tolerance = _FINAL_TOLERANCE if scale == _HUBER_THRESHOLD else _EARLY_TOLERANCE
+        solution = deadline.least_squares(
+            one,
+            point,
+            jacobian,
+            bounds=bounds,
+            loss=robust,
+            f_scale=scale,
+            max_nfev=_MOST_EVALUATIONS,
+            ftol=tolerance,
+            xtol=tolerance,
+        )
+        point = solution.x
+        if deadline.has_passed:
+            break
+    _, sizes, axes = np.linalg.svd(np.asarray(solution.jac), full_matrices=False)
+    axes = axes / sizes[:, None] * spread
+    covariance = axes.T @ axes
+    return Optimum(solution.x * spread, covariance, one(solution.x)[: -spread.size], float(solution.cost))

@@ -1,0 +1,208 @@
+"""Advancing on a branch: the next leg, shortened until the tails of its series are small enough."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.branches.curves import ANGLE, DIP, Accuracy
+from tactile_bayes.mechanics.branches.equilibrium import (
+    SETTLED,
+    Balance,
+    Equilibrium,
+    Scene,
+    settle_at,
+    settle_at_limit,
+    tangential_psi1,
+)
+from tactile_bayes.mechanics.branches.leg import NUDGE, Leg, LegCurves, guess, leg_from, sample_leg, shortened
+from tactile_bayes.mechanics.branches.leg_events import change_of_phase, first_knot, release, share_of
+from tactile_bayes.mechanics.branches.outline import Outline
+from tactile_bayes.mechanics.branches.phase import limit
+from tactile_bayes.mechanics.branches.series import change_of, tail
+from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+
+__all__ = ["FIRST_LENGTH", "LONGEST", "Here", "Setting", "Step", "advance", "next_length"]
+
+FIRST_LENGTH, LONGEST, _SHORTEST = 0.5, 1.0, 1e-6
+"""Length of the first leg, and those between which all lie; see `leg_from`."""
+
+_ACCEPT, _AIM, _NOISE = 0.05, 0.01, 1e3
+"""Errors over the tolerated one: the largest that is accepted (tails underestimate errors of singular series), the one
+that is aimed at, and the largest that may be rounding in an exact leg."""
+
+_BACK, _LEAST_PACE, _MOST_PACE = 0.8, 0.3, 2.0
+"""Largest change of the length after a failure, and bounds of any change."""
+
+_MOST_TRIES = 64
+"""Largest number of trials of a leg: as many as `_BACK` takes from `LONGEST` to `_SHORTEST`."""
+
+_ROOM_IN_TIP, _ROOM_PAST_TIP = 0.3, 0.02
+"""Largest distances by which a leg of a rod that is not smooth at its tip passes the change of the phase, in ψ1 [rad]
+and in arc length [L]."""
+
+_PAST_TIP = 1e-6
+"""Share of a leg by which it passes the tip of a rod that is not smooth there."""
+
+_IN_A_DIP = 1e-5
+"""Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
+
+_ROUNDING = 1e-14
+"""Tail of the series of a drive angle that its rounding leaves [rad]."""
+
+_RESOLVED_LOADS = 1e-10
+"""Error of loads that no tolerance is below, over the loads: rounding may leave it where the rod bears on its base."""
+
+
+class Setting(NamedTuple):
+    """What is the same all along a branch."""
+
+    knots: Floats
+    low: float
+    """Least parameter of the contour."""
+    seen: Outline
+    """Outline relative to the base at first contact."""
+    accuracy: Accuracy
+    tolerance: Floats
+    slides: bool
+    """Whether friction opposes the slip everywhere."""
+    may_release: bool
+    """Whether the force may vanish: for a straight rod that turns about a pivot it does not."""
+
+
+class Here(NamedTuple):
+    """Where a branch goes on."""
+
+    scene: Scene
+    """With the phase, the line of the drive, and the sense of the friction."""
+    line: int
+    begin: Balance
+    before: Balance
+    """An equilibrium before that, if the branch is smooth there, else NaN."""
+    onward: Equilibrium
+    """Direction of the branch, of any length."""
+    length: float
+    """Length of the next leg."""
+    longest: float
+
+
+class Step(NamedTuple):
+    """A leg, with its series in the workspace."""
+
+    is_sound: bool
+    """False if the branch does not cut all planes of the leg."""
+    leg: Leg
+    length: float
+    end: Balance
+    before_end: Balance
+    knot: float
+    """Knot of the contour at its end, else NaN."""
+    at_knot: Balance
+    is_released: bool
+    """Whether the force vanishes at its end."""
+
+
+@inlined
+def advance(here: Here, setting: Setting, in_dip: bool, work: LegCurves) -> tuple[Step, float]:
+    """Next leg, and the factor of the length of the one after it."""
+    scene, accuracy = here.scene, setting.accuracy
+    least, length, known, before, pace = LONGEST * 0.5**accuracy.halvings, here.length, 0.0, math.inf, 1.0
+    for _ in range(_MOST_TRIES):
+        step = _trial(here, setting, length, known, work)
+        excess = _excess(accuracy, setting.tolerance, in_dip, work) if step.is_sound else math.inf
+        pace = _pace(excess, scene.exact, work)
+        # Rounding, which a shorter leg does not make smaller.
+        is_noise = 0.5 * before < excess < (_NOISE if scene.exact else 1.0)
+        if is_noise:
+            pace = max(pace, 1.0)
+        if excess <= _ACCEPT or is_noise or step.length <= (least if step.is_sound else _SHORTEST):
+            break
+        share, before = min(pace, _BACK), excess
+        if step.is_sound:
+            share = _up_to_tip(scene, accuracy, step.leg, share, work)
+        length, known = share * step.length, share if step.is_sound else 0.0
+    return step, pace
+
+
+@inlined
+def next_length(here: Here, setting: Setting, step: Step, pace: float) -> float:
+    """Length of the next leg."""
+    return max(min(pace * step.length, here.longest), LONGEST * 0.5**setting.accuracy.halvings)
+
+
+@inlined
+def _trial(here: Here, setting: Setting, length: float, known: float, work: LegCurves) -> Step:
+    """Leg of at most some length, which ends at the first knot of the contour, and where the force vanishes.
+
+    `known` is as in `sample_leg`."""
+    scene, begin = here.scene, here.begin
+    settled = max(SETTLED, 0.1 * setting.accuracy.last_step)
+    leg = leg_from(scene, begin, here.onward, length)
+    if known == 0.0 and scene.beam.varied is not None:
+        share = _share_in_phase(scene, leg)
+        leg, length = shortened(leg, share), share * length
+    share = release(scene, leg) if setting.may_release else math.nan
+    is_released = share <= 1.0
+    if is_released:
+        leg, length, known = shortened(leg, share), share * length, share * known
+    is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, known, settled, work)
+    knot, at_knot = math.nan, begin
+    if is_sound:
+        knot, node = first_knot(leg, setting.knots, setting.low, work)
+        if node <= 1.0:  # rates at the end are those before the knot
+            at_knot = settle_at(scene, knot, guess(work, node))
+            share = share_of(leg, at_knot) * (1.0 - NUDGE)
+            is_sound, is_released = share > 0.0, False
+            if is_sound:
+                leg, length = shortened(leg, share), share * length
+                is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, share, settled, work)
+    return Step(is_sound, leg, length, end, before_end, knot, at_knot, is_released)
+
+
+@compiled
+def _excess(accuracy: Accuracy, tolerance: Floats, in_dip: bool, work: LegCurves) -> float:
+    """Estimated error of the drive angle, the loads or the states over the tolerated one."""
+    curves = work.curves
+    angle, change = tail(curves.series[ANGLE]), change_of(curves.series[ANGLE])
+    if in_dip:
+        return angle / (_IN_A_DIP * DIP)
+    found = max(angle / max(accuracy.resolved * change, _ROUNDING), angle / accuracy.sharp)
+    for c in range(3):
+        loads = curves.series[c]
+        tolerated = max(tolerance[c], _RESOLVED_LOADS * (abs(loads[0]) + change_of(loads)))
+        found = max(found, (tail(loads) + angle * change_of(loads) / change) / tolerated)
+    if not accuracy.polished:
+        for c in range(ANGLE):
+            found = max(found, tail(curves.series[c]) / (accuracy.resolved * max(change_of(curves.series[c]), 1.0)))
+    return found
+
+
+@compiled
+def _pace(excess: float, exact: bool, work: LegCurves) -> float:
+    """Factor of the length by which the error becomes the one aimed at, which is of the order of the series."""
+    if exact and excess < _AIM:  # rounding
+        return _MOST_PACE
+    return min(max((_AIM / excess) ** (1.0 / (2 * work.nodes.size - 1)), _LEAST_PACE), _MOST_PACE)
+
+
+@compiled
+def _share_in_phase(scene: Scene, leg: Leg) -> float:
+    """Share of a leg up to somewhat beyond the change of the phase, as far as its direction tells."""
+    end, sense = limit(scene.phase, tangential_psi1(scene))
+    room = sense * (end - leg.begin.q) + (_ROOM_IN_TIP if scene.phase == TIP else _ROOM_PAST_TIP)
+    pace = sense * leg.along.q
+    return room / pace if pace > room > 0.0 else 1.0
+
+
+@compiled
+def _up_to_tip(scene: Scene, accuracy: Accuracy, leg: Leg, share: float, work: LegCurves) -> float:
+    """Share of a leg to try next: up to the tip of a rod that is not smooth there, if the contact reaches it."""
+    if scene.beam.varied is None or scene.phase != TANGENTIAL:
+        return share
+    change = change_of_phase(scene, accuracy, work)
+    if not change < _BACK:
+        return share
+    change = share_of(leg, settle_at_limit(scene, guess(work, change))) + _PAST_TIP
+    return change if _PAST_TIP < change < _BACK else share
