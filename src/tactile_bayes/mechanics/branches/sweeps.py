@@ -292,9 +292,10 @@ def _follow(
 
     Where such a branch is refused for another reason, that is the reason.
     """
-    ends = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, True)
+    yes, no = bool(1), bool(0)  # numba would compile all once for True and again for False
+    ends = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, yes)
     if ends.reach == _STICKS and room is None:
-        assumed = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, False)
+        assumed = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, no)
         return ends if asks_sliding and assumed.reach == _TOUCHES else assumed
     return ends
 
