@@ -52,3 +52,10 @@ def test_the_height_is_that_nearest_to_what_is_asked():
 def test_what_is_no_polyline_is_refused(pieces, error, words):
     with refused(error, words):
         Polyline(pieces)
+
+
+def test_arguments_broadcast():
+    square = Polyline([[(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)]])
+    assert square.height(0.5, [[0.4], [0.6]]).tolist() == [[0.0], [1.0]]
+    assert square.height([0.25, 2.0], 0.0).tolist() == pytest.approx([0.0, np.nan], nan_ok=True)
+    assert square.distance(0.5, [-0.5, 1.25]).tolist() == [0.5, 0.25]

@@ -61,7 +61,7 @@ class Polyline:
 
     def distance(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Return the distance of each point from the nearest one of the polyline; NaN where that is a free end."""
-        points = np.stack(check_arrays(x=x, y=y), axis=-1)
+        points = np.stack(np.broadcast_arrays(*check_arrays(x=x, y=y)), axis=-1)
         starts, along, free = self._segments
         squares = np.sum(along**2, axis=1)
         found = np.full(points.shape[:-1], np.nan)
@@ -82,7 +82,7 @@ class Polyline:
         >>> Polyline([[(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)]]).height([0.5, 0.5, 2.0], [0.4, 0.6, 0.0])
         array([ 0.,  1., nan])
         """
-        positions, heights = check_arrays(x=x, near=near)
+        positions, heights = np.broadcast_arrays(*check_arrays(x=x, near=near))
         starts, along, _ = self._segments
         left, right = (edge(starts[:, 0], starts[:, 0] + along[:, 0]) for edge in (np.minimum, np.maximum))
         found = np.full(positions.shape, np.nan)
