@@ -37,10 +37,8 @@ _MAX_REDRAWS = 40  # times that points out of bounds are drawn again
 # effect, and farther above most draws would be lost.
 _CUTS = np.linspace(-4.0, 1.0, 101)
 _ROUNDS = 10  # of expectation and maximisation
-_PRIOR_POINTS, _PRIOR_WIDTH = (
-    5.0,
-    0.3,
-)  # points that the prior of a part's covariance weighs; its width over that of all
+# Points that the prior of a part's covariance weighs, and its width over that of all.
+_PRIOR_POINTS, _PRIOR_WIDTH = 5.0, 0.3
 
 
 class Random(Protocol):

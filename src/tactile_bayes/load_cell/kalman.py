@@ -28,10 +28,10 @@ def given_before(
 ) -> tuple[Floats, Floats]:
     """Return residuals of samples given those before, shape (..., samples, channels), and their variances."""
     if _is_of_states(zero, discrepancy):
-        return _run(_filter_all, residual, noise, zero, discrepancy)
+        return _run(False, residual, noise, zero, discrepancy)
     without = zero._replace(bias=np.zeros(1))
     residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
-    (new, of_one), (total, _) = _run(_filter_all, np.stack([residual, ones]), noise, without)
+    (new, of_one), (total, _) = _run(False, np.stack([residual, ones]), noise, without)
     with np.errstate(divide="ignore"):
         known = 1.0 / zero.bias + _sum_before(of_one**2 / total)
     new = new - of_one * _sum_before(of_one * new / total) / known
@@ -47,12 +47,12 @@ def given_others(
     the noise over its variance (de Jong 1988, doi 10.1093/biomet/75.3.594).
     """
     if _is_of_states(zero, discrepancy):
-        weighed, precision = _run(_smooth_all, residual, noise, zero, discrepancy)
+        weighed, precision = _run(True, residual, noise, zero, discrepancy)
     else:
         # The bias is a change of rank one of Q: the Sherman–Morrison formula.
         without = zero._replace(bias=np.zeros(1))
         residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
-        found = _run(_smooth_all, np.stack([residual, ones]), noise, without)
+        found = _run(True, np.stack([residual, ones]), noise, without)
         (weighed, of_one), (precision, _) = found
         with np.errstate(divide="ignore"):
             known = 1.0 / zero.bias + of_one.sum(axis=-2, keepdims=True)
@@ -75,7 +75,7 @@ def innovations(
 
     Shapes: weight as residual and noise, rate (n,), wandering (3, n, channels): variances of `Zero`.
     """
-    return _called(_filter_all, (residual, noise, weight), rate, order, step, wandering, decay)
+    return _called(False, (residual, noise, weight), rate, order, step, wandering, decay)
 
 
 def _is_of_states(zero: Zero, discrepancy: Discrepancy | None) -> bool:
@@ -90,9 +90,9 @@ def _sum_before(values: Floats) -> Floats:
 
 
 def _run(
-    function: object, residual: Floats, noise: Floats, zero: Zero, discrepancy: Discrepancy | None = None
+    smooths: bool, residual: Floats, noise: Floats, zero: Zero, discrepancy: Discrepancy | None = None
 ) -> tuple[Floats, Floats]:
-    """Call a compiled function with one axis for the batch."""
+    """Filter, or smooth as well, with one axis for the batch."""
     noise = np.atleast_2d(noise)
     constant = zero.bias if zero.decay == 1.0 else 0.0
     variances = zero.initial + constant, zero.step, zero.bias - constant
@@ -101,29 +101,31 @@ def _run(
     shapes = residual.shape, noise.shape, of_zero[0].shape, weight.shape, (*rate.shape, 1, 1)
     shape = np.broadcast_shapes(*shapes)
     size = -1, *shape[-2:]
-    readings = [np.ascontiguousarray(np.broadcast_to(v, shape)).reshape(size) for v in (residual, noise, weight)]
+    residual, noise, weight = (
+        np.ascontiguousarray(np.broadcast_to(v, shape)).reshape(size) for v in (residual, noise, weight)
+    )
     order = np.arange(shape[-2]) if discrepancy is None else discrepancy.course.order
     step = np.ones(shape[-2]) if discrepancy is None else discrepancy.course.step
     wandering = np.stack([np.broadcast_to(v, (*shape[:-2], 1, shape[-1])).reshape(-1, shape[-1]) for v in of_zero])
     rates = np.broadcast_to(rate, shape[:-2]).ravel()
-    found = _called(function, tuple(readings), rates, order, step, wandering, zero.decay)
+    found = _called(smooths, (residual, noise, weight), rates, order, step, wandering, zero.decay)
     return found[0].reshape(shape), found[1].reshape(shape)
 
 
 def _called(
-    function: object,
-    readings: tuple[Floats, ...],
+    smooths: bool,
+    readings: tuple[Floats, Floats, Floats],
     rate: Floats,
     order: Index,
     step: Floats,
     wandering: Floats,
     decay: float,
 ) -> tuple[Floats, Floats]:
-    """Call a compiled function with memory for its results, and for mean, covariance, a vector, and gains of states."""
+    """Call the compiled function with room for results, and for mean, covariance, a vector, and gains of states."""
     found = np.empty(readings[0].shape), np.empty(readings[0].shape)
-    gains = np.empty((order.size if function is _smooth_all else 0, _STATES))
+    gains = np.empty((order.size if smooths else 0, _STATES))
     state = np.empty(_STATES), np.empty((_STATES, _STATES)), np.empty(_STATES), gains
-    function(readings, rate, order, step, wandering, decay, found, state)  # type: ignore[operator]
+    _filter_all(readings, rate, order, step, wandering, decay, smooths, found, state)
     return found
 
 
@@ -326,25 +328,7 @@ def _filter_all(
     step: Floats,
     wandering: Floats,
     decay: float,
-    found: tuple[Floats, Floats],
-    state: tuple[Floats, Floats, Floats, Floats],
-) -> None:
-    (residual, white, weight), (new, total) = readings, found
-    for p in range(rate.size):
-        for c in range(residual.shape[2]):
-            own = residual[p, :, c], white[p, :, c], weight[p, :, c]
-            variances = wandering[0, p, c], wandering[1, p, c], wandering[2, p, c]
-            _filter(own, rate[p], order, step, variances, decay, (new[p, :, c], total[p, :, c]), state)
-
-
-@cached
-def _smooth_all(
-    readings: tuple[Floats, Floats, Floats],
-    rate: Floats,
-    order: Index,
-    step: Floats,
-    wandering: Floats,
-    decay: float,
+    smooths: bool,
     found: tuple[Floats, Floats],
     state: tuple[Floats, Floats, Floats, Floats],
 ) -> None:
@@ -355,4 +339,5 @@ def _smooth_all(
             variances = wandering[0, p, c], wandering[1, p, c], wandering[2, p, c]
             of_channel = new[p, :, c], total[p, :, c]
             _filter(own, rate[p], order, step, variances, decay, of_channel, state)
-            _smooth(own[2], rate[p], order, step, decay, of_channel, state)
+            if smooths:
+                _smooth(own[2], rate[p], order, step, decay, of_channel, state)
