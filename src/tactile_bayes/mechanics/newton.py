@@ -1,10 +1,21 @@
-"""Newton's method within a bracket, for functions that fall through zero."""
+"""Steps of searches: by Newton's method within a bracket, for functions that fall through zero, and by the golden
+section, for those with one maximum."""
 
 from __future__ import annotations
 
+import math
+
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = ["newton_step"]
+__all__ = ["golden", "newton_step"]
+
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+@compiled
+def golden(low: float, high: float) -> tuple[float, float]:
+    """Points between which the bracket of an extremum is cut, by their values."""
+    return high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
 
 
 @compiled

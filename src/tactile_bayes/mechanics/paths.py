@@ -15,12 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
-from tactile_bayes.mechanics.branches.shapes import shapes_of
+from tactile_bayes.mechanics.branches.sweeps import Segments, Shapes, Solutions, Sweeps, shapes_of, solve_sweeps
 from tactile_bayes.mechanics.elastica import Wrench
-from tactile_bayes.mechanics.phases import NONE, TANGENTIAL
+from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 
 if TYPE_CHECKING:
-    from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps
     from tactile_bayes.mechanics.rods.profile import Profile
 
 __all__ = ["Paths", "States", "trace"]
@@ -63,10 +62,9 @@ class Paths:
     """Drive angle of snap-off [rad]."""
     snap_parameter: Floats
     snap_off: NDArray[np.int8]
-    changes: Floats
-    """Beginnings of phases, then the end of the last, as in `Found`, shape (n, phases + 1, 6); NaN beyond."""
     events: Floats
-    """States there, with the columns of `STATE`, shape (n, phases + 1, columns); zero beyond."""
+    """States where phases begin, and at the end of the last, with the columns of `STATE`, shape (n, phases + 1,
+    columns); zero beyond."""
     phases: Index
     """Number of phases."""
     largest_curvature: Floats
@@ -83,6 +81,8 @@ class Paths:
     then travels, in rod lengths."""
     sampled: Floats
     """States at the drive angles given to `trace`, shape (n, k, columns)."""
+    slides_from: float | None = None
+    """Drive angle of a single path from which friction opposes the slip, if it does not all along."""
 
     def is_clear(self) -> Flags:
         """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,).
@@ -149,13 +149,14 @@ class Paths:
         index, sample = np.nonzero(self.sampled[..., 0] != NONE)
         return index, sample, _as_states(self.sampled[index, sample])
 
-    def sampled_states(self, index: Index) -> States:
-        """States of contours at the drive angles given to `trace`, shape (*index.shape, k); NaN out of contact."""
-        return _as_states(self.sampled[index])
+    def sampled_states(self, index: Index, sample: Index | slice = slice(None)) -> States:
+        """States of contours at the drive angles given to `trace`, shape (*index.shape, k), or at one of them each,
+        shape (*index.shape,); NaN out of contact."""
+        return _as_states(self.sampled[index, sample])
 
     def changes_to_tip(self) -> list[list[bool]]:
         """Return whether the phases of each path are tip contact."""
-        to_tip = (self.changes[..., 3] > 0.0).tolist()
+        to_tip = (self.events[..., 0] == TIP).tolist()
         return [of_path[:count] for of_path, count in zip(to_tip, self.phases.tolist(), strict=True)]
 
     def event_states(self) -> States:
@@ -228,7 +229,6 @@ def trace(
         snap_angle=solutions.snap_angle,
         snap_parameter=solutions.snap_parameter,
         snap_off=solutions.snap_off,
-        changes=np.where(has_path, solutions.changes[:, : most + 1], np.nan),
         events=np.where(has_path, solutions.event_states[:, : most + 1], 0.0),
         phases=solutions.phases,
         largest_curvature=solutions.curvature,
@@ -244,8 +244,6 @@ def trace(
 
 def _sweeps_of(sweep_frame: SweepFrame, friction_angle: ArrayLike, compliance: ArrayLike) -> Sweeps:
     """One sweep along each contour, with loads in EI/L and EI/L²."""
-    from tactile_bayes.mechanics.branches.sweeps import Sweeps  # numba takes a second to load
-
     count, every = sweep_frame.size, np.arange(sweep_frame.size)
     return Sweeps(
         contour=every,
@@ -279,8 +277,6 @@ def _swept(
     **options: Any,
 ) -> Solutions:
     """Solutions at drive angles in the sweep frame, shape (k,) for all or (n, k)."""
-    from tactile_bayes.mechanics.branches.sweeps import Segments, solve_sweeps
-
     angles = np.atleast_2d(np.asarray(drive_angles, dtype=float))
     if lines is not None:
         angles = np.broadcast_to(angles, (max(angles.shape[0], lines.shape[0]), angles.shape[1]))
@@ -297,7 +293,7 @@ def _as_states(columns: Floats) -> States:
     """States from their columns, shape (..., columns); NaN where there is none."""
     phase = columns[..., 0].astype(np.int8)
     found = np.where((phase == NONE)[..., None], np.nan, columns)
-    parameter, x, y, alpha, drive_angle, moment, force_x, force_y, arclength, tip_angle, _ = np.moveaxis(
+    parameter, x, y, alpha, drive_angle, moment, force_x, force_y, arclength, tip_angle, *_ = np.moveaxis(
         found[..., 1:], -1, 0
     ).copy()
     unknown, lying = np.full(phase.shape, np.nan), np.where(phase == TANGENTIAL, arclength, np.nan)

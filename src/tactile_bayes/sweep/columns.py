@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.paths import Paths
 from tactile_bayes.mechanics.phases import NONE
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 
@@ -29,13 +30,19 @@ class ManyUnits(NamedTuple):
     moment_unit: Any
     force_unit: Any
 
+    @classmethod
+    def of_rod(cls, rod: Rod) -> ManyUnits:
+        return cls(rod.length_unit, rod.moment_unit, rod.force_unit)
+
     def of(self, index: Index) -> ManyUnits:
         return ManyUnits(*(value[index] if isinstance(value, np.ndarray) else value for value in self))
 
 
-def sweep_samples(paths: Paths, units: ManyUnits, index: Index) -> dict[str, NDArray[Any]]:
-    """Loads and contacts at the drive angles with which paths were traced. Returns shape (*index.shape, k)."""
-    states, each = paths.sampled_states(index), index[..., None]
+def sweep_samples(paths: Paths, units: ManyUnits, index: Index, sample: Index | None = None) -> dict[str, NDArray[Any]]:
+    """Loads and contacts at the drive angles with which paths were traced, shape (*index.shape, k), or at one of them
+    each, shape (*index.shape,)."""
+    each, chosen = (index[..., None], slice(None)) if sample is None else (index, sample)
+    states = paths.sampled_states(index, chosen)
     found = to_lab_frame(paths.sweep_frame, each, states, units.of(each))
     for name in CHANNELS:
         np.copyto(found[name], 0.0, where=states.wrench.phase == NONE)

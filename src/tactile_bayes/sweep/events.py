@@ -13,7 +13,6 @@ from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Direction, Drive
 from tactile_bayes.sweep.lab_frame import to_lab_frame
-from tactile_bayes.sweep.sliding import sliding_from
 
 __all__ = ["Event", "SweepEvents", "events_of"]
 
@@ -114,9 +113,8 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
         base, columns["travel"] = drive.base, columns["drive_angle"]
         columns["base_x"], columns["base_y"] = (np.full(index.size, value) for value in base)
     slides = float(columns["travel"][0])
-    if not isinstance(drive, Carried):
-        way = sliding_from(paths)
-        slides = np.pi - way if direction == "backward" else way
+    if paths.slides_from is not None:
+        slides = np.pi - paths.slides_from if direction == "backward" else paths.slides_from
     kinds = [
         phases[0],
         *(f"{before} → {after}" for before, after in pairwise(phases)),

@@ -11,22 +11,35 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_kind, check_number
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.sweep_frame import SweepFrame
-from tactile_bayes.errors import ContourError, ParameterError, ReachError
+from tactile_bayes.errors import ContourError, ParameterError, ReachError, TactileBayesError
 from tactile_bayes.mechanics.branches.line import lines_through
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.paths import Paths, trace
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Direction
-from tactile_bayes.sweep.sliding import sliding_from
 
-__all__ = ["carried_paths", "friction_angle_of", "sweep_paths", "to_sweep_frame"]
+__all__ = ["carried_paths", "frame_of", "friction_angle_of", "rotated_paths", "sweep_paths", "to_sweep_frame"]
 
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
 _SAME = 1e-9
 """Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: its side
 is then the one to which it is turned less."""
+
+_LOOKS = 400
+"""Travels from first contact to snap-off at which contacts are compared to find the sense of the slip."""
+
+_ROUNDING = 1e-12
+"""Slip between two of them [L] that rounding may cause."""
+
+_PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
+"""Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
+of the object on one side seems to have passed it on the other."""
+
+_FREE = "without friction the rod has a path (friction = 0 under [unknown] of rig.toml); with it, "
+
 _SLIDING = (
     "split a drive that turns back while the rod is in contact into drives that go one way, or take another heading or "
     "drive angle",
@@ -34,11 +47,37 @@ _SLIDING = (
 )
 """What to do where friction would hold a rod that is carried, and one that turns about a pivot."""
 
-_FREE = "without friction the rod has a path (friction = 0 under [unknown] of rig.toml); with it, "
-
-_PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
-"""Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
-of the object on one side seems to have passed it on the other."""
+_IN_CONTACT: dict[Reachability, tuple[type[TactileBayesError], str]] = {
+    Reachability.GRAZES: (
+        ReachError,
+        "{sweep} the rod touches the contour so slightly that rounding hides where contact ends: bring contour and "
+        "pivot closer together (are contour, pivot and rod in one unit?)",
+    ),
+    Reachability.BEGINS_INSIDE: (
+        ContourError,
+        "{sweep} the unloaded rod would cut the contour from the beginning, or before it touches it on a side from "
+        "which it can be followed: begin the drive clear of it, or carry the rod another way",
+    ),
+    Reachability.SLIPS_OFF: (
+        ReachError,
+        "{sweep} the rod's tip slips off the contour as soon as it touches it: it is turned beyond the normal of the "
+        "contour there, so that any load pushes it on; sweep in the other direction, move the pivot, or take a rod "
+        "that is less curved",
+    ),
+    Reachability.FOLDS_OVER: (
+        ReachError,
+        "{sweep} the rod's tip folds over: at {point} the other side of the rod lies along the contour, and contact "
+        "with both sides in one sweep is not modelled; end the drive before, take a rod that is stiffer or less curved "
+        "at its tip, sweep in the other direction, or move the pivot",
+    ),
+    Reachability.TOUCHES_TWICE: (
+        ContourError,
+        "{sweep} the rod would touch the contour twice: in contact at {point} it is curved toward the object so much "
+        "that another part of it would cut the contour, and contact at two points is not modelled; take a rod that is "
+        "less curved, sweep in the other direction, or move the pivot",
+    ),
+}
+"""Why there is no path although the rod touches the contour."""
 
 
 def sweep_paths(
@@ -54,32 +93,69 @@ def sweep_paths(
     """Compute the exact path of one sweep along one contour, or raise an error that says why there is none.
 
     Parameters and errors are those of `scan`, with one pivot and one direction, and the compliance of the suspension
-    [rad/(EI/L)]. Friction opposes the slip all along the path, or from a travel on: see `sliding_from`. States are
-    computed at the drive angles in the sweep frame [rad].
+    [rad/(EI/L)]. Friction opposes the slip all along the path, or from `Paths.slides_from` on.
     """
     rod = Rod() if rod is None else rod
     sweep_frame = to_sweep_frame(contour, base, direction, rod)
-    friction_angle = friction_angle_of(friction)
+    rubbing = rod, friction_angle_of(friction), compliance
     height = np.asarray(contour.height(base[0])) - 0.5 * rod.diameter
     if np.any(height <= base[1]):
         raise ContourError(
             f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
-    known: dict[str, Any] = {
-        "friction_angle": friction_angle,
-        "suspension_compliance": compliance,
-        "profile": rod.profile,
-        "drive_angles": drive_angles,
-    }
-    paths = trace(sweep_frame, asks_sliding=True, **known)
+    paths = rotated_paths(sweep_frame, *rubbing, drive_angles)
     if paths.reach[0] == Reachability.STICKS:
-        assumed = trace(sweep_frame, **known)
-        if assumed.reach[0] == Reachability.TOUCHES and np.isfinite(sliding_from(assumed)):
-            paths = assumed
-    where = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
-    _refuse(paths, contour, rod, direction, where)
+        assumed = rotated_paths(sweep_frame, *rubbing, drive_angles, asks_sliding=False)
+        if assumed.reach[0] == Reachability.TOUCHES and np.isfinite(begin := _slides_from(assumed)):
+            paths = replace(assumed, slides_from=begin)
+    _refuse(paths, contour, rod, direction, f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})")
     return paths
+
+
+def rotated_paths(
+    sweep_frame: SweepFrame,
+    rod: Rod,
+    friction_angle: float,
+    compliance: float,
+    drive_angles: Floats | None,
+    *,
+    asks_sliding: bool = True,
+    polished: bool = True,
+) -> Paths:
+    """Follow the paths of a rod that turns in one direction, with states at drive angles in the laboratory frame."""
+    if drive_angles is not None and sweep_frame.mirrored[0]:
+        drive_angles = np.pi - drive_angles
+    return trace(
+        sweep_frame,
+        friction_angle=friction_angle,
+        suspension_compliance=compliance,
+        profile=rod.profile,
+        drive_angles=drive_angles,
+        asks_sliding=asks_sliding,
+        polished=polished,
+    )
+
+
+def _slides_from(paths: Paths) -> float:
+    """Return the travel in the sweep frame from which friction opposes the slip along one path; NaN if it does not.
+
+    A rod that is curved toward the object is first straightened, and slides outward: friction has the wrong sense up to
+    there. A state of sliding has no memory, so that those after it are right.
+    """
+    travels = np.linspace(paths.first_angle[0], paths.snap_angle[0], _LOOKS + 1)
+    states = paths.states(np.zeros(travels.size, dtype=np.intp), travels)
+    frame, alpha = paths.sweep_frame, states.slope_angle
+    standoff = float(np.max(frame.standoff)) / float(np.max(frame.length))
+    middle, arclength = 0.5 * (alpha[1:] + alpha[:-1]), states.wrench.contact_arclength
+    moved = np.diff(states.x + standoff * np.sin(alpha)) * np.cos(middle)
+    moved += np.diff(states.y - standoff * np.cos(alpha)) * np.sin(middle)
+    lying = states.wrench.phase == TANGENTIAL
+    wrong = moved - np.where(lying[1:] & lying[:-1], np.diff(arclength), 0.0) > _ROUNDING
+    if not wrong.any():
+        return float(travels[0])
+    last = int(np.flatnonzero(wrong)[-1])
+    return float(travels[last + 2]) if wrong[: last + 1].all() and last + 2 < _LOOKS else np.nan
 
 
 def carried_paths(
@@ -127,23 +203,23 @@ def carried_paths(
 
 def _turn_to_tangency(paths: Paths) -> float:
     """Angle by which the tip is turned from the contour at first contact [rad]; 0 in tangential contact."""
-    _, q, _, is_tip, _, friction_angle = paths.changes[0, 0]
-    return float(q + friction_angle) if is_tip > 0.0 else 0.0
+    first = paths.event_states().take(np.array(0), np.array(0))
+    return float(first.wrench.tip_angle - first.slope_angle) if first.wrench.phase == TIP else 0.0
 
 
 def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, sweep: str) -> None:
     """Raise an error that says why there is no path."""
-    base = float(paths.sweep_frame.base_x[0]), float(paths.sweep_frame.base_y[0])
-    match Reachability(int(paths.reach[0])):
-        case Reachability.TOO_FAR if paths.lines is not None:
+    x, y = float(paths.sweep_frame.base_x[0]), float(paths.sweep_frame.base_y[0])
+    reach, is_carried = Reachability(int(paths.reach[0])), paths.lines is not None
+    pivot, nearest = f"pivot at ({x:g}, {y:g})", f"{paths.distance[0] * rod.length:.6g}"
+    if reach in _IN_CONTACT:
+        kind, message = _IN_CONTACT[reach]
+        raise kind(message.format(sweep=sweep, point=_point(paths)))
+    match reach:
+        case Reachability.TOO_FAR if is_carried:
             raise ReachError(
                 f"{sweep} the rod does not touch the contour: bring them closer together, or carry the rod farther "
                 "(are contour, drive and rod in one unit?)"
-            )
-        case Reachability.BEGINS_INSIDE:
-            raise ContourError(
-                f"{sweep} the unloaded rod would cut the contour from the beginning, or before it touches it on a side "
-                "from which it can be followed: begin the drive clear of it, or carry the rod another way"
             )
         case Reachability.STICKS:
             free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)
@@ -152,26 +228,23 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 f"{sweep} friction would hold the contact at {_point(paths)}: the rod would have to slide the other "
                 "way there, or would not slide at first, and sticking is not modelled; "
                 + (_FREE if is_free else "")
-                + _SLIDING[paths.lines is None]
+                + _SLIDING[not is_carried]
             )
         case Reachability.TOO_FAR:
             raise ReachError(
-                f"the contour is out of reach: its nearest point is {paths.distance[0] * rod.length:.6g} from the "
-                f"pivot at ({base[0]:g}, {base[1]:g}), and the rod is {rod.length:g} long"
-                + (f", on a stem of {rod.stem:g}" if rod.stem else "")
+                f"the contour is out of reach: its nearest point is {nearest} from the {pivot}, and the rod is "
+                f"{rod.length:g} long" + (f", on a stem of {rod.stem:g}" if rod.stem else "")
             )
-        case Reachability.CUTS_PIVOT if paths.lines is not None:
+        case Reachability.CUTS_PIVOT if is_carried:
             raise ContourError(f"{sweep} the contour cuts the path of the base: raise the contour or lower the drive")
         case Reachability.CUTS_PIVOT:
             raise ContourError(
-                f"the contour cuts the base: the pivot at ({base[0]:g}, {base[1]:g}) is not below it; raise the "
-                "contour or lower the pivot"
+                f"the contour cuts the base: the {pivot} is not below it; raise the contour or lower the pivot"
             )
         case Reachability.TOO_CLOSE:
-            of_drive = "path of the base" if paths.lines is not None else f"pivot at ({base[0]:g}, {base[1]:g})"
             raise ContourError(
-                f"the contour comes within {paths.distance[0] * rod.length:.6g} of the {of_drive}; a path can be "
-                f"followed from {CLEARANCE * rod.length + rod.stem:g} on ({CLEARANCE:.0%} of the rod's length"
+                f"the contour comes within {nearest} of the {'path of the base' if is_carried else pivot}; a path can "
+                f"be followed from {CLEARANCE * rod.length + rod.stem:g} on ({CLEARANCE:.0%} of the rod's length"
                 f"{', beyond the stem, on which contact is not modelled' if rod.stem else ''}): move one of them away"
             )
         case Reachability.ENDS:
@@ -183,29 +256,6 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
             raise ContourError(
                 f"{sweep} the rod would still touch at {_end(contour, direction == 'backward')}, and "
                 "nothing is known of the object beyond: extend the contour, or move the pivot"
-            )
-        case Reachability.GRAZES:
-            raise ReachError(
-                f"{sweep} the rod touches the contour so slightly that rounding hides where contact ends: bring "
-                "contour and pivot closer together (are contour, pivot and rod in one unit?)"
-            )
-        case Reachability.SLIPS_OFF:
-            raise ReachError(
-                f"{sweep} the rod's tip slips off the contour as soon as it touches it: it is turned beyond the normal "
-                "of the contour there, so that any load pushes it on; sweep in the other direction, move the pivot, or "
-                "take a rod that is less curved"
-            )
-        case Reachability.FOLDS_OVER:
-            raise ReachError(
-                f"{sweep} the rod's tip folds over: at {_point(paths)} the other side of the rod lies along the "
-                "contour, and contact with both sides in one sweep is not modelled; end the drive before, take a rod "
-                "that is stiffer or less curved at its tip, sweep in the other direction, or move the pivot"
-            )
-        case Reachability.TOUCHES_TWICE:
-            raise ContourError(
-                f"{sweep} the rod would touch the contour twice: in contact at {_point(paths)} it is curved toward "
-                "the object so much that another part of it would cut the contour, and contact at two points is not "
-                "modelled; take a rod that is less curved, sweep in the other direction, or move the pivot"
             )
 
 
@@ -231,14 +281,19 @@ def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direc
         raise ParameterError(
             f"one contour is wanted here, not an array of shape {contour.shape}: scan_many takes those of shape (n,)"
         )
-    x, y = (np.full(1, float(b)) for b in base)
+    return frame_of(contour.broadcast_to((1,)), base, direction, rod)
+
+
+def frame_of(contours: Contour, base: tuple[Any, Any], direction: Direction, rod: Rod) -> SweepFrame:
+    """Convert contours with parameters of shape (n,) to the frame of sweeps of a rod about a pivot each."""
+    x, y = (np.array(np.broadcast_to(b, contours.shape), dtype=float) for b in base)
     return SweepFrame(
-        contour.broadcast_to((1,)),
+        contours,
         x,
         y,
         rod.length,
         0.5 * rod.diameter,
-        np.array([direction == "backward"]),
+        np.full(contours.shape, direction == "backward"),
         rod.arc_curvature,
         rod.taper,
         rod.stem / rod.length,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -20,11 +20,13 @@ from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN, Rod
+from tactile_bayes.record import CHANNELS
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig import make_record
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import pivot_shifts
+from tactile_bayes.sweep.columns import ManyUnits, sweep_samples
 from tactile_bayes.sweep.drive import Carried, Direction, Drive, Motion, Rotation, Translation, drives_of
 from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
@@ -263,46 +265,22 @@ def scan(
     >>> round(result.events["forward"].snap_off.drive_angle, 6)
     3.154275
     """
-    rod, friction, compliance = acting(rig)
-    short = {"direction": direction, "drive_step": drive_step, "drive_angles": drive_angles}
+    acts, short = acting(rig), {"direction": direction, "drive_step": drive_step, "drive_angles": drive_angles}
     drives = _rotations(base, short) if drive is None else drives_of(drive)
     if drive is not None and (given := _given(base, short)):
         raise ParameterError(
             f"{given} is for rotations without a drive: give it to the drive, as in Rotation({given}=…)"
         )
 
-    drives = _shifted(drives, rig_of(rig))
-    columns: list[dict[str, NDArray[np.generic]]] = []
+    columns: list[dict[str, NDArray[Any]]] = []
     sweeps: list[SweepEvents] = []
-    for one in drives:
-        if isinstance(one, Carried):
-            travels = _travels(one, rod)
-            paths, sense = carried_paths(contour, one, travels, rod=rod, friction=friction, compliance=compliance)
-            sweep = events_of(paths, sense, one, rod)
-            _warn_of(sweep, one, rod)
-            last = sweep.touches_again if sweep.clear else sweep.snap_off.travel
-            chosen = np.flatnonzero(~(travels > last))
-            found = [(paths, sweep, one.at(travels[chosen]), chosen)]
-        else:
-            found = []
-            every = _every_angle(one)
-            for sense in one.directions:
-                paths = sweep_paths(
-                    contour,
-                    base=one.base,
-                    direction=sense,
-                    rod=rod,
-                    friction=friction,
-                    compliance=compliance,
-                    drive_angles=np.pi - every if sense == "backward" else every,
-                )
-                sweep = events_of(paths, sense, one, rod)
-                _warn_of(sweep, one, rod)
-                angles = _angles(one, every, sweep)
-                poses = np.column_stack([*(np.full(angles.size, value) for value in one.base), angles])
-                found.append((paths, sweep, poses, np.searchsorted(every, angles)))
-        for paths, sweep, poses, chosen in found:
-            columns.append(_sweep(paths, chosen, poses, len(sweeps), sweep.direction, rod))
+    for one in _shifted(drives, rig_of(rig)):
+        for paths, sense, every in _paths_of(contour, one, *acts):
+            sweep = events_of(paths, sense, one, acts[0])
+            _warn_of(sweep, one, acts[0])
+            chosen = _before_return(every, sweep) if isinstance(one, Carried) else _within_a_turn(one, every, sweep)
+            poses = one.at(every[chosen]) if isinstance(one, Carried) else _turned(one.base, every[chosen])
+            columns.append(_columns(paths, chosen, poses, len(sweeps), sweep.direction, acts[0]))
             sweeps.append(sweep)
     if not any(len(of_sweep["drive_angle"]) for of_sweep in columns):
         snaps = ", ".join(f"{sweep.snap_off.drive_angle:.6g} rad ({sweep.direction})" for sweep in sweeps)
@@ -311,7 +289,7 @@ def scan(
             "the rod does not come free of the object: give angles before it too"
         )
     record = {name: np.concatenate([of_sweep[name] for of_sweep in columns]) for name in columns[0]}
-    return Scan(make_record(record, Rig(rod=rod)), tuple(sweeps), contour)
+    return Scan(make_record(record, Rig(rod=acts[0])), tuple(sweeps), contour)
 
 
 def acting(rig: Rig | None) -> tuple[Rod, float, float]:
@@ -352,56 +330,62 @@ def _given(base: Any, options: Mapping[str, Any]) -> str | None:
     return "base" if check_pivots("base", base) != [(0.0, 0.0)] else next(iter(given), None)
 
 
-def _every_angle(drive: Rotation) -> Floats:
-    """Drive angles of a rotation, increasing: those asked for, or all multiples of its step within a turn each way."""
+def _paths_of(
+    contour: Contour, drive: Drive, rod: Rod, friction: float, compliance: float
+) -> Iterator[tuple[Paths, Direction, Floats]]:
+    """Follow the path of each sweep of a drive, with states at its drive angles or travels, which are increasing."""
+    known: dict[str, Any] = {"rod": rod, "friction": friction, "compliance": compliance}
+    if isinstance(drive, Carried):
+        travels = drive.travels
+        if drive.drive_step is not None or not isinstance(drive, Motion) or drive.x.size <= _FEWEST_POSES:
+            travels = drive.by(drive.drive_step or _SHARE * rod.length)
+        yield *carried_paths(contour, drive, travels, **known), travels
+        return
     if drive.drive_angles is not None:
-        return np.array(drive.drive_angles)
-    step = drive.drive_step or _STEP
-    angles = np.arange(np.floor(-_TURN / step), np.ceil(_TURN / step) + 1) * step
-    return np.asarray(angles[np.abs(angles) <= _TURN])  # a drive turns by no more
-
-
-def _angles(drive: Rotation, every: Floats, sweep: SweepEvents) -> Floats:
-    """Drive angles of the samples of a rotation, in their order."""
-    forward, angles = sweep.direction == "forward", every
-    is_asked = drive.drive_angles is not None
-    if not is_asked:
+        angles = np.array(drive.drive_angles)
+    else:
         step = drive.drive_step or _STEP
-        first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
-        number = np.round(angles / step)
-        angles = angles[(number >= np.floor(first / step) - _MARGIN) & (number <= np.ceil(snap / step) + _MARGIN)]
-    sense = 1.0 if forward else -1.0
-    if not sweep.clear:
-        angles = angles[sense * (sweep.snap_off.drive_angle - angles) >= 0.0]
-    angles = _within_a_turn(angles, sense, sweep, is_asked=is_asked)
-    touching = sense * (angles - sweep.first_contact.drive_angle) >= 0.0
-    angles = angles[~(touching & (sense * (sweep.slides_from - angles) > 0.0))]
-    return angles[:: 1 if forward else -1]
+        angles = np.arange(np.floor(-_TURN / step), np.ceil(_TURN / step) + 1) * step
+        angles = angles[np.abs(angles) <= _TURN]  # a drive turns by no more
+    for sense in drive.directions:
+        paths = sweep_paths(contour, base=drive.base, direction=sense, drive_angles=angles, **known)
+        yield paths, sense, angles
 
 
-def _within_a_turn(angles: Floats, sense: float, sweep: SweepEvents, *, is_asked: bool) -> Floats:
-    """Return the angles without those at which the rod, a turn before or later, is in the same contact.
+def _before_return(travels: Floats, sweep: SweepEvents) -> Index:
+    """Indices of the travels up to where the rod is in another contact."""
+    return np.flatnonzero(~(travels > (sweep.touches_again if sweep.clear else sweep.snap_off.travel)))
 
-    It warns if the angles are those that were asked for.
-    """
+
+def _within_a_turn(drive: Rotation, every: Floats, sweep: SweepEvents) -> Index:
+    """Indices of the drive angles that are sampled, in their order: without those at which the rod, a turn before or
+    later, is in the same contact, of which it warns if they were asked for."""
     first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
+    sense, chosen = 1.0 if sweep.direction == "forward" else -1.0, np.arange(every.size)
+    if drive.drive_angles is None:
+        step = drive.drive_step or _STEP
+        low, high = math.floor(min(first, snap) / step) - _MARGIN, math.ceil(max(first, snap) / step) + _MARGIN
+        number = round(every[0] / step)
+        chosen = chosen[max(low - number, 0) : high - number + 1]
+    if not sweep.clear:
+        chosen = chosen[sense * (snap - every[chosen]) >= 0.0]
+    angles = every[chosen]
     kept = (sense * (angles - snap) > -_TURN) & (sense * (angles - first) < _TURN)
-    if is_asked and not kept.all():
+    if drive.drive_angles is not None and not kept.all():
         warnings.warn(
             f"{_name(sweep)} the rod touches the object from {first:.6g} to {snap:.6g} rad, and so it does a turn (2π) "
             f"before and later: {np.count_nonzero(~kept)} of the drive angles, up to {snap - sense * _TURN:.6g} or "
             f"from {first + sense * _TURN:.6g} rad on, are left out",
             ClearanceWarning,
-            stacklevel=4,
+            stacklevel=3,
         )
-    return np.asarray(angles[kept])
+    sticks = (sense * (angles - first) >= 0.0) & (sense * (sweep.slides_from - angles) > 0.0)
+    return np.asarray(chosen[kept & ~sticks][:: int(sense)])
 
 
-def _travels(drive: Carried, rod: Rod) -> Floats:
-    """Travels of the samples of a drive that carries the base."""
-    if drive.drive_step is None and isinstance(drive, Motion) and drive.x.size > _FEWEST_POSES:
-        return drive.travels
-    return drive.by(drive.drive_step or _SHARE * rod.length)
+def _turned(base: tuple[float, float], angles: Floats) -> Floats:
+    """Poses of a base that rests."""
+    return np.column_stack([*(np.full(angles.size, value) for value in base), angles])
 
 
 def _floats(values: ArrayLike) -> Floats:
@@ -456,24 +440,12 @@ def _place(sweep: SweepEvents) -> str:
     return f"base ({event.base_x:.6g}, {event.base_y:.6g})"
 
 
-def _sweep(
+def _columns(
     paths: Paths, chosen: Index, poses: Floats, number: int, direction: str, rod: Rod
-) -> dict[str, NDArray[np.generic]]:
+) -> dict[str, NDArray[Any]]:
     """Columns of a sweep at some of the drive angles or travels of its path, which are those of poses of the base."""
-    index = np.zeros(chosen.size, dtype=np.intp)
-    states = paths.sampled_states(np.array(0)).take(chosen)
-    columns = to_lab_frame(paths.sweep_frame, index, states, rod)
-    loaded = states.wrench.phase != NONE
-    columns["contact_phase"] = np.array(PHASE_NAMES)[states.wrench.phase]
-    sweep: dict[str, NDArray[np.generic]] = {
-        "sweep": np.full(chosen.size, number),
-        "direction": np.full(chosen.size, direction),
-        "base_x": poses[:, 0],
-        "base_y": poses[:, 1],
-        "drive_angle": poses[:, 2],
-    }
-    for name in ("holding_moment", "force_x", "force_y"):
-        sweep[name] = np.where(loaded, columns[name], 0.0)
-    for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle", "contact_phase"):
-        sweep[f"truth_{name}"] = columns[name]
-    return sweep
+    samples = sweep_samples(paths, ManyUnits.of_rod(rod), np.zeros(chosen.size, dtype=np.intp), chosen)
+    samples["contact_phase"] = np.array(PHASE_NAMES)[samples["contact_phase"]]
+    sweep = {"sweep": np.full(chosen.size, number), "direction": np.full(chosen.size, direction)}
+    sweep |= dict(zip(("base_x", "base_y", "drive_angle"), poses.T, strict=True))
+    return sweep | {name if name in CHANNELS else f"truth_{name}": values for name, values in samples.items()}

@@ -10,15 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.checks import check_array, check_choice, check_numbers
 from tactile_bayes.contours.base import Contour
-from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.sweep.columns import ManyUnits, phases_of, sweep_events, sweep_samples
-from tactile_bayes.sweep.path import friction_angle_of
+from tactile_bayes.sweep.path import frame_of, friction_angle_of, rotated_paths
 from tactile_bayes.sweep.scanning import acting
 
 __all__ = ["scan_many"]
@@ -100,29 +98,9 @@ def scan_many(
             f"drive_angles must be angles in radians, at most a turn (2π), but {largest:g} is among them: those in "
             "degrees are converted by np.radians"
         )
-    backward = np.full(count, direction == "backward")
-    sweep_frame = SweepFrame(
-        contours.broadcast_to((count,)),
-        x,
-        y,
-        rod.length,
-        0.5 * rod.diameter,
-        backward,
-        rod.arc_curvature,
-        rod.taper,
-        rod.stem / rod.length,
-    )
-    in_sweep_frame = np.pi - angles if direction == "backward" else angles
-    paths = trace(
-        sweep_frame,
-        friction_angle=friction_angle_of(friction),
-        suspension_compliance=compliance,
-        profile=rod.profile,
-        drive_angles=in_sweep_frame,
-        polished=False,
-        asks_sliding=True,
-    )
-    units = ManyUnits(rod.length_unit, rod.moment_unit, rod.force_unit)
+    sweep_frame = frame_of(contours.broadcast_to((count,)), (x, y), direction, rod)
+    paths = rotated_paths(sweep_frame, rod, friction_angle_of(friction), compliance, angles, polished=False)
+    units = ManyUnits.of_rod(rod)
     system = "dimensionless" if rod.is_dimensionless else "SI"
 
     def labelled(dims: Any, values: NDArray[Any], name: str) -> tuple[Any, NDArray[Any], dict[str, str]]:

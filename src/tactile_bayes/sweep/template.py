@@ -31,21 +31,8 @@ def record_template(drives: Sequence[Drive], drive_angles: Floats, rod: Rod | No
     The angles are of rotations without a grid of their own; drives that carry the base have as many samples.
     """
     parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}
-    sweeps: list[tuple[str, Floats]] = []
-    for drive in drives:
-        if isinstance(drive, Carried):
-            side = drive.side(1.0 if rod is None else rod.length)
-            even = np.linspace(0.0, drive.travels[-1], drive_angles.size)
-            sweeps.append((side, drive.at(even if drive.drive_step is None else drive.by(drive.drive_step))))
-        else:
-            angles = np.sort(drive_angles)
-            if drive.drive_angles is not None:
-                angles = np.array(drive.drive_angles)
-            elif drive.drive_step is not None:
-                angles = blind_angles(drive.drive_step)
-            for direction in drive.directions:
-                turned = angles if direction == "forward" else angles[::-1]
-                sweeps.append((direction, np.column_stack([*(np.full(angles.size, v) for v in drive.base), turned])))
+    length = 1.0 if rod is None else rod.length
+    sweeps = [sweep for drive in drives for sweep in _sweeps_of(drive, np.sort(drive_angles), length)]
     for sweep, (way, poses) in enumerate(sweeps):
         parts["sweep"].append(np.full(len(poses), sweep))
         parts["direction"].append(np.full(len(poses), way))
@@ -55,3 +42,16 @@ def record_template(drives: Sequence[Drive], drive_angles: Floats, rod: Rod | No
     columns["drive_angle"] = columns["drive_angle"] + load_cell.misread(columns["direction"])
     loads = {name: np.zeros(columns["sweep"].size) for name in CHANNELS}
     return make_record(columns | loads, Rig(rod=rod, load_cell=LoadCell(frame=load_cell.frame or "fixed")))
+
+
+def _sweeps_of(drive: Drive, angles: Floats, length: float) -> list[tuple[str, Floats]]:
+    """Return direction and poses of each sweep of a drive, at increasing angles if it has no grid of its own."""
+    if isinstance(drive, Carried):
+        even = np.linspace(0.0, drive.travels[-1], angles.size)
+        return [(drive.side(length), drive.at(even if drive.drive_step is None else drive.by(drive.drive_step)))]
+    if drive.drive_angles is not None:
+        angles = np.array(drive.drive_angles)
+    elif drive.drive_step is not None:
+        angles = blind_angles(drive.drive_step)
+    poses = np.column_stack([*(np.full(angles.size, value) for value in drive.base), angles])
+    return [(direction, poses[:: 1 if direction == "forward" else -1]) for direction in drive.directions]

@@ -213,7 +213,7 @@ def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
         np.testing.assert_array_equal(usable, usable_exactly)
         assert np.count_nonzero(usable) > 20
         np.testing.assert_allclose(loads[usable], exact[usable], atol=2e-4 * np.abs(exact).max())
-        senses += np.sign(likelihood.paths(Circle(*places), rig).changes[usable, 0, 5]).tolist()
+        senses += np.sign(likelihood.paths(Circle(*places), rig).events[usable, 0, -1]).tolist()
     assert set(senses) == {-1.0, 1.0}
 
 

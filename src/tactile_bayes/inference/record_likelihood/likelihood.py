@@ -22,14 +22,13 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.averaged_cell import AveragedCell
 from tactile_bayes.load_cell.blocks import Blocks
 from tactile_bayes.load_cell.discrepancy import Discrepancy
-from tactile_bayes.mechanics.branches.shapes import shapes_of
+from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps, shapes_of, solve_sweeps
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rods.profile import Profile
 from tactile_bayes.record import CHANNELS, frame_of, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
-    from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps
     from tactile_bayes.mechanics.poses.forward_table import Tables
 
 __all__ = ["RecordLikelihood", "events_of"]
@@ -223,8 +222,6 @@ class RecordLikelihood:
 
     def _solutions(self, contours: Contour, rig: RigValues, errors: Floats | None = None) -> Solutions:
         """Solve the forward model; batch index k·n + i is contour i in segment k; without errors, for no samples."""
-        from tactile_bayes.mechanics.branches.sweeps import solve_sweeps  # numba takes a second to load
-
         errors = np.empty(0) if errors is None else errors
         return solve_sweeps(
             self._shapes(contours, rig),
@@ -256,8 +253,6 @@ class RecordLikelihood:
         return shapes_of(contours, low.min(axis=0), high.max(axis=0))
 
     def _sweeps(self, rig: RigValues) -> Sweeps:
-        from tactile_bayes.mechanics.branches.sweeps import Sweeps
-
         count, segments = rig.friction.size, len(self.segments)
         bases, (curvature, taper) = self._bases(rig), self._shape_of_rod(rig)
         return Sweeps(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -14,11 +13,9 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.discrepancy import Course
 from tactile_bayes.mechanics.branches.line import LINE_COLUMNS, lines_through
+from tactile_bayes.mechanics.branches.sweeps import Segments
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, base_of_sample, carried_sweeps, present_channels, rod_of
-
-if TYPE_CHECKING:
-    from tactile_bayes.mechanics.branches.sweeps import Segments
 
 __all__ = ["RecordSegments", "Segment", "without_errors"]
 
@@ -186,8 +183,6 @@ class RecordSegments:
 
     def samples_with(self, errors: Floats) -> Segments:
         """Return the samples of every segment, once for each error of the encoder, sorted by drive angle."""
-        from tactile_bayes.mechanics.branches.sweeps import Segments
-
         key = errors.tobytes()
         if key not in self._samples_by_errors:
             samples, angles = [], []

@@ -6,9 +6,7 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.curves import ANGLE, DIP, Accuracy
 from tactile_bayes.mechanics.branches.equilibrium import (
-    SETTLED,
     Balance,
     Equilibrium,
     Scene,
@@ -16,8 +14,19 @@ from tactile_bayes.mechanics.branches.equilibrium import (
     settle_at_limit,
     tangential_psi1,
 )
-from tactile_bayes.mechanics.branches.leg import NUDGE, Leg, LegCurves, guess, leg_from, sample_leg, shortened
-from tactile_bayes.mechanics.branches.leg_events import change_of_phase, first_knot, release, share_of
+from tactile_bayes.mechanics.branches.leg import (
+    ANGLE,
+    NUDGE,
+    REST,
+    Leg,
+    LegSeries,
+    guess,
+    leg_from,
+    sample_leg,
+    share_of,
+    shortened,
+)
+from tactile_bayes.mechanics.branches.leg_events import DIP, change_of_phase, first_knot, release
 from tactile_bayes.mechanics.branches.outline import Outline
 from tactile_bayes.mechanics.branches.phase import limit
 from tactile_bayes.mechanics.branches.series import change_of, tail
@@ -59,15 +68,16 @@ _RESOLVED_LOADS = 1e-10
 class Setting(NamedTuple):
     """What is the same all along a branch."""
 
+    lines: Floats | None
+    """Lines of a drive that carries the base, in rod lengths, NaN after the last; see `line_of`."""
     knots: Floats
+    """Parameters at which the contour may not be smooth."""
     low: float
     """Least parameter of the contour."""
     seen: Outline
     """Outline relative to the base at first contact."""
-    accuracy: Accuracy
-    tolerance: Floats
     slides: bool
-    """Whether friction opposes the slip everywhere."""
+    """Whether friction opposes the slip everywhere, or else there is no path."""
     may_release: bool
     """Whether the force may vanish: for a straight rod that turns about a pivot it does not."""
 
@@ -83,9 +93,8 @@ class Here(NamedTuple):
     """An equilibrium before that, if the branch is smooth there, else NaN."""
     onward: Equilibrium
     """Direction of the branch, of any length."""
-    length: float
-    """Length of the next leg."""
     longest: float
+    """Largest length of a leg."""
 
 
 class Step(NamedTuple):
@@ -105,40 +114,39 @@ class Step(NamedTuple):
 
 
 @inlined
-def advance(here: Here, setting: Setting, in_dip: bool, work: LegCurves) -> tuple[Step, float]:
-    """Next leg, and the factor of the length of the one after it."""
-    scene, accuracy = here.scene, setting.accuracy
-    least, length, known, before, pace = LONGEST * 0.5**accuracy.halvings, here.length, 0.0, math.inf, 1.0
+def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: LegSeries) -> tuple[Step, float]:
+    """Next leg, at most as long as given, and the factor of the length of the one after it."""
+    exact = work.accuracy.exact
+    least, known, before, pace = LONGEST * 0.5**work.accuracy.halvings, 0.0, math.inf, 1.0
     for _ in range(_MOST_TRIES):
         step = _trial(here, setting, length, known, work)
-        excess = _excess(accuracy, setting.tolerance, in_dip, work) if step.is_sound else math.inf
-        pace = _pace(excess, scene.exact, work)
+        excess = _excess(in_dip, work) if step.is_sound else math.inf
+        pace = _pace(excess, work)
         # Rounding, which a shorter leg does not make smaller.
-        is_noise = 0.5 * before < excess < (_NOISE if scene.exact else 1.0)
+        is_noise = 0.5 * before < excess < (_NOISE if exact else 1.0)
         if is_noise:
             pace = max(pace, 1.0)
         if excess <= _ACCEPT or is_noise or step.length <= (least if step.is_sound else _SHORTEST):
             break
         share, before = min(pace, _BACK), excess
         if step.is_sound:
-            share = _up_to_tip(scene, accuracy, step.leg, share, work)
+            share = _up_to_tip(here.scene, step.leg, share, work)
         length, known = share * step.length, share if step.is_sound else 0.0
     return step, pace
 
 
 @inlined
-def next_length(here: Here, setting: Setting, step: Step, pace: float) -> float:
+def next_length(here: Here, step: Step, pace: float, work: LegSeries) -> float:
     """Length of the next leg."""
-    return max(min(pace * step.length, here.longest), LONGEST * 0.5**setting.accuracy.halvings)
+    return max(min(pace * step.length, here.longest), LONGEST * 0.5**work.accuracy.halvings)
 
 
 @inlined
-def _trial(here: Here, setting: Setting, length: float, known: float, work: LegCurves) -> Step:
+def _trial(here: Here, setting: Setting, length: float, known: float, work: LegSeries) -> Step:
     """Leg of at most some length, which ends at the first knot of the contour, and where the force vanishes.
 
     `known` is as in `sample_leg`."""
     scene, begin = here.scene, here.begin
-    settled = max(SETTLED, 0.1 * setting.accuracy.last_step)
     leg = leg_from(scene, begin, here.onward, length)
     if known == 0.0 and scene.beam.varied is not None:
         share = _share_in_phase(scene, leg)
@@ -147,7 +155,7 @@ def _trial(here: Here, setting: Setting, length: float, known: float, work: LegC
     is_released = share <= 1.0
     if is_released:
         leg, length, known = shortened(leg, share), share * length, share * known
-    is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, known, settled, work)
+    is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, known, work)
     knot, at_knot = math.nan, begin
     if is_sound:
         knot, node = first_knot(leg, setting.knots, setting.low, work)
@@ -157,32 +165,32 @@ def _trial(here: Here, setting: Setting, length: float, known: float, work: LegC
             is_sound, is_released = share > 0.0, False
             if is_sound:
                 leg, length = shortened(leg, share), share * length
-                is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, share, settled, work)
+                is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, share, work)
     return Step(is_sound, leg, length, end, before_end, knot, at_knot, is_released)
 
 
 @compiled
-def _excess(accuracy: Accuracy, tolerance: Floats, in_dip: bool, work: LegCurves) -> float:
-    """Estimated error of the drive angle, the loads or the states over the tolerated one."""
-    curves = work.curves
-    angle, change = tail(curves.series[ANGLE]), change_of(curves.series[ANGLE])
+def _excess(in_dip: bool, work: LegSeries) -> float:
+    """Estimated error of the travel, the loads or the states over the tolerated one."""
+    accuracy, series = work.accuracy, work.series
+    angle, change = tail(series[ANGLE]), change_of(series[ANGLE])
     if in_dip:
         return angle / (_IN_A_DIP * DIP)
     found = max(angle / max(accuracy.resolved * change, _ROUNDING), angle / accuracy.sharp)
     for c in range(3):
-        loads = curves.series[c]
-        tolerated = max(tolerance[c], _RESOLVED_LOADS * (abs(loads[0]) + change_of(loads)))
-        found = max(found, (tail(loads) + angle * change_of(loads) / change) / tolerated)
+        of_load = change_of(series[c])
+        tolerated = max(accuracy.tolerance[c], _RESOLVED_LOADS * (abs(series[c, 0]) + of_load))
+        found = max(found, (tail(series[c]) + angle * of_load / change) / tolerated)
     if not accuracy.polished:
-        for c in range(ANGLE):
-            found = max(found, tail(curves.series[c]) / (accuracy.resolved * max(change_of(curves.series[c]), 1.0)))
+        for c in range(REST + 1):
+            found = max(found, tail(series[c]) / (accuracy.resolved * max(change_of(series[c]), 1.0)))
     return found
 
 
 @compiled
-def _pace(excess: float, exact: bool, work: LegCurves) -> float:
+def _pace(excess: float, work: LegSeries) -> float:
     """Factor of the length by which the error becomes the one aimed at, which is of the order of the series."""
-    if exact and excess < _AIM:  # rounding
+    if work.accuracy.exact and excess < _AIM:  # rounding
         return _MOST_PACE
     return min(max((_AIM / excess) ** (1.0 / (2 * work.nodes.size - 1)), _LEAST_PACE), _MOST_PACE)
 
@@ -197,11 +205,11 @@ def _share_in_phase(scene: Scene, leg: Leg) -> float:
 
 
 @compiled
-def _up_to_tip(scene: Scene, accuracy: Accuracy, leg: Leg, share: float, work: LegCurves) -> float:
+def _up_to_tip(scene: Scene, leg: Leg, share: float, work: LegSeries) -> float:
     """Share of a leg to try next: up to the tip of a rod that is not smooth there, if the contact reaches it."""
     if scene.beam.varied is None or scene.phase != TANGENTIAL:
         return share
-    change = change_of_phase(scene, accuracy, work)
+    change = change_of_phase(scene, work)
     if not change < _BACK:
         return share
     change = share_of(leg, settle_at_limit(scene, guess(work, change))) + _PAST_TIP

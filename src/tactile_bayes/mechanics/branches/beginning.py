@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
@@ -10,6 +11,7 @@ from tactile_bayes.mechanics.branches.equilibrium import (
     NO_FORCE,
     SETTLED,
     Balance,
+    Equilibrium,
     Scene,
     balance,
     in_phase,
@@ -19,12 +21,11 @@ from tactile_bayes.mechanics.branches.equilibrium import (
     tangential_psi1,
     with_friction,
 )
-from tactile_bayes.mechanics.branches.leg import first_equilibrium
-from tactile_bayes.mechanics.branches.limits import Approach, approach, arrival
+from tactile_bayes.mechanics.branches.limits import Approach, approach, arrival, touch
 from tactile_bayes.mechanics.branches.line import line_of, only_turns, pose_at
-from tactile_bayes.mechanics.branches.outline import Outline, from_base
+from tactile_bayes.mechanics.branches.outline import Outline, bearing, from_base
 from tactile_bayes.mechanics.branches.phase import touching
-from tactile_bayes.mechanics.branches.slip import NOT_SLIPPING, slip
+from tactile_bayes.mechanics.branches.refusals import NOT_SLIPPING, slip
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.reachability import Reachability
@@ -35,7 +36,8 @@ _TOUCHES, _TOUCHES_TWICE = int(Reachability.TOUCHES), int(Reachability.TOUCHES_T
 _SLIPS_OFF, _STICKS = int(Reachability.SLIPS_OFF), int(Reachability.STICKS)
 
 _NOT_TURNED = 1e-3
-"""Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried."""
+"""Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried: as
+near as its first contact is found."""
 
 
 class Beginning(NamedTuple):
@@ -52,17 +54,8 @@ class Beginning(NamedTuple):
     state: Balance
 
 
-class _Arrived(NamedTuple):
-    """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
-
-    near: Approach
-    scene: Scene
-    line: int
-    seen: Outline
-
-
 @compiled
-def beginning(scene: Scene, lines: Floats | None, first_step: float, slides: bool) -> Beginning:
+def beginning(scene: Scene, lines: Floats | None, slides: bool, first_step: float) -> Beginning:
     """Beginning of a branch, on the first line that leads to contact if the drive carries the base.
 
     Friction opposes the slip there if `slides`; otherwise it acts as in a forward sweep of a straight rod.
@@ -78,12 +71,13 @@ def beginning(scene: Scene, lines: Floats | None, first_step: float, slides: boo
 
 
 @compiled
-def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> _Arrived:
+def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> tuple[Approach, Scene, int, Outline]:
+    """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
     if lines is None:
-        return _Arrived(approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline)
+        return approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline
     near, k, travel = arrival(scene.outline, scene.beam, lines)
     pose = pose_at(line_of(lines, k), travel)
-    return _Arrived(near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y))
+    return near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y)
 
 
 @compiled
@@ -116,8 +110,12 @@ def _first_state(
 
 @compiled
 def _unloaded(scene: Scene, lines: Floats | None, seen: Outline, near: Approach) -> Balance:
-    """State without force at first contact."""
-    guessed = first_equilibrium(scene, seen, near)
+    """Equilibrium without force at first contact with an outline relative to the base."""
+    at, chord = touch(seen, scene.beam, near.begin, near.tip_first)
+    q = chord.arclength
+    if near.tip_first:
+        q = bearing(at) + chord.at_point - math.atan2(at.sin, at.cos) - scene.rig.friction_angle
+    start = Equilibrium(near.begin, q, 0.0)
     if lines is None:
-        return balance(scene, guessed)[0]
-    return settle(scene, guessed, NO_FORCE, BY_FORCE, 0.0, SETTLED)
+        return balance(scene, start)[0]
+    return settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED)

@@ -7,16 +7,15 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.line import Line, Offset, line_at, line_of, pose_at
-from tactile_bayes.mechanics.branches.outline import Outline, Place, ends, from_base, narrower, over, place
+from tactile_bayes.mechanics.branches.outline import Outline, beside, ends, from_base, over
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.newton import golden
 from tactile_bayes.mechanics.poses.beam import Beam, rest_point
 
 __all__ = ["travel_into"]
 
 _PARTS, _SHRINKS = 16, 24
 """Parts of stem and rod at whose ends depths are compared, and steps of the search between them."""
-
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 _DEEP, _DEEP_IN_FAST = 1e-6, 1e-5
 """Depth [L] of a rod that has just been released, which errors of exact events and of others may cause."""
@@ -97,7 +96,7 @@ def _depth(outline: Outline, beam: Beam, pose: Offset) -> float:
             best, at = found, k * size
     low, high = max(at - size, 0.0), min(at + size, 1.0 + beam.stem)
     for _ in range(_SHRINKS):
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        left, right = golden(low, high)
         of_left, of_right = _depth_at(rod, left), _depth_at(rod, right)
         if of_left.upright > of_right.upright:
             high, found = right, of_left
@@ -113,15 +112,10 @@ def _depth_at(rod: _Unloaded, way: float) -> _Depth:
     """Depth of a point of stem or rod, at a way from the pivot."""
     along, aside = rest_point(rod.beam, way)
     x, y = along * rod.cos - aside * rod.sin, along * rod.sin + aside * rod.cos
-    arclength = max(way - rod.beam.stem, 0.0)
-    beyond = max(_end(rod, rod.low, arclength).x - x, x - _end(rod, rod.high, arclength).x)
+    outline, arclength = rod.outline, max(way - rod.beam.stem, 0.0)
+    beyond = max(beside(outline, rod.low, arclength).x - x, x - beside(outline, rod.high, arclength).x)
     if not beyond < 0.0:
         return _Depth(-beyond, -beyond)
-    at = over(rod.outline, arclength, x, rod.low, rod.high)
+    at = over(outline, arclength, x, rod.low, rod.high)
     across = (y - at.y) * at.cos - (x - at.x) * at.sin
     return _Depth(min(across / at.cos, -beyond), min(across, -beyond))
-
-
-@compiled
-def _end(rod: _Unloaded, p: float, arclength: float) -> Place:
-    return narrower(rod.outline, place(rod.outline, p), arclength)

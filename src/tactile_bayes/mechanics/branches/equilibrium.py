@@ -70,7 +70,8 @@ class Equilibrium(NamedTuple):
     force: float
 
 
-_BY_Q, BY_FORCE, NO_FORCE = Equilibrium(0.0, 1.0, 0.0), Equilibrium(0.0, 0.0, 1.0), Equilibrium(0.0, 0.0, 0.0)
+_BY_P, _BY_Q, BY_FORCE = Equilibrium(1.0, 0.0, 0.0), Equilibrium(0.0, 1.0, 0.0), Equilibrium(0.0, 0.0, 1.0)
+NO_FORCE = Equilibrium(0.0, 0.0, 0.0)
 
 
 class Rig(NamedTuple):
@@ -95,8 +96,6 @@ class Scene(NamedTuple):
     outline: Outline
     beam: Beam
     rig: Rig
-    exact: bool
-    """True if events are computed to rounding."""
     line: Line | None
     """Drive that carries the base, which is at the origin at its beginning; None for a rotation about a pivot."""
     phase: int
@@ -142,7 +141,7 @@ class _Equations(NamedTuple):
 @compiled
 def in_phase(scene: Scene, phase: int) -> Scene:
     """Scene in a phase of contact."""
-    return Scene(scene.outline, scene.beam, scene.rig, scene.exact, scene.line, phase)
+    return Scene(scene.outline, scene.beam, scene.rig, scene.line, phase)
 
 
 @compiled
@@ -156,7 +155,7 @@ def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
     """Scene with another line of the drive."""
     if lines is None:
         return scene
-    return Scene(scene.outline, scene.beam, scene.rig, scene.exact, line_of(lines, k), scene.phase)
+    return Scene(scene.outline, scene.beam, scene.rig, line_of(lines, k), scene.phase)
 
 
 @compiled
@@ -164,7 +163,7 @@ def with_friction(scene: Scene, angle: float) -> Scene:
     """Scene with friction that acts in the other sense."""
     _, compliance, offset, sign, moment_unit, force_unit = scene.rig
     rig = Rig(angle, compliance, offset, sign, moment_unit, force_unit)
-    return Scene(scene.outline, rubbed_otherwise(scene.beam), rig, scene.exact, scene.line, scene.phase)
+    return Scene(scene.outline, rubbed_otherwise(scene.beam), rig, scene.line, scene.phase)
 
 
 @compiled
@@ -309,24 +308,9 @@ def settle_at_limit(scene: Scene, start: Equilibrium) -> Balance:
 
 @compiled
 def settle_at(scene: Scene, p: float, start: Equilibrium) -> Balance:
-    """Equilibrium at a parameter of the contour, where its curvature may be infinite; NaN if none is found.
-
-    Tangent and rates need not be finite.
-    """
+    """Equilibrium at a parameter of the contour."""
     at = Equilibrium(p, start.q, start.force)
-    for _ in range(_MOST_STEPS):
-        equations = balance(scene, at)[1]
-        one, two, by_one, by_two = equations.miss_one, equations.miss_two, equations.by_one, equations.by_two
-        det = by_one.q * by_two.force - by_one.force * by_two.q
-        dq, df = (one * by_two.force - two * by_one.force) / det, (by_one.q * two - by_two.q * one) / det
-        largest = max(abs(dq) / _MOST_TURN, abs(df) / (_MOST_LOADING * (1.0 + at.force)))
-        if not largest < math.inf:
-            break
-        share = min(1.0, 1.0 / largest) if largest > 0.0 else 1.0
-        at = Equilibrium(p, at.q - share * dq, at.force - share * df)
-        if largest <= SETTLED:
-            return balance(scene, at)[0]
-    return nowhere()
+    return settle(scene, at, at, _BY_P, 0.0, SETTLED)
 
 
 @compiled

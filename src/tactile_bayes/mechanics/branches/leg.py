@@ -1,37 +1,51 @@
 """Legs: parts of a branch of equilibria that are short enough for series.
 
 A leg begins at an equilibrium and goes along the tangent there. Planes across the tangent cut the branch at the nodes
-of Chebyshev series of loads, contact and drive angle (numerical continuation by pseudo-arc length, Keller 1977).
+of Chebyshev series of loads, contact and travel (numerical continuation by pseudo-arc length, Keller 1977). A position
+on a leg ("way") is a number from 0 to 1.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.curves import ANGLE, REST, Curves, curves_of
-from tactile_bayes.mechanics.branches.equilibrium import Balance, Equilibrium, Rates, Scene, dot, less, settle, times
-from tactile_bayes.mechanics.branches.limits import Approach, touch
-from tactile_bayes.mechanics.branches.outline import Outline, place
-from tactile_bayes.mechanics.branches.series import value_and_slope, weighted
+from tactile_bayes.mechanics.branches.equilibrium import (
+    SETTLED,
+    Balance,
+    Equilibrium,
+    Rates,
+    Scene,
+    dot,
+    less,
+    settle,
+    times,
+)
+from tactile_bayes.mechanics.branches.outline import place
+from tactile_bayes.mechanics.branches.series import two_values, weighted
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.numerics import chebyshev
 
 __all__ = [
+    "ANGLE",
     "NUDGE",
     "PLACE",
+    "RATE",
+    "REST",
+    "Accuracy",
     "Leg",
-    "LegCurves",
-    "first_equilibrium",
+    "LegSeries",
     "guess",
-    "leg_curves",
     "leg_from",
+    "leg_series",
     "sample_leg",
     "settle_on",
+    "share_of",
     "shortened",
 ]
 
@@ -42,8 +56,30 @@ p, where it is monotone: the greater its weight, the fewer legs a branch has."""
 NUDGE = 1e-9
 """Distance beyond a knot of the contour, in its parameter, at which it is smooth."""
 
-PLACE = 5
-"""Row of the contour's parameter at the nodes."""
+REST, PLACE, ANGLE, RATE = 3, 4, 5, 6
+"""Rows of series after the three loads: the coordinate q of the rod, the contour's parameter, the travel (in a rotation
+the drive angle), and its derivative."""
+
+
+class Accuracy(NamedTuple):
+    """Accuracy of a path."""
+
+    tolerance: Floats
+    """Tolerated errors of moment and forces [EI/L and EI/L²], shape (3,)."""
+    resolved: float
+    """Tolerated error of an interpolant, as a share of the change of the travel on a leg."""
+    sharp: float
+    """Tolerated error of the travel of an event [rad]."""
+    halvings: int
+    """Largest number of halvings of a leg; a singularity at its end exhausts them."""
+    first_step: float
+    """Newton step, as a share of the bracket, at which the search for first contact ends."""
+    last_step: float
+    """Newton step, as a share of the bracket, at which searches on a leg end."""
+    polished: bool
+    """True if states at drive angles are solved for, and not taken from the series."""
+    exact: bool
+    """True if events are computed to rounding."""
 
 
 class Leg(NamedTuple):
@@ -55,11 +91,10 @@ class Leg(NamedTuple):
     normal: Equilibrium
 
 
-class LegCurves(NamedTuple):
+class LegSeries(NamedTuple):
     """Workspace for the series of a leg, from values and derivatives at half as many nodes."""
 
-    curves: Curves
-    """The rest of a state is the coordinate q of the rod."""
+    accuracy: Accuracy
     nodes: Floats
     """Positions from 0 to 1: legs have their ends in common."""
     onward: Floats
@@ -67,29 +102,37 @@ class LegCurves(NamedTuple):
     (nodes, 6)."""
     fit: Floats
     """Coefficients of the series of which one value or derivative is 1 and all others are 0, a row each."""
+    slopes: Floats
+    """Coefficients of the derivative of each polynomial, a row each."""
+    grid: Floats
+    """Positions at which signs are checked."""
+    on_grid: Floats
+    """Values of each polynomial there."""
     at_nodes: Floats
-    """Values of loads, q, drive angle and p at the nodes, and then their derivatives, shape (6, order)."""
-    place: Floats
-    """Coefficients of the contour's parameter p."""
-    rest_slope: Floats
-    """Coefficients of the derivative of q."""
+    """Values of the series at the nodes, and then their derivatives, shape (6, order)."""
+    series: Floats
+    """Shape (7, order)."""
+    slope: Floats
+    """Derivative of one of them, where it is wanted."""
+    sampled: Floats
+    """Values on the grid."""
 
 
-def leg_curves(order: int) -> LegCurves:
+def leg_series(accuracy: Accuracy, order: int) -> LegSeries:
     """Workspace for series of an even number of terms."""
-    nodes, onward, fit = _weights(order)
-    empty = np.zeros(order)
-    return LegCurves(curves_of(order), nodes, onward, fit, np.zeros((6, order)), empty, empty.copy())
+    grid = np.linspace(0.0, 1.0, 2 * order + 1)
+    series = np.zeros((6, order)), np.zeros((7, order)), np.zeros(order)
+    return LegSeries(accuracy, *_weights(order), grid, chebyshev.basis(order, grid), *series, np.zeros(grid.size))
 
 
 @cache
-def _weights(order: int) -> tuple[Floats, Floats, Floats]:
-    """Nodes, and the weights `onward` and `fit`, which compiled code only reads."""
+def _weights(order: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Nodes, and the weights `onward`, `fit` and `slopes`, which compiled code only reads."""
     nodes, unit = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, order // 2)), np.eye(order)
     slopes = np.vstack([chebyshev.derivative(unit), np.zeros(order)])
     at_nodes = chebyshev.polynomials(order, nodes)
     fit = np.ascontiguousarray(np.linalg.inv(np.vstack([at_nodes, at_nodes @ slopes])).T)
-    return nodes, _onward(nodes), fit
+    return nodes, _onward(nodes), fit, np.ascontiguousarray(slopes.T)
 
 
 def _onward(nodes: Floats) -> Floats:
@@ -106,28 +149,17 @@ def _onward(nodes: Floats) -> Floats:
 
 
 @compiled
-def first_equilibrium(scene: Scene, outline: Outline, found: Approach) -> Equilibrium:
-    """Equilibrium without force at first contact with an outline relative to the base."""
-    at, chord = touch(outline, scene.beam, found.begin, found.tip_first)
-    if found.tip_first:
-        bearing = math.atan2(at.y, at.x) if scene.line is None else math.atan2(-at.x, at.y) + 0.5 * math.pi
-        psi1 = bearing + chord.at_point - math.atan2(at.sin, at.cos) - scene.rig.friction_angle
-        return Equilibrium(found.begin, psi1, 0.0)
-    return Equilibrium(found.begin, chord.arclength, 0.0)
-
-
-@compiled
-def leg_from(scene: Scene, begin: Balance, before: Equilibrium, length: float) -> Leg:
-    """Leg from an equilibrium in the sense of the direction before.
+def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -> Leg:
+    """Leg from an equilibrium in the sense of a direction.
 
     Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f.
     """
-    spot, tangent = place(scene.outline, begin.at.p + math.copysign(NUDGE, before.p)), begin.tangent
+    spot, tangent = place(scene.outline, begin.at.p + math.copysign(NUDGE, onward.p)), begin.tangent
     by_p, loading = spot.speed * spot.speed + spot.bend * spot.bend, 1.0 + begin.at.force
     by_force = _BY_FORCE if scene.line is None else _BY_FORCE_ON_LINE
     across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
     size = length / math.sqrt(dot(across, tangent))
-    if dot(across, before) < 0.0:
+    if dot(across, onward) < 0.0:
         size = -size
     along = times(size, tangent)
     scale = 1.0 / (size * dot(across, tangent))
@@ -140,6 +172,12 @@ def shortened(leg: Leg, share: float) -> Leg:
     normal = leg.normal
     across = Equilibrium(normal.p / share, normal.q / share, normal.force / share)
     return Leg(leg.begin, times(share, leg.along), across)
+
+
+@compiled
+def share_of(leg: Leg, found: Balance) -> float:
+    """Position on a leg."""
+    return dot(leg.normal, less(found.at, leg.begin))
 
 
 @compiled
@@ -158,7 +196,7 @@ def _by_way(leg: Leg, found: Balance) -> Balance:
 
 
 @compiled
-def _combined(weights: Floats, found: Balance, old: Balance, older: Balance) -> Equilibrium:
+def _combined(weights: Sequence[float] | Floats, found: Balance, old: Balance, older: Balance) -> Equilibrium:
     """Extrapolation from three equilibria, the last one first, with weights of values and tangents."""
     a, b, c, d, e, f = weights[0], weights[1], weights[2], weights[3], weights[4], weights[5]
     one, two, three = found.at, old.at, older.at
@@ -173,42 +211,32 @@ def _combined(weights: Floats, found: Balance, old: Balance, older: Balance) -> 
 @compiled
 def _cubic(leg: Leg, found: Balance, before: Balance, way: float) -> Equilibrium:
     """Cubic through the beginning of a leg and an equilibrium before it, with their tangents, at a position."""
-    z, rate, old, tangent = found.at, found.tangent, before.at, before.tangent
-    h = dot(leg.normal, less(z, old))
-    scale = 1.0 / dot(leg.normal, tangent)
-    return Equilibrium(
-        _cubic_at(z.p, rate.p, old.p, scale * tangent.p, h, way),
-        _cubic_at(z.q, rate.q, old.q, scale * tangent.q, h, way),
-        _cubic_at(z.force, rate.force, old.force, scale * tangent.force, h, way),
-    )
+    h = dot(leg.normal, less(found.at, before.at))
+    t, scale = way / h, h / dot(leg.normal, before.tangent)
+    old = t * t * (3.0 + 2.0 * t)
+    weights = (1.0 - old, old, 0.0, way * (1.0 + t) * (1.0 + t), scale * t * t * (1.0 + t), 0.0)
+    return _combined(weights, found, before, before)
 
 
 @compiled
-def _cubic_at(new: float, rate: float, old: float, old_rate: float, h: float, t: float) -> float:
-    mean = (new - old) / h
-    bend, twist = (2.0 * rate + old_rate - 3.0 * mean) / h, (rate + old_rate - 2.0 * mean) / (h * h)
-    return new + t * (rate + t * (bend + t * twist))
-
-
-@compiled
-def guess(work: LegCurves, way: float) -> Equilibrium:
+def guess(work: LegSeries, way: float) -> Equilibrium:
     """Equilibrium at a position, from the series."""
-    series = work.curves.series
-    p, q = value_and_slope(work.place, series[REST], way)
-    force_x, force_y = value_and_slope(series[1], series[2], way)
+    p, q = two_values(work.series[PLACE], work.series[REST], way)
+    force_x, force_y = two_values(work.series[1], work.series[2], way)
     return Equilibrium(p, q, math.hypot(force_x, force_y))
 
 
 @compiled
 def sample_leg(
-    scene: Scene, leg: Leg, begin: Balance, before: Balance, known: float, settled: float, work: LegCurves
+    scene: Scene, leg: Leg, begin: Balance, before: Balance, known: float, work: LegSeries
 ) -> tuple[bool, Balance, Balance]:
     """Fit the series of a leg, unless the branch does not cut all planes, and return the equilibria at its last nodes.
 
     The search at a node starts from a polynomial through the nodes before it. If the series of a longer leg in the same
     direction are at hand, of which this is the share `known` > 0, it starts from these.
     """
-    series, at_nodes, half = work.curves.series, work.at_nodes, work.nodes.size
+    at_nodes, half = work.at_nodes, work.nodes.size
+    settled = max(SETTLED, 0.1 * work.accuracy.last_step)
     found = _by_way(leg, begin)
     old, older = found, found
     for k in range(half):
@@ -227,9 +255,8 @@ def sample_leg(
         at_nodes[1, k], at_nodes[1, half + k] = found.force_x, found.rates.x
         at_nodes[2, k], at_nodes[2, half + k] = found.force_y, found.rates.y
         at_nodes[REST, k], at_nodes[REST, half + k] = found.at.q, found.tangent.q
-        at_nodes[ANGLE, k], at_nodes[ANGLE, half + k] = found.travel, found.rates.travel
         at_nodes[PLACE, k], at_nodes[PLACE, half + k] = found.at.p, found.tangent.p
-    for c in range(PLACE):
-        weighted(work.fit, at_nodes[c], series[c])
-    weighted(work.fit, at_nodes[PLACE], work.place)
+        at_nodes[ANGLE, k], at_nodes[ANGLE, half + k] = found.travel, found.rates.travel
+    for c in range(RATE):
+        weighted(work.fit, at_nodes[c], work.series[c])
     return True, found, old

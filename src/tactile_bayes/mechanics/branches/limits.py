@@ -10,10 +10,21 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.line import Line, Offset, line_of, pose_at
-from tactile_bayes.mechanics.branches.outline import Outline, Place, ends, frame, from_base, mirrored, narrower, place
+from tactile_bayes.mechanics.branches.line import Line, line_of, pose_at
+from tactile_bayes.mechanics.branches.outline import (
+    Outline,
+    Place,
+    bearing,
+    beside,
+    ends,
+    frame,
+    from_base,
+    mirrored,
+    narrower,
+    place,
+)
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.newton import newton_step
+from tactile_bayes.mechanics.newton import golden, newton_step
 from tactile_bayes.mechanics.poses.beam import Beam, Chord, chord_to, mirrored_beam
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
@@ -33,20 +44,17 @@ class _Sought(IntEnum):
 
 _TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reachability.TOUCHES), int(Reachability.TOO_FAR), int(Reachability.CUTS_PIVOT)
 _ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reachability.ENDS), int(Reachability.TOO_CLOSE), int(Reachability.RUNS_OUT)
-_BEGINS_INSIDE = int(Reachability.BEGINS_INSIDE)
-_CLEARANCE = CLEARANCE
+_BEGINS_INSIDE, _CLEARANCE = int(Reachability.BEGINS_INSIDE), CLEARANCE
 
 _MOST_MOVES = 50
 """Largest number of corrections of a standoff. Each reduces the error to a share of the order of the cone's angle."""
 
-_MOST_HALVINGS, _LAST = 100, 1e-6
-"""Largest number of steps of that search, and its last step where a rod comes within reach and is past the object."""
-
-_UPRIGHT = 0.5 * math.pi
-
 _ROUNDING = 1e-14
 """Distance from the end of the rod's reach [L] that counts as zero."""
 
+_MOST_HALVINGS, _LAST = 100, 1e-6
+"""Largest number of steps of the search between two looks, and its last step where a rod comes within reach and is past
+the object."""
 
 _LOOKS, _FEWEST_LOOKS, _COARSE = 8, 2, 1e-3
 """Parts of a drive, and fewest of a line, between which a carried rod is looked at, and last step of searches there."""
@@ -59,8 +67,6 @@ _DEEPEST = 20
 
 _JUMP = 0.02
 """Angle [rad] by which a rod that comes within reach of an object is past it, and has not touched it."""
-
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 class Approach(NamedTuple):
@@ -110,8 +116,8 @@ def _missing(outline: Outline, beam: Beam, what: _Sought, p: float) -> tuple[flo
     # faces the pivot. It jumps below the pivot, where no contour is.
     at, chord = touch(outline, beam, p, False)
     along, facing = frame(at)
-    bearing, distance = math.atan2(-at.x, at.y) + 0.5 * math.pi, math.hypot(at.x, at.y)
-    angle = bearing - math.atan2(at.sin, at.cos) + chord.at_point - outline.half_angle
+    distance = math.hypot(at.x, at.y)
+    angle = bearing(at) - math.atan2(at.sin, at.cos) + chord.at_point - outline.half_angle
     return -angle, facing * at.speed / (distance * distance) + at.bend - chord.rate * along * at.speed / distance
 
 
@@ -130,21 +136,39 @@ def _root(outline: Outline, beam: Beam, what: _Sought, positive: float, negative
     return p
 
 
+class _Nearest(NamedTuple):
+    """The point of an outline that is nearest to the base of a rod, and the ends of the outline."""
+
+    low: float
+    high: float
+    p: float
+    distance: float
+    """Distance from the base [L]."""
+    missing: float
+    """Distance of the point beside which the tip lies, less the rod's reach [L]."""
+    is_above: bool
+    """Whether the base is outside of the object."""
+    beyond_low: bool
+    beyond_high: bool
+    """Whether it would be beyond the least or the greatest parameter."""
+
+
 @compiled
-def _nearest(outline: Outline, beam: Beam, low: float, high: float, last_step: float) -> tuple[float, bool, bool]:
-    """Parameter of the nearest point, and whether it lies beyond the greatest or the least parameter."""
+def _nearest(outline: Outline, beam: Beam, last_step: float) -> _Nearest:
+    low, high = ends(outline)
     beyond_high = _missing(outline, beam, _Sought.LEVER, high)[0] <= 0.0
     beyond_low = _missing(outline, beam, _Sought.LEVER, low)[0] >= 0.0
-    if beyond_high:
-        return high, beyond_high, beyond_low
-    if beyond_low:
-        return low, beyond_high, beyond_low
-    return _root(outline, beam, _Sought.LEVER, high, low, last_step), beyond_high, beyond_low
+    p = high if beyond_high else low
+    if not (beyond_high or beyond_low):
+        p = _root(outline, beam, _Sought.LEVER, high, low, last_step)
+    at, tip = place(outline, p), beside(outline, p, 1.0)
+    missing = math.hypot(tip.x, tip.y) - (beam.reach - _ROUNDING)
+    return _Nearest(low, high, p, math.hypot(at.x, at.y), missing, frame(at)[1] > 0.0, beyond_low, beyond_high)
 
 
 @compiled
 def _is_out(outline: Outline, beam: Beam, p: float) -> bool:
-    at = narrower(outline, place(outline, p), 1.0)
+    at = beside(outline, p, 1.0)
     return math.hypot(at.x, at.y) > beam.reach
 
 
@@ -160,34 +184,27 @@ def _first(outline: Outline, beam: Beam, high: float, nearest: float, last_step:
 @compiled
 def approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
     """First contact of a rod; roots are found to a share of their brackets."""
-    low, high = ends(outline)
-    nearest, beyond_high, beyond_low = _nearest(outline, beam, low, high, last_step)
-    at = place(outline, nearest)
-    distance, below = math.hypot(at.x, at.y), frame(at)[1] > 0.0
-    at_tip = narrower(outline, at, 1.0)
-    begin, tip_first = _first(outline, beam, high, nearest, last_step)
-    at_high = narrower(outline, place(outline, high), 1.0)
-    open_end = frame(at_high)[1] > 0.0 and math.hypot(at_high.x, at_high.y) <= beam.reach
+    nearest = _nearest(outline, beam, last_step)
+    begin, tip_first = _first(outline, beam, nearest.high, nearest.p, last_step)
+    open_end = frame(beside(outline, nearest.high, 1.0))[1] > 0.0 and not _is_out(outline, beam, nearest.high)
     reach = _TOUCHES
-    if not below:
-        reach = _RUNS_OUT if beyond_low and not beyond_high else _CUTS_PIVOT
-    elif distance < beam.stem + _CLEARANCE:
+    if not nearest.is_above:
+        reach = _RUNS_OUT if nearest.beyond_low and not nearest.beyond_high else _CUTS_PIVOT
+    elif nearest.distance < beam.stem + _CLEARANCE:
         reach = _TOO_CLOSE
-    elif math.hypot(at_tip.x, at_tip.y) >= beam.reach - _ROUNDING:
+    elif nearest.missing >= 0.0:
         reach = _TOO_FAR
-    elif beyond_high or open_end:
+    elif nearest.beyond_high or open_end:
         reach = _ENDS
-    return Approach(reach, distance, begin, tip_first, low)
+    return Approach(reach, nearest.distance, begin, tip_first, nearest.low)
 
 
 @compiled
 def clear_angle(outline: Outline, beam: Beam, last_step: float) -> float:
     """Drive angle beyond which an unloaded rod has passed the contour: first contact of the opposite sweep [rad]."""
     opposite, of_opposite = mirrored(outline), mirrored_beam(beam)
-    low, high = ends(opposite)
-    nearest = _nearest(opposite, of_opposite, low, high, last_step)[0]
-    begin, tip_first = _first(opposite, of_opposite, high, nearest, last_step)
-    at, chord = touch(opposite, of_opposite, begin, tip_first)
+    near = approach(opposite, of_opposite, last_step)
+    at, chord = touch(opposite, of_opposite, near.begin, near.tip_first)
     return math.pi - (math.atan2(at.y, at.x) - chord.at_base)
 
 
@@ -206,36 +223,28 @@ class _Turned(NamedTuple):
 
 
 @compiled
-def _turned(outline: Outline, beam: Beam, pose: Offset, last_step: float) -> _Turned:
-    """First contact of a rod if it turned from a pose of its base."""
-    seen = from_base(outline, pose.x, pose.y)
-    low, high = ends(seen)
-    nearest, beyond_high, beyond_low = _nearest(seen, beam, low, high, last_step)
-    at = place(seen, nearest)
-    at_tip, distance = narrower(seen, at, 1.0), math.hypot(at.x, at.y)
-    missing = math.hypot(at_tip.x, at_tip.y) - (beam.reach - _ROUNDING)
-    if frame(at)[1] <= 0.0:
-        cuts = not (beyond_high or beyond_low)
-        return _Turned(_CUTS_PIVOT if cuts else _TOO_FAR, 1.0 + max(missing, 0.0), nearest, True, distance)
-    if distance < beam.stem + _CLEARANCE:
-        return _Turned(_TOO_CLOSE, 0.0, nearest, True, distance)
-    if missing >= 0.0:
-        return _Turned(_TOO_FAR, 1.0 + missing, nearest, True, distance)
-    begin, tip_first, reach = high, False, _TOUCHES
-    if not beyond_high and _missing(seen, beam, _Sought.TURNED, high)[0] > 0.0:
-        begin, tip_first = _first(seen, beam, high, nearest, last_step)
-    elif _is_out(seen, beam, high):
-        begin, tip_first = _root(seen, beam, _Sought.WITHIN, nearest, high, last_step), True
-    else:
-        reach = _ENDS
-    there, chord = touch(seen, beam, begin, tip_first)
-    bearing = math.atan2(-there.x, there.y) + _UPRIGHT
-    return _Turned(reach, bearing - chord.at_base - pose.angle, begin, tip_first, distance)
-
-
-@compiled
 def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> _Turned:
-    return _turned(outline, beam, pose_at(line, travel), _COARSE)
+    """First contact of a rod if it turned from the pose of its base at a travel."""
+    pose = pose_at(line, travel)
+    seen = from_base(outline, pose.x, pose.y)
+    nearest = _nearest(seen, beam, _COARSE)
+    high, begin, tip_first, reach = nearest.high, nearest.p, True, _TOUCHES
+    if not nearest.is_above:
+        reach = _TOO_FAR if nearest.beyond_high or nearest.beyond_low else _CUTS_PIVOT
+    elif nearest.distance < beam.stem + _CLEARANCE:
+        return _Turned(_TOO_CLOSE, 0.0, begin, tip_first, nearest.distance)
+    elif nearest.missing >= 0.0:
+        reach = _TOO_FAR
+    if reach != _TOUCHES:
+        return _Turned(reach, 1.0 + max(nearest.missing, 0.0), begin, tip_first, nearest.distance)
+    if not nearest.beyond_high and _missing(seen, beam, _Sought.TURNED, high)[0] > 0.0:
+        begin, tip_first = _first(seen, beam, high, nearest.p, _COARSE)
+    elif _is_out(seen, beam, high):
+        begin = _root(seen, beam, _Sought.WITHIN, nearest.p, high, _COARSE)
+    else:
+        begin, tip_first, reach = high, False, _ENDS
+    there, chord = touch(seen, beam, begin, tip_first)
+    return _Turned(reach, bearing(there) - chord.at_base - pose.angle, begin, tip_first, nearest.distance)
 
 
 @compiled
@@ -278,7 +287,7 @@ def _grazing(outline: Outline, beam: Beam, line: Line, low: float, high: float) 
     """First contact about the least gap between two travels, and its travel; NaN if there is none."""
     looked = _look(outline, beam, line, high)
     for _ in range(_DEEPEST):
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        left, right = golden(low, high)
         at_left, at_right = _look(outline, beam, line, left), _look(outline, beam, line, right)
         if min(at_left.gap, at_right.gap) <= 0.0:
             inside, looked = (left, at_left) if at_left.gap <= 0.0 else (right, at_right)

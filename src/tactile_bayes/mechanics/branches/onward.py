@@ -6,7 +6,6 @@ import math
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.advance import LONGEST, Here, Setting, Step
-from tactile_bayes.mechanics.branches.curves import LOST, regained
 from tactile_bayes.mechanics.branches.equilibrium import (
     SETTLED,
     Balance,
@@ -21,7 +20,8 @@ from tactile_bayes.mechanics.branches.equilibrium import (
     tangential_psi1,
     times,
 )
-from tactile_bayes.mechanics.branches.leg import NUDGE, LegCurves, guess, leg_from, sample_leg, settle_on, shortened
+from tactile_bayes.mechanics.branches.leg import NUDGE, LegSeries, guess, leg_from, sample_leg, settle_on, shortened
+from tactile_bayes.mechanics.branches.leg_events import LOST, regained
 from tactile_bayes.mechanics.branches.line import Line
 from tactile_bayes.mechanics.branches.meeting import KNOT, LINE, PHASE, Growth, Leaving
 from tactile_bayes.mechanics.branches.phase import following, limit
@@ -36,45 +36,42 @@ _ROOM_PAST_LINE = 1.1
 @inlined
 def stopped(here: Here) -> Here:
     """End of a branch."""
-    scene, line, _, before, onward, length, longest = here
-    return Here(scene, line, nowhere(), before, onward, length, longest)
+    return Here(here.scene, here.line, nowhere(), here.before, here.onward, here.longest)
 
 
 @inlined
 def regained_at(
-    here: Here, setting: Setting, step: Step, leaving: Leaving, growth: Growth, most: float, work: LegCurves
+    here: Here, step: Step, leaving: Leaving, growth: Growth, most: float, work: LegSeries
 ) -> tuple[float, Balance]:
     """Position on a leg at which the travel exceeds its maximum again, as `regained`, and the equilibrium there."""
     scene, behind = here.scene, growth.stop
     if step.end.at.force < 0.0:
         return LOST, here.begin
     if leaving.share < 1.0:
-        part = shortened(step.leg, leaving.share)
-        settled = max(SETTLED, 0.1 * setting.accuracy.last_step)
-        sample_leg(scene, part, here.begin, nowhere(), leaving.share, settled, work)
+        sample_leg(scene, shortened(step.leg, leaving.share), here.begin, nowhere(), leaving.share, work)
         behind = min(behind / leaving.share, 1.0)
-    found = regained(behind, most, work.curves)
+    found = regained(behind, most, work)
     if not 0.0 <= found <= 1.0:
         return found, here.begin
     return found, settle_on(scene, step.leg, leaving.share * found, guess(work, found), SETTLED)
 
 
 @inlined
-def continued(here: Here, lines: Floats | None, setting: Setting, step: Step, leaving: Leaving) -> Here:
+def continued(here: Here, setting: Setting, step: Step, leaving: Leaving) -> Here:
     """Beginning of the next leg; NaN where the drive or the contour ends."""
+    scene, line, before, onward = here.scene, here.line, nowhere(), step.end.tangent
     if leaving.kind == LINE:
-        return _on_next_line(here, lines, step, leaving)
-    scene = here.scene
+        return _on_next_line(here, setting.lines, step, leaving)
     if leaving.kind == PHASE:
         scene = in_phase(scene, following(scene.phase))
         q, sense = limit(scene.phase, tangential_psi1(scene))
         begin = balance(scene, Equilibrium(leaving.at.at.p, q, leaving.at.at.force))[0]
-        return Here(scene, here.line, begin, nowhere(), Equilibrium(0.0, -sense, 0.0), here.length, here.longest)
-    onward = step.end.tangent
-    if leaving.kind == KNOT:
+        onward = Equilibrium(0.0, -sense, 0.0)
+    elif leaving.kind == KNOT:
         begin = nowhere() if step.knot == setting.low else _past(scene, step.at_knot, onward.p)
-        return Here(scene, here.line, begin, nowhere(), onward, here.length, here.longest)
-    return Here(scene, here.line, step.end, step.before_end, onward, here.length, here.longest)
+    else:
+        begin, before = step.end, step.before_end
+    return Here(scene, line, begin, before, onward, here.longest)
 
 
 @inlined
@@ -87,7 +84,7 @@ def _on_next_line(here: Here, lines: Floats | None, step: Step, leaving: Leaving
     begin = settle(scene, leaving.at.at, leaving.at.at, step.leg.normal, 0.0, SETTLED)
     onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
     longest = _length_on_line(scene.line, scene, begin, onward) if goes_on(lines, line) else LONGEST
-    return Here(scene, line, begin, nowhere(), onward, here.length, longest)
+    return Here(scene, line, begin, nowhere(), onward, longest)
 
 
 @compiled

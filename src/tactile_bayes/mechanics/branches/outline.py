@@ -22,6 +22,8 @@ __all__ = [
     "Half",
     "Outline",
     "Place",
+    "bearing",
+    "beside",
     "ends",
     "frame",
     "from_base",
@@ -153,6 +155,12 @@ def narrower(outline: Outline, at: Place, arclength: float) -> Place:
 
 
 @compiled
+def beside(outline: Outline, p: float, arclength: float) -> Place:
+    """Point beside which the rod lies with an arc length, at a parameter."""
+    return narrower(outline, place(outline, p), arclength)
+
+
+@compiled
 def on_object(outline: Outline, at: Place) -> tuple[float, float]:
     """Point of the object itself, from that of the base."""
     return at.x - outline.standoff * at.sin, at.y + outline.standoff * at.cos
@@ -224,10 +232,16 @@ def frame(at: Place) -> tuple[float, float]:
 
 
 @compiled
+def bearing(at: Place) -> float:
+    """Direction from the pivot to a point, continuous where it is above the pivot or beside it [rad]."""
+    return math.atan2(-at.x, at.y) + _UPRIGHT
+
+
+@compiled
 def is_inside(outline: Outline, arclength: float, x: float, y: float, low: float, high: float) -> bool:
     """True if the rod at an arc length is within the object as far as it is known: between contour and chord of two of
     its points."""
-    left, right = _beside(outline, low, arclength), _beside(outline, high, arclength)
+    left, right = beside(outline, low, arclength), beside(outline, high, arclength)
     if not (left.x < x < right.x and (y - left.y) * (right.x - left.x) < (x - left.x) * (right.y - left.y)):
         return False
     at = over(outline, arclength, x, low, high)
@@ -240,17 +254,12 @@ def over(outline: Outline, arclength: float, x: float, low: float, high: float) 
     p, before = 0.5 * (low + high), high - low
     settled = _SETTLED * before
     for _ in range(_MOST_STEPS):
-        at = _beside(outline, p, arclength)
+        at = beside(outline, p, arclength)
         new, low, high, before = newton_step(p, x - at.x, -at.speed * at.cos, low, high, before)
         step, p = abs(new - p), new
         if not step > settled:
             break
-    return _beside(outline, p, arclength)
-
-
-@compiled
-def _beside(outline: Outline, p: float, arclength: float) -> Place:
-    return narrower(outline, place(outline, p), arclength)
+    return beside(outline, p, arclength)
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Loads and states at the drive angles of the samples on a stretch of a path."""
+"""Loads and states at the drive angles of the samples of a path, from the legs that have been followed."""
 
 from __future__ import annotations
 
@@ -8,293 +8,310 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.mechanics.branches.curves import ANGLE, REST, WAY, Accuracy, Course, lay_over_angle, left_of
 from tactile_bayes.mechanics.branches.equilibrium import (
     SETTLED,
     Balance,
     Equilibrium,
     Scene,
     balance,
+    in_phase,
+    on_line,
     tangential_psi1,
 )
-from tactile_bayes.mechanics.branches.leg import Leg, LegCurves, guess, settle_on
+from tactile_bayes.mechanics.branches.leg import ANGLE, PLACE, RATE, REST, Leg, LegSeries, guess, settle_on
 from tactile_bayes.mechanics.branches.line import drive_angle_at
 from tactile_bayes.mechanics.branches.outline import on_object, place
 from tactile_bayes.mechanics.branches.phase import on_rod
-from tactile_bayes.mechanics.branches.series import at_all, crossing, value, value_and_slope, weighted
+from tactile_bayes.mechanics.branches.series import at_all, copy_rows, crossing, two_values, value
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.newton import newton_step
+from tactile_bayes.mechanics.poses.beam import bending
 
 __all__ = [
     "STATE",
     "STATE_COLUMNS",
-    "Asked",
+    "Course",
     "Followed",
     "Found",
+    "Legs",
     "Samples",
-    "asked",
-    "find_samples",
-    "polish_states",
+    "largest_curvature",
+    "legs_for",
+    "recall",
+    "store",
     "write_event",
-    "write_loads",
-    "write_states",
+    "write_samples",
 ]
 
 STATE_COLUMNS = (
     *("phase", "parameter", "x", "y", "slope_angle", "drive_angle"),
-    *("holding_moment", "force_x", "force_y", "arclength", "tip_angle", "travel"),
+    *("holding_moment", "force_x", "force_y", "arclength", "tip_angle", "travel", "friction_angle"),
 )
 STATE = np.dtype([(name, np.float64) for name in STATE_COLUMNS])
-"""A state in the sweep frame; the drive angle is that of the unloaded rod, without the turn of the suspension."""
-
-_SETTLED = 1e-14
-"""Share of a stretch by which an exact state may miss its drive angle; the interpolant corrects for it."""
+"""A state in the sweep frame; the drive angle is that of the unloaded rod, without the turn of the suspension, and the
+friction angle has the sign of the sense in which friction acts."""
 
 _NEAR, _MOST_STEPS = 1e-5, 6
-"""Newton step, as a share of the stretch, after which the search ends, and the largest number of steps."""
-
-_MOST_HALVINGS = 100
-"""Largest number of steps to an exact state: more than halvings of a stretch to rounding."""
+"""Newton step, as a share of the leg, after which the search in series ends, and the largest number of steps."""
 
 _PAST = 1e-6
-"""Share of a stretch by which a step may pass the end."""
+"""Share of a leg by which a step may pass the end."""
+
+_SETTLED, _ROUNDING = 1e-8, 1e-15
+"""Newton step to an exact state, over the distance from the end of its leg, after which a first-order correction leaves
+rounding errors only: its square; and the rounding of a travel."""
+
+_MOST_HALVINGS = 100
+"""Largest number of steps to an exact state: more than halvings of a leg to rounding."""
+
+
+_PIECES = 16
+"""Pieces of a leg between which curvatures are compared: the largest is found to some 1e-5 of itself."""
 
 
 class Samples(NamedTuple):
     """Samples of one path."""
 
     angles: Floats
-    """Drive angles as read, in the sweep frame, increasing [rad]."""
+    """Travels, or drive angles as read, in the sweep frame, increasing."""
     rows: Index
     """Rows of their loads and states."""
     relative: bool
-    """True if angles are shares of the drive angle from first contact to snap-off."""
+    """True if angles are shares of the travel from first contact to snap-off."""
 
 
 class Found(NamedTuple):
-    """Results for the samples and stretches of a path."""
+    """Results of a path."""
 
     loads: Floats
     """Loads with the sign of the sweep and the rod's rigidity, initially zero, shape (rows, 3)."""
     states: Any
-    """States, initially zero, structured as `STATE`, shape (rows,)."""
-    changes: Floats
-    """Beginnings of phases, then the end of the last: coordinates p, q and f of the equilibrium, 1 for tip contact, the
-    number of the line of the drive, and the friction angle with the sign of its sense, shape (phases + 1, 6); no rows
-    if no states are computed."""
+    """States of samples, initially zero, structured as `STATE`, shape (rows,)."""
     events: Any
-    """States there, initially zero, structured as `STATE`, shape (phases + 1,)."""
+    """States where phases begin, and at the end of the last, structured as `STATE`, shape (phases + 1,); none if no
+    states are computed."""
+    event: Any
+    """Events of the path, one record; see `Solutions`."""
 
 
-class Asked(NamedTuple):
-    """Workspace for the samples of a path and of one stretch."""
+class Course(NamedTuple):
+    """Course of the travel along a leg."""
 
+    stop: float
+    """Position at which the leg, or the path, ends."""
+    begin: float
+    """Travel at the beginning."""
+    end: float
+    steadiness: float
+    """Rate at the end over the mean rate: 0 where the drive turns back, 1 if the rate is constant."""
+
+
+class Legs(NamedTuple):
+    """Legs that have been followed, one in each row, and room for the samples on one of them."""
+
+    phase: Index
+    line: Index
+    """Number of the line of the drive."""
+    leg: Floats
+    """As in `Leg`, and the equilibrium where its growing part ends, shape (legs, 4, 3)."""
+    course: Floats
+    """As in `Course`, shape (legs, 4)."""
+    series: Floats
+    """As in `LegSeries`, shape (legs, 7, order)."""
     angles: Floats
     """Drive angles of all samples, if shares were given."""
     wanted: Floats
-    """Drive angles of the samples on the stretch."""
+    """Travels of the samples on a leg."""
     twice: Floats
-    """Stretched drive angles z, or positions z, as 4z − 2."""
+    """Their positions z, as 4 z − 2."""
     now: Floats
     before: Floats
     found: Floats
-    """Values of up to four series, shape (4, samples)."""
+    """Values of up to five series, shape (5, samples)."""
 
 
 class Followed(NamedTuple):
-    """A leg that has been followed, with its series."""
+    """A leg that has been followed, with its series in the workspace."""
 
     scene: Scene
     leg: Leg
-    accuracy: Accuracy
+    end: Equilibrium
     course: Course
-    work: LegCurves
-    workspace: Asked
+    work: LegSeries
+    room: Legs
 
 
-def asked(samples: int) -> Asked:
-    """Workspace for at most so many samples."""
+def legs_for(legs: int, order: int, samples: int) -> Legs:
+    """Room for at most so many legs, with series of so many terms, and samples."""
+    phase, line = np.empty((2, legs), dtype=np.intp)
+    leg, course, series = np.empty((legs, 4, 3)), np.empty((legs, 4)), np.empty((legs, RATE + 1, order))
     angles, wanted, twice, now, before = np.empty((5, samples))
-    return Asked(angles, wanted, twice, now, before, np.empty((4, samples)))
+    return Legs(phase, line, leg, course, series, angles, wanted, twice, now, before, np.empty((ANGLE, samples)))
 
 
 @compiled
-def find_samples(samples: Samples, part: Followed) -> Samples:
-    """Samples on a stretch; their drive angles are written to the workspace."""
-    course, workspace, offset = part.course, part.workspace, part.scene.rig.offset
-    first, last = _before(samples.angles, course.begin + offset), _before(samples.angles, course.end + offset)
-    while last < samples.angles.size and samples.angles[last] - offset <= course.end:
-        last += 1
-    for j in range(last - first):
-        workspace.wanted[j] = samples.angles[first + j] - offset
-        workspace.twice[j] = 2.0 - 4.0 * left_of(workspace.wanted[j], course)
-    return Samples(samples.angles[first:last], samples.rows[first:last], samples.relative)
+def store(
+    k: int, scene: Scene, line: int, leg: Leg, end: Equilibrium, course: Course, work: LegSeries, legs: Legs
+) -> None:
+    """Keep a leg as number k."""
+    legs.phase[k], legs.line[k], rows = scene.phase, line, legs.leg[k]
+    for c in range(3):
+        rows[0, c], rows[1, c], rows[2, c], rows[3, c] = leg.begin[c], leg.along[c], leg.normal[c], end[c]
+    for c in range(4):
+        legs.course[k, c] = course[c]
+    copy_rows(work.series, legs.series[k])
 
 
 @compiled
-def _before(angles: Floats, angle: float) -> int:
-    """Number of increasing angles that are less than a given one."""
-    low, high = 0, angles.size
-    while low < high:
-        middle = (low + high) // 2
-        if angles[middle] < angle:
-            low = middle + 1
-        else:
-            high = middle
-    return low
+def recall(k: int, scene: Scene, lines: Floats | None, work: LegSeries, legs: Legs) -> Followed:
+    """Leg number k, with its series in the workspace."""
+    copy_rows(legs.series[k], work.series)
+    rows, course = legs.leg[k], legs.course[k]
+    leg = Leg(_equilibrium(rows[0]), _equilibrium(rows[1]), _equilibrium(rows[2]))
+    there = on_line(in_phase(scene, legs.phase[k]), lines, legs.line[k])
+    return Followed(there, leg, _equilibrium(rows[3]), Course(course[0], course[1], course[2], course[3]), work, legs)
 
 
 @compiled
-def _look_for(part: Followed, count: int) -> None:
-    """Convert the stretched drive angles of samples to positions z on the stretch, as 4z − 2.
-
-    Newton's method starts between the nodes of the series, for all samples together; samples for which it does not
-    converge are solved one by one."""
-    course, curves, workspace = part.course, part.work.curves, part.workspace
-    wanted, twice, found, stop = workspace.wanted, workspace.twice, workspace.found, course.stop
-    nodes, angles, angle, rate = curves.on.nodes, curves.values[ANGLE], curves.series[ANGLE], curves.series[ANGLE + 1]
-    k, before, after, way_before, way_after = 0, -2.0, -2.0, 0.0, 0.0
-    for j in range(count):
-        while twice[j] > after and after < 2.0:
-            before, way_before = after, way_after
-            beyond = k == nodes.size or nodes[k] >= stop or angles[k] >= course.end
-            after = 2.0 if beyond else 2.0 - 4.0 * left_of(angles[k], course)
-            way_after = stop if beyond else nodes[k]
-            k += 1
-        share = (twice[j] - before) / (after - before) if after > before else 1.0
-        twice[j] = 4.0 * (way_before + share * (way_after - way_before)) - 2.0
-    for _ in range(_MOST_STEPS):
-        at_all(curves.series[ANGLE:], twice, count, workspace.now, workspace.before, found)
-        largest = 0.0
-        for j in range(count):
-            way = 0.25 * (twice[j] + 2.0)
-            most = 0.5 * (stop - way) + _PAST * stop
-            step = (found[0, j] - wanted[j]) / found[1, j] if found[1, j] > 0.0 else 0.0
-            found[2, j] = min(max(step, -most), most)
-            twice[j] = 4.0 * min(max(way - found[2, j], 0.0), stop) - 2.0
-            largest = max(largest, abs(found[2, j]))
-        if largest <= _NEAR * stop:
-            return
-    for j in range(count):
-        if abs(found[2, j]) > _NEAR * stop:
-            way = 0.25 * (twice[j] + 2.0)
-            way = crossing(angle, rate, wanted[j], stop, 0.0, way, part.accuracy.last_step)
-            twice[j] = 4.0 * way - 2.0
+def _equilibrium(row: Floats) -> Equilibrium:
+    return Equilibrium(row[0], row[1], row[2])
 
 
 @compiled
-def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
-    """Write the loads of the samples on a stretch, from the series."""
-    count, workspace = samples.rows.size, part.workspace
-    _look_for(part, count)
-    at_all(part.work.curves.series[:REST], workspace.twice, count, workspace.now, workspace.before, workspace.found)
-    for j in range(count):
-        moment, force_x, force_y = workspace.found[0, j], workspace.found[1, j], workspace.found[2, j]
-        _write_loads(part.scene, moment, force_x, force_y, out[samples.rows[j]])
+def largest_curvature(scene: Scene, stop: float, work: LegSeries) -> float:
+    """Largest change of the rod's curvature from its rest curvature up to a position on a leg [1/L]: of values at even
+    distances, and where a parabola through three of them about the largest has its vertex."""
+    size, curvature, best = stop / _PIECES, work.sampled, 0
+    for k in range(_PIECES + 1):
+        curvature[k] = _bent(scene, k * size, work.series)
+        best = k if curvature[k] > curvature[best] else best
+    middle = min(max(best, 1), _PIECES - 1)
+    rise, fall = curvature[middle] - curvature[middle - 1], curvature[middle] - curvature[middle + 1]
+    off = 0.5 * (rise - fall) / (rise + fall)
+    return max(curvature[best], _bent(scene, (middle + off) * size, work.series) if abs(off) < 1.0 else 0.0)
 
 
 @compiled
-def _write_loads(scene: Scene, moment: float, force_x: float, force_y: float, out: Floats) -> None:
-    """Write loads with the sign of the sweep and the rod's rigidity."""
-    rig = scene.rig
-    out[0], out[1] = rig.sign * rig.moment_unit * moment, rig.sign * rig.force_unit * force_x
-    out[2] = rig.force_unit * force_y
+def _bent(scene: Scene, way: float, series: Floats) -> float:
+    """Largest change of curvature between pivot and contact at a position [1/L]."""
+    moment, force_x = two_values(series[0], series[1], way)
+    force_y, rest = two_values(series[2], series[REST], way)
+    slope = drive_angle_at(scene.line, value(series[ANGLE], way)) - scene.rig.compliance * moment
+    return bending(scene.beam, slope, moment, force_x, force_y, on_rod(scene.phase, rest, 0.0)[1])
+
+
+@compiled
+def write_event(scene: Scene, at: Equilibrium, out: Any) -> None:
+    """Write the state at an event of a path."""
+    found = balance(scene, at)[0]
+    moment, force_x, force_y = found.holding_moment, found.force_x, found.force_y
+    _write_state(scene, at.p, at.q, found.travel, moment, force_x, force_y, out)
 
 
 @compiled
 def _write_state(
     scene: Scene, p: float, q: float, travel: float, moment: float, force_x: float, force_y: float, out: Any
 ) -> None:
-    """Write a state."""
     at = place(scene.outline, p)
     psi1, arclength = on_rod(scene.phase, q, tangential_psi1(scene))
     out.phase, out.parameter, out.travel, out.arclength = scene.phase, p, travel, arclength
     out.x, out.y = on_object(scene.outline, at)
-    out.slope_angle = math.atan2(at.sin, at.cos)
+    out.slope_angle, out.friction_angle = math.atan2(at.sin, at.cos), scene.rig.friction_angle
     out.tip_angle = out.slope_angle + (scene.rig.friction_angle + psi1)
     out.drive_angle = drive_angle_at(scene.line, travel) - scene.rig.compliance * moment
     out.holding_moment, out.force_x, out.force_y = moment, force_x, force_y
 
 
 @compiled
-def write_event(scene: Scene, line: int, at: Equilibrium, tip: bool, k: int, out: Found) -> None:
-    """Write an event of a path: its coordinates, and its state."""
-    row, state = out.changes[k], balance(scene, at)[0]
-    row[0], row[1], row[2], row[3], row[4], row[5] = at.p, at.q, at.force, tip, line, scene.rig.friction_angle
-    moment, force_x, force_y = state.holding_moment, state.force_x, state.force_y
-    _write_state(scene, at.p, at.q, state.travel, moment, force_x, force_y, out.events[k])
-
-
-@compiled
-def write_states(samples: Samples, part: Followed, out: Found) -> None:
-    """Write the states of the samples on a leg, from the series."""
-    course, work, workspace = part.course, part.work, part.workspace
-    series, count = work.curves.series, samples.rows.size
+def write_samples(samples: Samples, part: Followed, wants_states: bool, out: Found) -> None:
+    """Write the loads of the samples on a leg, and their states if these are wanted: exact ones, or from the series."""
+    scene, work, room, rig = part.scene, part.work, part.room, part.scene.rig
+    samples, found = _on_leg(samples, part), room.found
+    count = samples.rows.size
     # Just before the end of contact the last drive angle matters.
-    off = value(series[ANGLE], course.stop) - course.end
+    off = value(work.series[ANGLE], part.course.stop) - part.course.end if wants_states else 0.0
+    _look_for(part, count, off)
+    at_all(work.series[: ANGLE if wants_states else REST], room.twice, count, room.now, room.before, found)
     for j in range(count):
-        workspace.wanted[j] += off
-    _look_for(part, count)
-    at_all(series[:ANGLE], workspace.twice, count, workspace.now, workspace.before, workspace.found)
-    for j in range(count):
-        row, found = samples.rows[j], workspace.found
-        p, travel = value(work.place, 0.25 * (workspace.twice[j] + 2.0)), workspace.wanted[j] - off
-        moment, force_x, force_y = found[0, j], found[1, j], found[2, j]
-        _write_state(part.scene, p, found[REST, j], travel, moment, force_x, force_y, out.states[row])
-        _write_loads(part.scene, moment, force_x, force_y, out.loads[row])
+        row, moment, force_x, force_y = samples.rows[j], found[0, j], found[1, j], found[2, j]
+        if wants_states:
+            travel, at = room.wanted[j], Equilibrium(found[PLACE, j], found[REST, j], math.hypot(force_x, force_y))
+            if work.accuracy.polished:
+                state = _polished(part, travel, 0.25 * (room.twice[j] + 2.0), at)
+                if not math.isfinite(state.travel):
+                    continue
+                at, moment, force_x, force_y = state.at, state.holding_moment, state.force_x, state.force_y
+            _write_state(scene, at.p, at.q, travel, moment, force_x, force_y, out.states[row])
+        loads = out.loads[row]
+        loads[0], loads[1] = rig.sign * rig.moment_unit * moment, rig.sign * rig.force_unit * force_x
+        loads[2] = rig.force_unit * force_y
 
 
 @compiled
-def polish_states(samples: Samples, part: Followed, out: Found) -> None:
-    """Write exact states at the drive angles of the samples on a leg."""
-    scene, course, curves = part.scene, part.course, part.work.curves
-    over_angle = curves.over_angle
-    lay_over_angle(part.accuracy, course, curves)
-    weighted(curves.on.slopes, over_angle[WAY], curves.bend)
-    for j in range(samples.rows.size):
-        row, target = samples.rows[j], 0.25 * (part.workspace.twice[j] + 2.0)
-        state = _polished(part, target)
-        if not math.isfinite(state.travel):
-            continue
-        # The digits of a position are limited: the interpolant corrects for the remaining distance to the angle.
-        reached, loads = 1.0 - left_of(state.travel, course), part.workspace.found[:, 0]
-        for c in range(3):
-            loads[c] = value(over_angle[c], target) - value(over_angle[c], reached)
-        moment, force_x = state.holding_moment + loads[0], state.force_x + loads[1]
-        force_y = state.force_y + loads[2]
-        out_state = out.states[row]
-        _write_state(scene, state.at.p, state.at.q, state.travel, moment, force_x, force_y, out_state)
-        out_state.drive_angle = drive_angle_at(scene.line, state.travel) - scene.rig.compliance * state.holding_moment
-        _write_loads(scene, moment, force_x, force_y, out.loads[row])
+def _on_leg(samples: Samples, part: Followed) -> Samples:
+    """Samples on a leg. Their travels are written to the room, and positions at which these are reached if the rate of
+    the travel is linear in the position."""
+    course, room, offset, angles = part.course, part.room, part.scene.rig.offset, samples.angles
+    first = np.searchsorted(angles, course.begin + offset)
+    last = max(np.searchsorted(angles, course.end + offset), first)
+    while last < angles.size and angles[last] - offset <= course.end:
+        last += 1
+    for j in range(last - first):
+        room.wanted[j] = angles[first + j] - offset
+        # With the way z on the leg that is left, left = z (steadiness + (1 − steadiness) z).
+        left = min(max((course.end - room.wanted[j]) / (course.end - course.begin), 0.0), 1.0)
+        root = math.sqrt(course.steadiness * course.steadiness + 4.0 * (1.0 - course.steadiness) * left)
+        way_left = 2.0 * left / (course.steadiness + root) if left > 0.0 else 0.0
+        room.twice[j] = 4.0 * course.stop * (1.0 - way_left) - 2.0
+    return Samples(angles[first:last], samples.rows[first:last], samples.relative)
 
 
 @compiled
-def _polished(part: Followed, target: float) -> Balance:
-    """State at a stretched drive angle, by Newton's method in it."""
-    course, curves = part.course, part.work.curves
-    stop, steadiness = course.stop, course.steadiness
-    way, pace = value_and_slope(curves.over_angle[WAY], curves.bend, target)
-    way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle falls again
-    low, high, before = 0.0, stop, stop
-    state = settle_on(part.scene, part.leg, way, guess(part.work, way), SETTLED)
+def _look_for(part: Followed, count: int, off: float) -> None:
+    """Find the positions at which the series reach the travels of samples and some more, as 4 z − 2.
+
+    Newton's method for all samples together; those for which it does not converge are solved one by one."""
+    work, room, stop = part.work, part.room, part.course.stop
+    wanted, twice, found = room.wanted, room.twice, room.found
+    for _ in range(_MOST_STEPS):
+        at_all(work.series[ANGLE:], twice, count, room.now, room.before, found)
+        largest = 0.0
+        for j in range(count):
+            way = 0.25 * (twice[j] + 2.0)
+            most = 0.5 * (stop - way) + _PAST * stop
+            step = (found[0, j] - (wanted[j] + off)) / found[1, j] if found[1, j] > 0.0 else 0.0
+            found[2, j] = min(max(step, -most), most)
+            twice[j] = 4.0 * min(max(way - found[2, j], 0.0), stop) - 2.0
+            largest = max(largest, abs(found[2, j]))
+        if largest <= _NEAR * stop:
+            return
+    travel, rate, last_step = work.series[ANGLE], work.series[RATE], work.accuracy.last_step
+    for j in range(count):
+        if abs(found[2, j]) > _NEAR * stop:
+            way = crossing(travel, rate, wanted[j] + off, stop, 0.0, 0.25 * (twice[j] + 2.0), last_step)
+            twice[j] = 4.0 * way - 2.0
+
+
+@compiled
+def _polished(part: Followed, wanted: float, way: float, start: Equilibrium) -> Balance:
+    """Exact state at a travel, by Newton's method from a position on the leg and the equilibrium about there."""
+    course, last, step = part.course, math.inf, math.nan
+    low, high, before = 0.0, course.stop, course.stop
+    state = settle_on(part.scene, part.leg, way, start, SETTLED)
     for _ in range(_MOST_HALVINGS):
         # Rounding may undo the very first contact.
-        turned = 1.0 - left_of(state.travel, course) if math.isfinite(state.travel) else 0.0
-        missing = target - turned
-        if abs(missing) <= _SETTLED or not high > low:
+        missing = wanted - (state.travel if math.isfinite(state.travel) else course.begin)
+        rate, room = state.rates.travel, course.stop - way
+        step = missing / rate if rate > 0.0 else math.nan
+        if abs(step) <= _SETTLED * room or abs(missing) <= _ROUNDING or 0.5 * last < abs(missing) < _SETTLED:
             break
-        if missing > 0.0:
-            low = way
-        else:
-            high = way
-        rate = state.rates.travel
-        newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (course.end - course.begin) / rate
-        # Much nearer to the end than the target the rate may be zero or rounding: take the interpolant's rate.
-        new = way + missing * (newton if newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target) else pace)
-        if not (low < new < high and abs(new - way) <= 0.5 * before):
-            new = 0.5 * (low + high)
-        before = abs(new - way)
-        if new == way or not before > 0.0:
+        new, low, high, before = newton_step(way, missing, -rate, low, high, before)
+        if new == way:
             break
-        way = new
+        way, last = new, abs(missing)
         state = settle_on(part.scene, part.leg, way, guess(part.work, way), SETTLED)
-    return state
+    at, travel, moment, force_x, force_y, tangent, rates = state
+    step = min(max(step, -0.5 * room), 0.5 * room) if math.isfinite(step) else 0.0
+    at = Equilibrium(at.p + step * tangent.p, at.q + step * tangent.q, at.force + step * tangent.force)
+    moment, force_x, force_y = moment + step * rates.moment, force_x + step * rates.x, force_y + step * rates.y
+    return Balance(at, travel, moment, force_x, force_y, tangent, rates)

@@ -1,55 +1,12 @@
-"""Chebyshev series on [0, 1]: their values, roots, and coefficients from values at nodes."""
+"""Chebyshev series on [0, 1], which compiled code evaluates, and the point at which one falls through a value."""
 
 from __future__ import annotations
-
-import functools
-from typing import NamedTuple
-
-import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
-from tactile_bayes.numerics import chebyshev
 
-__all__ = [
-    "Nodes",
-    "at_all",
-    "change_of",
-    "copy_rows",
-    "crossing",
-    "nodes_of",
-    "tail",
-    "value",
-    "value_and_slope",
-    "weighted",
-]
-
-
-class Nodes(NamedTuple):
-    """Matrices of the interpolation with a given number of nodes."""
-
-    nodes: Floats
-    fit: Floats
-    """Coefficients of the interpolant that is 1 at one node and 0 at the others, a row each."""
-    slopes: Floats
-    """Coefficients of the derivative of each polynomial."""
-    grid: Floats
-    """Points at which the sign of a derivative is checked."""
-    on_grid: Floats
-    """Values of each polynomial there."""
-
-
-@functools.cache
-def nodes_of(order: int) -> Nodes:
-    unit, grid = np.eye(order), np.linspace(0.0, 1.0, 2 * order + 1)
-    return Nodes(
-        chebyshev.nodes(order),
-        np.ascontiguousarray(chebyshev.coefficients(unit).T),
-        np.ascontiguousarray(np.vstack([chebyshev.derivative(unit), np.zeros(order)]).T),
-        grid,
-        chebyshev.basis(order, grid),
-    )
+__all__ = ["at_all", "change_of", "copy_rows", "crossing", "tail", "two_values", "value", "weighted"]
 
 
 @compiled
@@ -73,7 +30,7 @@ def value(coefficients: Floats, z: float) -> float:
 
 
 @compiled
-def value_and_slope(one: Floats, other: Floats, z: float) -> tuple[float, float]:
+def two_values(one: Floats, other: Floats, z: float) -> tuple[float, float]:
     """Values of two series at once, which takes no longer than one."""
     twice = 4.0 * z - 2.0
     a, a_before, b, b_before = 0.0, 0.0, 0.0, 0.0
@@ -130,7 +87,7 @@ def crossing(
     before = abs(right - left)
     settled = last_step * before
     for _ in range(100):
-        at_z, rate = value_and_slope(function, slope, z)
+        at_z, rate = two_values(function, slope, z)
         missing = at_z - wanted
         new, left, right, before = newton_step(z, missing, rate, left, right, before)
         step = abs(new - z)
@@ -142,7 +99,7 @@ def crossing(
 
 @compiled
 def copy_rows(rows: Floats, out: Floats) -> None:
-    """Copy the common part of two arrays."""
-    for c in range(min(rows.shape[0], out.shape[0])):
-        for k in range(min(rows.shape[1], out.shape[1])):
+    """Copy one array of two axes to another."""
+    for c in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
             out[c, k] = rows[c, k]

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.contours.cells import in_cells
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.branches.branch import (
     MOST_CHANGES,
     BranchWorkspace,
-    Ends,
     branch_workspace,
     follow_branch,
+    refuse,
 )
 from tactile_bayes.mechanics.branches.clearance import travel_into
-from tactile_bayes.mechanics.branches.curves import Accuracy
 from tactile_bayes.mechanics.branches.equilibrium import Rig, Scene
+from tactile_bayes.mechanics.branches.leg import Accuracy
 from tactile_bayes.mechanics.branches.limits import clear_angle
 from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_of
 from tactile_bayes.mechanics.branches.outline import Half, Outline, mirrored
@@ -32,7 +33,10 @@ from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.rods.profile import Profile
 from tactile_bayes.tasks import in_parts
 
-__all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_sweeps"]
+if TYPE_CHECKING:
+    from tactile_bayes.contours.base import Contour
+
+__all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "shapes_of", "solve_sweeps"]
 
 _SAME_ANGLE = 1e-5
 """Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
@@ -41,19 +45,26 @@ _TOUCHES, _STICKS = int(Reachability.TOUCHES), int(Reachability.STICKS)
 _BEGINS_INSIDE = int(Reachability.BEGINS_INSIDE)
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
-_EXACT = Accuracy(resolved=1e-9, sharp=np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True)
+_EXACT = Accuracy(
+    np.full(3, np.inf),
+    resolved=1e-9,
+    sharp=np.inf,
+    halvings=12,
+    first_step=4e-16,
+    last_step=4e-16,
+    polished=True,
+    exact=True,
+)
 """Accuracy with states and events to rounding."""
 
 _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
 """Accuracy with events to rounding and states from series."""
 
-_FAST = Accuracy(resolved=1e-3, sharp=1e-6, halvings=12, first_step=1e-6, last_step=1e-4, polished=True)
-"""Accuracy that noise requires."""
+_FAST = _EXACT._replace(resolved=1e-3, sharp=1e-6, first_step=1e-6, last_step=1e-4, exact=False)
+"""Accuracy that noise requires, beside its tolerance."""
 
 _EXACT_ORDER, _FAST_ORDER = 32, 12
-"""Numbers of nodes on a stretch."""
-
-_NEVER_MISSED = np.full(3, np.inf)
+"""Numbers of terms of the series of a leg."""
 
 _FEWEST = 16
 """Fewest sweeps that another thread shares."""
@@ -70,6 +81,23 @@ class Shapes(NamedTuple):
     """Tables, shape (n, rows, columns), without rows if there are formulas."""
     knots: Floats
     """Parameters at which contours may not be smooth, increasing, shape (n, knots)."""
+
+
+def shapes_of(contours: Contour, low: Floats | None = None, high: Floats | None = None) -> Shapes:
+    """Contours with parameters of shape (n,), by their formula, or by tables from parameter `low` to `high`."""
+    halves = contours.halves
+    if halves is None:
+        assert low is not None
+        assert high is not None
+        halves = in_cells(contours, low, high)
+    count = contours.shape[0] if contours.shape else halves.x.size
+    columns, knots = np.empty((count, 6)), np.empty((count, len(contours.knots)))
+    for k, column in enumerate((*halves.left[1:], *halves.right[1:], halves.x, halves.y)):
+        columns[:, k] = column
+    for k, knot in enumerate(contours.knots):
+        knots[:, k] = knot
+    tables = np.empty((count, 0, 0)) if halves.tables is None else np.ascontiguousarray(halves.tables)
+    return Shapes((halves.left.kind, halves.right.kind), columns, tables, np.sort(knots, axis=1))
 
 
 class Sweeps(NamedTuple):
@@ -123,18 +151,18 @@ class Solutions(NamedTuple):
     """Loads in the laboratory frame [EI/L, EI/L² for a rigidity of 1], 0 out of contact, shape (contours, rows, 3)."""
     states: Floats
     """States with the columns of `STATE`, shape (contours, rows or 0, columns)."""
-    changes: Floats
-    """Events as in `Found`, shape (sweeps, phases + 1 or 0, 6)."""
     event_states: Floats
-    """States there, shape (sweeps, phases + 1 or 0, columns)."""
+    """States where phases begin, and at the end of the last, shape (sweeps, phases + 1 or 0, columns)."""
     phases: Index
     """Number of phases."""
     reach: NDArray[np.int8]
     distance: Floats
+    """Least distance of contour and pivot [L]."""
     first_angle: Floats
     first_parameter: Floats
     snap_angle: Floats
     snap_parameter: Floats
+    """Parameter at the end of the path, or at a second contact and the like if there is one."""
     snap_off: NDArray[np.int8]
     curvature: Floats
     """Largest curvature of the rod up to snap-off [1/L], if states are computed."""
@@ -160,7 +188,7 @@ def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
     return np.dtype([(name, kinds.get(name, np.float64)) for name in names], align=True)
 
 
-_SWEEP, _EVENTS = _side_by_side(Sweeps._fields), _side_by_side(Solutions._fields[4:])
+_SWEEP, _EVENTS = _side_by_side(Sweeps._fields), _side_by_side(Solutions._fields[3:])
 
 
 @compiled
@@ -203,7 +231,6 @@ def _scene(
     known: Tables,
     sweep: Any,
     line: Line | None,
-    exact: bool,
     table: Floats,
 ) -> Scene:
     """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
@@ -213,7 +240,7 @@ def _scene(
     rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, moment, moment / sweep.relative_length)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
-    return Scene(outline, beam, rig, exact, line, TIP)
+    return Scene(outline, beam, rig, line, TIP)
 
 
 @compiled
@@ -253,18 +280,18 @@ def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line |
 
 
 @compiled
-def _clear_angle(scene: Scene, lines: Floats | None, ends: Ends, first_step: float) -> float:
+def _clear_angle(scene: Scene, lines: Floats | None, event: Any, accuracy: Accuracy) -> float:
     """Travel beyond which the unloaded rod is clear; on lines, that from snap-off on at which it is not.
 
     A rod that is released touches there without load, which small errors alone would decide: −∞ if it does so nowhere
     else.
     """
     if lines is None:
-        clear = clear_angle(scene.outline, scene.beam, first_step)
-        return -math.inf if ends.snap_off == _RELEASE and clear < ends.snap_angle + _SAME_ANGLE else clear
-    if ends.snap_off == _NEVER:
+        clear = clear_angle(scene.outline, scene.beam, accuracy.first_step)
+        return -math.inf if event.snap_off == _RELEASE and clear < event.snap_angle + _SAME_ANGLE else clear
+    if event.snap_off == _NEVER:
         return -math.inf
-    return travel_into(scene.outline, scene.beam, lines, ends.snap_angle, scene.exact)
+    return travel_into(scene.outline, scene.beam, lines, event.snap_angle, accuracy.exact)
 
 
 @compiled
@@ -278,26 +305,21 @@ def _is_inside_before(scene: Scene, lines: Floats | None, first: float) -> bool:
 
 @compiled
 def _follow(
-    scene: Scene,
-    room: Floats | None,
-    knots: Floats,
-    samples: Samples,
-    accuracy: Accuracy,
-    tolerance: Floats,
-    workspace: BranchWorkspace,
-    found: Found,
-    asks_sliding: bool,
-) -> Ends:
+    scene: Scene, room: Floats | None, samples: Samples, asks_sliding: bool, workspace: BranchWorkspace, found: Found
+) -> None:
     """Follow a branch along which friction opposes the slip; in rotations it acts as if it did unless that is asked.
 
     Where such a branch is refused for another reason, that is the reason.
     """
     yes, no = bool(1), bool(0)  # numba would compile all once for True and again for False
-    ends = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, yes)
-    if ends.reach == _STICKS and room is None:
-        assumed = follow_branch(scene, room, knots, samples, accuracy, tolerance, workspace, found, no)
-        return ends if asks_sliding and assumed.reach == _TOUCHES else assumed
-    return ends
+    follow_branch(scene, room, samples, yes, workspace, found)
+    if found.event.reach == _STICKS and room is None:
+        where = found.event.snap_parameter
+        if asks_sliding:
+            samples = Samples(samples.angles[:0], samples.rows[:0], samples.relative)
+        follow_branch(scene, room, samples, no, workspace, found)
+        if asks_sliding and found.event.reach == _TOUCHES:
+            refuse(_STICKS, where, found.event)
 
 
 @cached
@@ -310,55 +332,35 @@ def _solve(
     lines: Floats | None,
     room: Floats | None,
     line: Line | None,
-    exact: bool,
-    accuracy: Accuracy,
-    tolerance: Floats,
     asks_clearance: bool,
     asks_sliding: bool,
     workspace: BranchWorkspace,
     table: Floats,
     loads: Floats,
     all_states: Any,
-    changes: Floats,
     event_states: Any,
     events: Any,
 ) -> None:
     """Follow the path of every sweep, and write the results of its samples.
 
-    Parameters
-    ----------
-    sweeps : structured ndarray, shape (sweeps,)
-        Fields as in `Sweeps`.
-    exact : bool
-        Whether states are computed to rounding, even where there are tables.
-    tolerance : ndarray, shape (3,)
-        Tolerated errors of moment and forces [EI/L and EI/L²].
-    workspace : BranchWorkspace
-        Workspace for one path.
-    table : ndarray, shape (rows, columns)
-        Workspace for the table of one contour.
-    loads, all_states, changes, event_states, events
-        As in `Solutions`; states and events are structured arrays.
+    Sweeps are a structured array with fields as in `Sweeps`; loads and the last three are as in `Solutions`, but
+    structured. Room is for the lines of one sweep, and `table` for that of one contour.
     """
-    count, knots = shapes.knots.shape[1], workspace.knots
+    count, knots, accuracy = shapes.knots.shape[1], workspace.knots, workspace.leg.accuracy
     for i in range(sweeps.size):
         sweep, event, c = sweeps[i], events[i], sweeps[i].contour
         _place_lines(lines, sweep, room)
-        scene = _scene(shapes, varied, known, sweep, line, exact, table)
+        scene = _scene(shapes, varied, known, sweep, line, table)
         for k in range(count):
             knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
         samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
-        found = Found(loads[c], all_states[c], changes[i], event_states[i])
-        ends = _follow(scene, room, knots, samples, accuracy, tolerance, workspace, found, asks_sliding)
-        event.reach, event.distance = ends.reach, ends.distance
-        event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
-        event.snap_angle, event.snap_parameter = ends.snap_angle, ends.snap_parameter
-        event.snap_off, event.phases, event.curvature = ends.snap_off, ends.phases, ends.curvature
+        found = Found(loads[c], all_states[c], event_states[i], event)
+        _follow(scene, room, samples, asks_sliding, workspace, found)
         event.clear_angle = math.nan
-        if asks_clearance and ends.reach == _TOUCHES:
-            event.clear_angle = _clear_angle(scene, room, ends, accuracy.first_step)
-            if exact and _is_inside_before(scene, room, ends.first_angle):
+        if asks_clearance and event.reach == _TOUCHES:
+            event.clear_angle = _clear_angle(scene, room, event, accuracy)
+            if accuracy.exact and _is_inside_before(scene, room, event.first_angle):
                 event.reach = _BEGINS_INSIDE
 
 
@@ -404,14 +406,14 @@ def solve_sweeps(
         Whether there is a path only where friction opposes the slip all along it. It always does so where the base is
         carried; in rotations it otherwise acts as on a straight rod, which is wrong where a curved one slides outward.
     """
-    accuracy, order = _FAST, _FAST_ORDER
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
+    else:
+        accuracy, order = _FAST._replace(tolerance=tolerance), _FAST_ORDER
     count, rows = shape
     sweep = _as_sweeps(sweeps)
-    loads = np.zeros((count, rows, 3))
-    all_states, most = np.zeros((count, rows if states else 0), dtype=STATE), MOST_CHANGES + 1 if states else 0
-    changes, event_states = np.full((sweep.size, most, 6), np.nan), np.zeros((sweep.size, most), dtype=STATE)
+    loads, all_states = np.zeros((count, rows, 3)), np.zeros((count, rows if states else 0), dtype=STATE)
+    event_states = np.zeros((sweep.size, MOST_CHANGES + 1 if states else 0), dtype=STATE)
     events = np.empty(sweep.size, dtype=_EVENTS)
     longest = int(np.diff(segments.first).max(initial=0))
     lines = 0 if segments.lines is None else segments.lines.shape[1]
@@ -424,22 +426,17 @@ def solve_sweeps(
             sweep[part],
             segments,
             *_carried(segments.lines),
-            tolerance is None,
-            accuracy,
-            _NEVER_MISSED if tolerance is None else tolerance,
             asks_clearance,
             asks_sliding,
-            branch_workspace(longest, order, shapes.knots.shape[1], lines),
+            branch_workspace(accuracy, order, longest, shapes.knots.shape[1], lines),
             np.empty(shapes.tables.shape[1:]),
             loads,
             all_states,
-            changes[part],
             event_states[part],
             events[part],
         )
 
     in_parts(solve, sweep.size, _FEWEST)
     columns = [one.view(np.float64).reshape(*one.shape, len(STATE_COLUMNS)) for one in (all_states, event_states)]
-    return Solutions(
-        loads, columns[0], changes, columns[1], *(np.ascontiguousarray(events[name]) for name in _EVENTS.names or ())
-    )
+    by_name = {name: np.ascontiguousarray(events[name]) for name in _EVENTS.names or ()}
+    return Solutions(loads, columns[0], columns[1], **by_name)
