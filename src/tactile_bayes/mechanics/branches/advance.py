@@ -16,17 +16,20 @@ from tactile_bayes.mechanics.branches.equilibrium import (
 )
 from tactile_bayes.mechanics.branches.leg import (
     ANGLE,
+    DIP,
     NUDGE,
     REST,
     Leg,
     LegSeries,
+    change_of_phase,
+    first_knot,
     guess,
     leg_from,
+    release,
     sample_leg,
     share_of,
     shortened,
 )
-from tactile_bayes.mechanics.branches.leg_events import DIP, change_of_phase, first_knot, release
 from tactile_bayes.mechanics.branches.outline import Outline
 from tactile_bayes.mechanics.branches.phase import limit
 from tactile_bayes.mechanics.branches.series import change_of, tail

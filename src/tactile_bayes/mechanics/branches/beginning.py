@@ -91,7 +91,7 @@ def _first_state(
     scene = in_phase(scene, touching(near.tip_first))
     begin = _unloaded(scene, lines, seen, near)
     if scene.phase == TANGENTIAL and lines is not None and begin.at.q > 1.0:  # the approach is not exact
-        near = Approach(near.reach, near.distance, near.begin, True, near.low)
+        near = Approach(near.reach, near.distance, near.begin, True, near.low, near.gap)
         scene = in_phase(scene, TIP)
         begin = _unloaded(scene, lines, seen, near)
     delta = scene.rig.friction_angle

@@ -2,7 +2,7 @@
 
 The branch is followed in legs (`leg`), which are shortened until the tails of their series are small enough
 (`advance`). A leg ends where the phase changes or the contour is not smooth (`meet`), and the branch goes on from there
-(`onward`). The first maximum of the drive angle is the snap-off: a fold (its derivative vanishes), a corner, or
+(`go_on`). The first maximum of the drive angle is the snap-off: a fold (its derivative vanishes), a corner, or
 the point where the line of force passes through the pivot. A maximum after which the drive angle falls by less than
 `DIP` before it exceeds the maximum again does not count: the branch continues where it does so. This happens where a
 radius of curvature vanishes.
@@ -23,10 +23,13 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.advance import FIRST_LENGTH, LONGEST, Here, Setting, Step, advance, next_length
 from tactile_bayes.mechanics.branches.beginning import Beginning, beginning
 from tactile_bayes.mechanics.branches.equilibrium import Equilibrium, Scene, nowhere
-from tactile_bayes.mechanics.branches.leg import RATE, Accuracy, LegSeries, leg_series
-from tactile_bayes.mechanics.branches.leg_events import LOST
-from tactile_bayes.mechanics.branches.meeting import KNOT, LINE, OPEN, Growth, Leaving, fate_of, meet
-from tactile_bayes.mechanics.branches.onward import continued, goes_on, regained_at, stopped
+from tactile_bayes.mechanics.branches.leg import (
+    RATE,
+    Accuracy,
+    LegSeries,
+    leg_series,
+)
+from tactile_bayes.mechanics.branches.meeting import OPEN, Growth, Leaving, fate_of, go_on, meet
 from tactile_bayes.mechanics.branches.readings import (
     Course,
     Found,
@@ -57,8 +60,7 @@ _MOST, _MOST_ON_LINE = 256, 2
 _LEAST_TRAVEL = 1e-12
 """Travel of a path that rounding may leave of none."""
 
-_TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_OUT), int(Reachability.GRAZES)
-_SLIPS_OFF = int(Reachability.SLIPS_OFF)
+_TOUCHES, _GRAZES, _SLIPS_OFF = int(Reachability.TOUCHES), int(Reachability.GRAZES), int(Reachability.SLIPS_OFF)
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
 _ACROSS = 0.5 * math.pi
@@ -105,7 +107,7 @@ def follow_branch(
             followed = _grow(followed, here, setting, step, leaving, growth, samples, work, legs, found)
         if event.reach != _TOUCHES or event.snap_off == _RELEASE:
             break
-        here = _go_on(here, setting, step, leaving, growth, event, work)
+        here = go_on(here, setting, step, leaving, growth, event, work)
         if not math.isfinite(here.begin.at.p):
             break
         length = next_length(here, step, pace, work)
@@ -165,25 +167,6 @@ def _grow(
     store(followed, scene, here.line, step.leg, at.at, Course(stop, begin, at.travel, steadiness), work, legs)
     event.snap_angle, event.snap_parameter = at.travel, at.at.p
     return followed + 1
-
-
-@inlined
-def _go_on(
-    here: Here, setting: Setting, step: Step, leaving: Leaving, growth: Growth, event: Any, work: LegSeries
-) -> Here:
-    """Where the branch goes on; NaN where it or the drive ends, which is written."""
-    if event.snap_off > _NEVER:
-        position, begin = regained_at(here, step, leaving, growth, event.snap_angle, work)
-        if position == LOST:
-            return stopped(here)
-        if position <= 1.0:
-            event.snap_off = OPEN
-            return Here(here.scene, here.line, begin, nowhere(), begin.tangent, here.longest)
-    elif leaving.kind == KNOT and step.knot == setting.low:
-        event.reach, event.snap_parameter = _RUNS_OUT, math.nan
-    elif leaving.kind == LINE and not goes_on(setting.lines, here.line):
-        event.snap_off = _NEVER
-    return continued(here, setting, step, leaving)
 
 
 @inlined

@@ -176,7 +176,7 @@ def balance(scene: Scene, at: Equilibrium) -> tuple[Balance, _Equations]:
     sin, cos = spot.sin * cos_delta + spot.cos * sin_delta, spot.cos * cos_delta - spot.sin * sin_delta
     rod = beam_pose(scene.beam, psi1, length, force, scene.phase == TIP)
     angle = math.atan2(sin, cos) + psi1 + rod[0].turn
-    equations = _equations(scene, scene.line, spot, _Force(force, sin, cos), rod, angle)
+    equations = _equations(scene, scene.line, spot, force, sin, cos, rod, angle)
     tangent, moment = _cross(equations.by_one, equations.by_two), equations.moment
     turned = force * spot.bend * tangent.p
     rates = Rates(
@@ -188,21 +188,20 @@ def balance(scene: Scene, at: Equilibrium) -> tuple[Balance, _Equations]:
     return Balance(at, equations.travel, moment, -force * sin, force * cos, tangent, rates), equations
 
 
-class _Force(NamedTuple):
-    """Contact force; its direction (sin β, −cos β)."""
-
-    size: float
-    sin: float
-    cos: float
-
-
 @compiled
 def _equations(
-    scene: Scene, line: Line | None, spot: Place, contact: _Force, rod: tuple[Pose, Pose, Pose], angle: float
+    scene: Scene,
+    line: Line | None,
+    spot: Place,
+    force: float,
+    sin: float,
+    cos: float,
+    rod: tuple[Pose, Pose, Pose],
+    angle: float,
 ) -> _Equations:
-    """Equations for a drive, with a base at an angle before the turn of the suspension."""
+    """Equations for a contact force in the direction (sin, −cos), and a base at an angle before the turn of the
+    suspension."""
     here, by_q, by_force = rod
-    force, sin, cos = contact
     compliance, by_psi1 = scene.rig.compliance, turning(scene.phase)
     closer = sliding(scene.phase) * scene.outline.narrowing
     sin_delta, cos_delta = spot.cos * sin - spot.sin * cos, spot.cos * cos + spot.sin * sin

@@ -75,13 +75,15 @@ class Approach(NamedTuple):
     reach: int
     """A `Reachability`."""
     distance: float
-    """Least distance of contour and pivot [L]."""
+    """Least distance of contour and base [L]."""
     begin: float
     """First contact."""
     tip_first: bool
     """True if the tip touches first, and not a point before it."""
     low: float
     """Least parameter of the contour."""
+    gap: float
+    """Angle by which the rod would turn until it touches [rad]; out of reach, one and the distance that is missing."""
 
 
 @compiled
@@ -196,7 +198,7 @@ def approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
         reach = _TOO_FAR
     elif nearest.beyond_high or open_end:
         reach = _ENDS
-    return Approach(reach, nearest.distance, begin, tip_first, nearest.low)
+    return Approach(reach, nearest.distance, begin, tip_first, nearest.low, math.nan)
 
 
 @compiled
@@ -208,47 +210,34 @@ def clear_angle(outline: Outline, beam: Beam, last_step: float) -> float:
     return math.pi - (math.atan2(at.y, at.x) - chord.at_base)
 
 
-class _Turned(NamedTuple):
-    """First contact of a rod if it turned about its base where it is."""
-
-    reach: int
-    """Among `_TOUCHES`, `_TOO_FAR`, `_ENDS` if it is the end of what is known, `_CUTS_PIVOT` and `_TOO_CLOSE`."""
-    gap: float
-    """Angle by which it would turn until it touches [rad]; out of reach, one and the distance that is missing."""
-    begin: float
-    """Parameter of the contour there."""
-    tip_first: bool
-    distance: float
-    """Least distance of contour and base [L]."""
-
-
 @compiled
-def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> _Turned:
-    """First contact of a rod if it turned from the pose of its base at a travel."""
+def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> Approach:
+    """First contact of a rod if it turned from the pose of its base at a travel; `_ENDS` if that is the end of what is
+    known."""
     pose = pose_at(line, travel)
     seen = from_base(outline, pose.x, pose.y)
     nearest = _nearest(seen, beam, _COARSE)
-    high, begin, tip_first, reach = nearest.high, nearest.p, True, _TOUCHES
+    high, begin, tip_first, reach, gap = nearest.high, nearest.p, True, _TOUCHES, 1.0 + max(nearest.missing, 0.0)
     if not nearest.is_above:
         reach = _TOO_FAR if nearest.beyond_high or nearest.beyond_low else _CUTS_PIVOT
     elif nearest.distance < beam.stem + _CLEARANCE:
-        return _Turned(_TOO_CLOSE, 0.0, begin, tip_first, nearest.distance)
+        reach, gap = _TOO_CLOSE, 0.0
     elif nearest.missing >= 0.0:
         reach = _TOO_FAR
-    if reach != _TOUCHES:
-        return _Turned(reach, 1.0 + max(nearest.missing, 0.0), begin, tip_first, nearest.distance)
-    if not nearest.beyond_high and _missing(seen, beam, _Sought.TURNED, high)[0] > 0.0:
-        begin, tip_first = _first(seen, beam, high, nearest.p, _COARSE)
-    elif _is_out(seen, beam, high):
-        begin = _root(seen, beam, _Sought.WITHIN, nearest.p, high, _COARSE)
     else:
-        begin, tip_first, reach = high, False, _ENDS
-    there, chord = touch(seen, beam, begin, tip_first)
-    return _Turned(reach, bearing(there) - chord.at_base - pose.angle, begin, tip_first, nearest.distance)
+        if not nearest.beyond_high and _missing(seen, beam, _Sought.TURNED, high)[0] > 0.0:
+            begin, tip_first = _first(seen, beam, high, nearest.p, _COARSE)
+        elif _is_out(seen, beam, high):
+            begin = _root(seen, beam, _Sought.WITHIN, nearest.p, high, _COARSE)
+        else:
+            begin, tip_first, reach = high, False, _ENDS
+        there, chord = touch(seen, beam, begin, tip_first)
+        gap = bearing(there) - chord.at_base - pose.angle
+    return Approach(reach, nearest.distance, begin, tip_first, nearest.low, gap)
 
 
 @compiled
-def _arrival_on(outline: Outline, beam: Beam, line: Line, way: float, is_first: bool) -> tuple[_Turned, float]:
+def _arrival_on(outline: Outline, beam: Beam, line: Line, way: float, is_first: bool) -> tuple[Approach, float]:
     """First contact on a line of a drive of some way, and its travel; NaN if there is none.
 
     The least gap between two looks is looked for where it may be less than none: if the least found is no larger than
@@ -277,13 +266,13 @@ def _arrival_on(outline: Outline, beam: Beam, line: Line, way: float, is_first: 
 
 
 @compiled
-def _is_blocked(found: _Turned) -> bool:
+def _is_blocked(found: Approach) -> bool:
     """True if the object is where the base is, or too close to it."""
     return found.reach == _CUTS_PIVOT or found.reach == _TOO_CLOSE
 
 
 @compiled
-def _grazing(outline: Outline, beam: Beam, line: Line, low: float, high: float) -> tuple[_Turned, float]:
+def _grazing(outline: Outline, beam: Beam, line: Line, low: float, high: float) -> tuple[Approach, float]:
     """First contact about the least gap between two travels, and its travel; NaN if there is none."""
     looked = _look(outline, beam, line, high)
     for _ in range(_DEEPEST):
@@ -302,8 +291,8 @@ def _grazing(outline: Outline, beam: Beam, line: Line, low: float, high: float) 
 
 @compiled
 def _between(
-    outline: Outline, beam: Beam, line: Line, clear: float, gap: float, inside: float, found: _Turned
-) -> tuple[_Turned, float]:
+    outline: Outline, beam: Beam, line: Line, clear: float, gap: float, inside: float, found: Approach
+) -> tuple[Approach, float]:
     """First contact between two travels, at the second of which the unloaded rod would cut the object."""
     settled, at_inside = _LAST * (inside - clear), found.gap
     if _is_blocked(found):
@@ -325,7 +314,7 @@ def _between(
 @compiled
 def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int, float]:
     """First contact of a rod that is carried along lines, the number of the line, and the travel."""
-    reach, distance, way = _TOO_FAR, math.inf, 0.0
+    least, way = math.inf, 0.0
     for k in range(lines.shape[0]):
         if not math.isnan(lines[k, 7]):
             way = lines[k, 7]
@@ -334,12 +323,10 @@ def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int,
             break
         line = line_of(lines, k)
         found, travel = _arrival_on(outline, beam, line, way, k == 0)
-        distance = min(distance, found.distance)
-        if _is_blocked(found):
-            return Approach(found.reach, found.distance, math.nan, True, math.nan), k, travel
-        if math.isfinite(travel):
-            reach = _BEGINS_INSIDE if k == 0 and travel == line.travel else found.reach
-            pose = pose_at(line, travel)
-            low = ends(from_base(outline, pose.x, pose.y))[0]
-            return Approach(reach, found.distance, found.begin, found.tip_first, low), k, travel
-    return Approach(reach, distance, math.nan, True, math.nan), 0, math.nan
+        if math.isfinite(travel) or _is_blocked(found):
+            reach, distance, begin, tip_first, low, gap = found
+            if k == 0 and travel == line.travel and not _is_blocked(found):
+                reach = _BEGINS_INSIDE
+            return Approach(reach, distance, begin, tip_first, low, gap), k, travel
+        least = min(least, found.distance)
+    return Approach(_TOO_FAR, least, math.nan, True, math.nan, math.nan), 0, math.nan

@@ -164,12 +164,9 @@ def line_at(lines: Floats, travel: float) -> int:
 @compiled
 def off_line(line: Line, x: float, y: float, angle: float) -> Offset:
     """Components of a pose across the line, and its travel in place of the angle."""
-    x, y, angle = x - line.begin.x, y - line.begin.y, angle - line.begin.angle
-    return Offset(
-        _component(line.across, x, y, angle),
-        _component(line.other, x, y, angle),
-        line.travel + _component(line.onward, x, y, angle),
-    )
+    begin = line.begin
+    off = components(line, x - begin.x, y - begin.y, angle - begin.angle)
+    return Offset(off.x, off.y, line.travel + off.angle)
 
 
 @compiled

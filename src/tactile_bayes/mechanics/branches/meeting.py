@@ -1,21 +1,52 @@
-"""Meeting an event on a leg: how the leg is left, up to where the travel of the drive grows, and how the path ends."""
+"""Meeting an event on a leg: how the leg is left, up to where the travel of the drive grows, how the path ends, and
+where the branch goes on: in another phase, on another line, past a knot, or where it has left a dip."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from tactile_bayes.mechanics.branches.advance import Here, Step
-from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, settle_at_limit
-from tactile_bayes.mechanics.branches.leg import LegSeries, guess, settle_on, share_of
-from tactile_bayes.mechanics.branches.leg_events import change_of_phase, end_of_line, first_fall, polished_fold
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.branches.advance import LONGEST, Here, Setting, Step
+from tactile_bayes.mechanics.branches.equilibrium import (
+    SETTLED,
+    Balance,
+    Equilibrium,
+    Scene,
+    balance,
+    dot,
+    in_phase,
+    nowhere,
+    on_line,
+    settle,
+    settle_at_limit,
+    tangential_psi1,
+    times,
+)
+from tactile_bayes.mechanics.branches.leg import (
+    LOST,
+    NUDGE,
+    LegSeries,
+    change_of_phase,
+    end_of_line,
+    first_fall,
+    guess,
+    leg_from,
+    polished_fold,
+    regained,
+    sample_leg,
+    settle_on,
+    share_of,
+    shortened,
+)
 from tactile_bayes.mechanics.branches.line import Line
+from tactile_bayes.mechanics.branches.phase import following, limit
 from tactile_bayes.mechanics.compiler import compiled, inlined
-from tactile_bayes.mechanics.reachability import SnapOff
+from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 
-__all__ = ["KNOT", "LINE", "OPEN", "PHASE", "Growth", "Leaving", "fate_of", "meet"]
+__all__ = ["KNOT", "OPEN", "Growth", "Leaving", "fate_of", "go_on", "meet"]
 
-_SMOOTHLY, KNOT, PHASE, LINE = range(4)
+_SMOOTHLY, KNOT, _PHASE, _LINE = range(4)
 """How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase, or the end
 of a line of the drive."""
 
@@ -29,7 +60,12 @@ _NO_LOAD = 1e-8
 """Force [EI/L²] at the end of a leg on which a release was found that is zero. There may be another state without force
 on the plane across its end."""
 
-_, _FOLD, _CORNER, _THRUST, _RELEASE = (int(kind) for kind in SnapOff)
+_NEVER, _FOLD, _CORNER, _THRUST, _RELEASE = (int(kind) for kind in SnapOff)
+_RUNS_OUT = int(Reachability.RUNS_OUT)
+
+
+_ROOM_PAST_LINE = 1.1
+"""Largest travel of a leg on a line of the drive, over the travel up to its end."""
 
 
 class Leaving(NamedTuple):
@@ -58,7 +94,7 @@ def meet(here: Here, step: Step, in_dip: bool, is_first: bool, work: LegSeries) 
     kind, share, at = _SMOOTHLY, 1.0, step.end
     change = change_of_phase(scene, work)
     if change <= 1.0:
-        kind, at = PHASE, settle_at_limit(scene, guess(work, change))
+        kind, at = _PHASE, settle_at_limit(scene, guess(work, change))
         share = min(max(share_of(step.leg, at), 0.0), 1.0)
     elif math.isfinite(step.knot):
         kind, at = KNOT, step.at_knot
@@ -68,7 +104,7 @@ def meet(here: Here, step: Step, in_dip: bool, is_first: bool, work: LegSeries) 
     over = end_of_line(scene.line, min(stop, share), work)
     if over <= 1.0:
         at = _ending(scene.line, settle_on(scene, step.leg, over, guess(work, over), SETTLED))
-        kind, share, stop = LINE, over, 2.0
+        kind, share, stop = _LINE, over, 2.0
     leaving = Leaving(kind, share, at)
     if stop <= 0.0:
         return leaving, Growth(stop, here.begin, True)
@@ -97,3 +133,96 @@ def fate_of(growth: Growth, step: Step, leaving: Leaving) -> int:
         return _FOLD if growth.stop > 0.0 else _CORNER
     is_free = step.is_released and step.end.at.force < _NO_LOAD
     return _RELEASE if is_free and leaving.kind == _SMOOTHLY else OPEN
+
+
+@inlined
+def go_on(
+    here: Here, setting: Setting, step: Step, leaving: Leaving, growth: Growth, event: Any, work: LegSeries
+) -> Here:
+    """Where the branch goes on; NaN where it, the drive or the contour ends, which is written."""
+    if event.snap_off > _NEVER:
+        position, begin = _regained_at(here, step, leaving, growth, event.snap_angle, work)
+        if position == LOST:
+            return _stopped(here)
+        if position <= 1.0:
+            event.snap_off = OPEN
+            return Here(here.scene, here.line, begin, nowhere(), begin.tangent, here.longest)
+    elif leaving.kind == KNOT and step.knot == setting.low:
+        event.reach, event.snap_parameter = _RUNS_OUT, math.nan
+    elif leaving.kind == _LINE and not _goes_on(setting.lines, here.line):
+        event.snap_off = _NEVER
+    if leaving.kind == _LINE:
+        return _on_next_line(here, setting.lines, step, leaving)
+    scene, before, onward = here.scene, nowhere(), step.end.tangent
+    if leaving.kind == _PHASE:
+        scene = in_phase(scene, following(scene.phase))
+        q, sense = limit(scene.phase, tangential_psi1(scene))
+        begin = balance(scene, Equilibrium(leaving.at.at.p, q, leaving.at.at.force))[0]
+        onward = Equilibrium(0.0, -sense, 0.0)
+    elif leaving.kind == KNOT:
+        begin = nowhere() if step.knot == setting.low else _past(scene, step.at_knot, onward.p)
+    else:
+        begin, before = step.end, step.before_end
+    return Here(scene, here.line, begin, before, onward, here.longest)
+
+
+@inlined
+def _stopped(here: Here) -> Here:
+    return Here(here.scene, here.line, nowhere(), here.before, here.onward, here.longest)
+
+
+@inlined
+def _regained_at(
+    here: Here, step: Step, leaving: Leaving, growth: Growth, most: float, work: LegSeries
+) -> tuple[float, Balance]:
+    """Position on a leg at which the travel exceeds its maximum again, as `regained`, and the equilibrium there."""
+    scene, behind = here.scene, growth.stop
+    if step.end.at.force < 0.0:
+        return LOST, here.begin
+    if leaving.share < 1.0:
+        sample_leg(scene, shortened(step.leg, leaving.share), here.begin, nowhere(), leaving.share, work)
+        behind = min(behind / leaving.share, 1.0)
+    found = regained(behind, most, work)
+    if not 0.0 <= found <= 1.0:
+        return found, here.begin
+    return found, settle_on(scene, step.leg, leaving.share * found, guess(work, found), SETTLED)
+
+
+@inlined
+def _on_next_line(here: Here, lines: Floats | None, step: Step, leaving: Leaving) -> Here:
+    """Beginning of a leg on the next line of the drive; NaN after the last."""
+    if not _goes_on(lines, here.line):
+        return _stopped(here)
+    line = here.line + 1
+    scene = on_line(here.scene, lines, line)
+    begin = settle(scene, leaving.at.at, leaving.at.at, step.leg.normal, 0.0, SETTLED)
+    onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
+    longest = _length_on_line(scene.line, scene, begin, onward) if _goes_on(lines, line) else LONGEST
+    return Here(scene, line, begin, nowhere(), onward, longest)
+
+
+@compiled
+def _goes_on(lines: Floats | None, k: int) -> bool:
+    """True if the drive continues after a line."""
+    if lines is None:
+        return False
+    return k + 1 < lines.shape[0] and not math.isnan(lines[k + 1, 0])
+
+
+@compiled
+def _length_on_line(line: Line | None, scene: Scene, begin: Balance, onward: Equilibrium) -> float:
+    """Length of a leg up to somewhat beyond the end of the line of the drive, as far as its travel's rate tells."""
+    if line is None:
+        return LONGEST
+    leg = leg_from(scene, begin, onward, LONGEST)
+    room = _ROOM_PAST_LINE * (line.end - begin.travel)
+    pace = begin.rates.travel / dot(leg.normal, begin.tangent)
+    return LONGEST * room / pace if pace > room > 0.0 else LONGEST
+
+
+@compiled
+def _past(scene: Scene, at_knot: Balance, sense: float) -> Balance:
+    """Equilibrium at a knot, with the tangent and the rates behind it."""
+    at, travel, moment, force_x, force_y, _, _ = at_knot
+    behind = balance(scene, Equilibrium(at.p + math.copysign(NUDGE, sense), at.q, at.force))[0]
+    return Balance(at, travel, moment, force_x, force_y, behind.tangent, behind.rates)
