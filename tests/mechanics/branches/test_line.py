@@ -11,6 +11,7 @@ from helpers.integration import ATOL, RTOL
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.branches.line import lines_through
+from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
@@ -151,7 +152,9 @@ def test_a_fold_is_the_greatest_travel(poses, contour):
     """By shooting: the travel of the states that integration finds for a force is greatest where the path ends."""
     paths = carried(contour, poses)
     assert paths.snap_off[0] == SnapOff.FOLD
-    p, q, force, tip = paths.changes[0, -1, :4]
+    last = dict(zip(STATE_COLUMNS, paths.events[0, -1], strict=True))
+    tip, p, force = last["phase"] == TIP, last["parameter"], np.hypot(last["force_x"], last["force_y"])
+    q = last["tip_angle"] - last["slope_angle"] if tip else last["arclength"]
     whole = np.linalg.norm(poses[1] - poses[0])
     along = (poses[1] - poses[0]) / whole
 
@@ -194,7 +197,7 @@ def test_first_contact_is_where_the_unloaded_rod_touches():
     normal = np.array([np.sin(0.8), -np.cos(0.8)])
     touch = centre + 0.3 * normal
     assert low.first_angle[0] == pytest.approx(1.5 - (touch[0] - (touch[1] - 0.4) / np.tan(0.8)), abs=1e-12)
-    assert low.changes[0, 0, 3] == 0.0
+    assert low.events[0, 0, 0] == TANGENTIAL
 
 
 def test_a_rod_that_is_drawn_back_is_released_without_a_jump():

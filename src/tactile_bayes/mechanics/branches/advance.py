@@ -30,7 +30,6 @@ from tactile_bayes.mechanics.branches.leg import (
     share_of,
     shortened,
 )
-from tactile_bayes.mechanics.branches.outline import Outline
 from tactile_bayes.mechanics.branches.phase import limit
 from tactile_bayes.mechanics.branches.series import change_of, tail
 from tactile_bayes.mechanics.compiler import compiled, inlined
@@ -75,10 +74,8 @@ class Setting(NamedTuple):
     """Lines of a drive that carries the base, in rod lengths, NaN after the last; see `line_of`."""
     knots: Floats
     """Parameters at which the contour may not be smooth."""
-    low: float
-    """Least parameter of the contour."""
-    seen: Outline
-    """Outline relative to the base at first contact."""
+    ends: tuple[float, float]
+    """Least and greatest parameter of the contour."""
     slides: bool
     """Whether friction opposes the slip everywhere, or else there is no path."""
     may_release: bool
@@ -161,7 +158,7 @@ def _trial(here: Here, setting: Setting, length: float, known: float, work: LegS
     is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, known, work)
     knot, at_knot = math.nan, begin
     if is_sound:
-        knot, node = first_knot(leg, setting.knots, setting.low, work)
+        knot, node = first_knot(leg, setting.knots, setting.ends[0], work)
         if node <= 1.0:  # rates at the end are those before the knot
             at_knot = settle_at(scene, knot, guess(work, node))
             share = share_of(leg, at_knot) * (1.0 - NUDGE)

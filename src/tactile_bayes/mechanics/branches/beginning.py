@@ -49,8 +49,6 @@ class Beginning(NamedTuple):
     scene: Scene
     """With the phase, the line of the drive, and the friction that the rod has there."""
     line: int
-    seen: Outline
-    """Relative to the base."""
     state: Balance
 
 
@@ -62,12 +60,12 @@ def beginning(scene: Scene, lines: Floats | None, slides: bool, first_step: floa
     """
     near, scene, line, seen = _arrive(scene, lines, first_step)
     if near.reach != _TOUCHES:
-        return Beginning(near.reach, near, scene, line, seen, nowhere())
+        return Beginning(near.reach, near, scene, line, nowhere())
     reach, scene, state = _first_state(scene, lines, seen, near, slides)
     least_psi1 = tangential_psi1(scene) - (0.0 if lines is None else _NOT_TURNED)
     if reach == _TOUCHES and scene.phase == TIP and state.at.q < least_psi1:
         reach = _TOUCHES_TWICE
-    return Beginning(reach, near, scene, line, seen, state)
+    return Beginning(reach, near, scene, line, state)
 
 
 @compiled
@@ -91,7 +89,7 @@ def _first_state(
     scene = in_phase(scene, touching(near.tip_first))
     begin = _unloaded(scene, lines, seen, near)
     if scene.phase == TANGENTIAL and lines is not None and begin.at.q > 1.0:  # the approach is not exact
-        near = Approach(near.reach, near.distance, near.begin, True, near.low, near.gap)
+        near = Approach(near.reach, near.distance, near.begin, True, near.ends, near.gap)
         scene = in_phase(scene, TIP)
         begin = _unloaded(scene, lines, seen, near)
     delta = scene.rig.friction_angle

@@ -29,7 +29,7 @@ from tactile_bayes.mechanics.branches.leg import (
     LegSeries,
     leg_series,
 )
-from tactile_bayes.mechanics.branches.meeting import OPEN, Growth, Leaving, fate_of, go_on, meet
+from tactile_bayes.mechanics.branches.meeting import OPEN, Meeting, fate_of, go_on, meet
 from tactile_bayes.mechanics.branches.readings import (
     Course,
     Found,
@@ -90,28 +90,28 @@ def follow_branch(
     The scene has the first line of a drive that carries the base. `slides` says whether friction opposes the slip
     everywhere, or else there is no path; otherwise it acts as in a forward sweep of a straight rod.
     """
-    work, legs, event = workspace.leg, workspace.legs, found.event
+    work, event = workspace.leg, found.event
     start = beginning(scene, lines, slides, work.accuracy.first_step)
     here, length, followed = _begin(start, found), FIRST_LENGTH, 0
     if event.reach != _TOUCHES:
         return
     may_release = lines is not None or not is_straight(scene.beam)
-    setting = Setting(lines, workspace.knots, start.near.low, start.seen, slides, may_release)
-    for _ in range(legs.phase.size):
+    setting = Setting(lines, workspace.knots, start.near.ends, slides, may_release)
+    for _ in range(workspace.legs.phase.size):
         in_dip = event.snap_off > _NEVER
         step, pace = advance(here, setting, length, in_dip, work)
         if not step.is_sound:
             break
-        leaving, growth = meet(here, step, in_dip, followed == 0, work)
+        met = meet(here, step, in_dip, followed == 0, work)
         if not in_dip:
-            followed = _grow(followed, here, setting, step, leaving, growth, samples, work, legs, found)
+            followed = _grow(followed, here, setting, step, met, samples, workspace, found)
         if event.reach != _TOUCHES or event.snap_off == _RELEASE:
             break
-        here = go_on(here, setting, step, leaving, growth, event, work)
+        here = go_on(here, setting, step, met, event, work)
         if not math.isfinite(here.begin.at.p):
             break
         length = next_length(here, step, pace, work)
-    _end(followed, here, lines, start, samples, work, legs, found)
+    _end(followed, here, lines, start, samples, workspace, found)
 
 
 @inlined
@@ -140,18 +140,17 @@ def _grow(
     here: Here,
     setting: Setting,
     step: Step,
-    leaving: Leaving,
-    growth: Growth,
+    met: Meeting,
     samples: Samples,
-    work: LegSeries,
-    legs: Legs,
+    workspace: BranchWorkspace,
     found: Found,
 ) -> int:
     """Store the growing part of a leg, unless it is ruled out, and write what is known of the path with it; return the
     number of legs that are stored."""
-    scene, at, stop, event, begin = here.scene, growth.at, growth.stop, found.event, found.event.snap_angle
-    event.snap_off = fate_of(growth, step, leaving)
-    event.reach, where = ruled_out(here, setting, step, leaving, growth, work)
+    work, legs, event, begin = workspace.leg, workspace.legs, found.event, found.event.snap_angle
+    scene, at, stop = here.scene, met.at, met.stop
+    event.snap_off = fate_of(step, met)
+    event.reach, where = ruled_out(here, setting, step, met, work)
     if event.reach != _TOUCHES:
         event.snap_parameter = where
     if event.reach != _TOUCHES or not stop > 0.0:
@@ -162,7 +161,7 @@ def _grow(
             write_event(scene, step.leg.begin, found.events[event.phases])
             event.phases += 1
     steadiness = 0.0
-    if samples.angles.size and not growth.is_maximum and at.travel > begin:
+    if samples.angles.size and not met.is_maximum and at.travel > begin:
         steadiness = min(max(value(work.series[RATE], stop) * stop / (at.travel - begin), 0.0), 1.0)
     store(followed, scene, here.line, step.leg, at.at, Course(stop, begin, at.travel, steadiness), work, legs)
     event.snap_angle, event.snap_parameter = at.travel, at.at.p
@@ -176,13 +175,12 @@ def _end(
     lines: Floats | None,
     start: Beginning,
     samples: Samples,
-    work: LegSeries,
-    legs: Legs,
+    workspace: BranchWorkspace,
     found: Found,
 ) -> None:
     """Write the end of a path and its samples; or why there is none."""
     event, wants_states, first = found.event, found.events.size > 0, start.state.travel
-    where = event.snap_parameter
+    work, legs, where = workspace.leg, workspace.legs, event.snap_parameter
     if event.reach == _TOUCHES and (event.snap_off == OPEN or not event.snap_angle - first > _LEAST_TRAVEL):
         across = start.scene.phase == TIP and start.state.at.q > _ACROSS
         event.reach, where = _SLIPS_OFF if across else _GRAZES, math.nan

@@ -80,8 +80,8 @@ class Approach(NamedTuple):
     """First contact."""
     tip_first: bool
     """True if the tip touches first, and not a point before it."""
-    low: float
-    """Least parameter of the contour."""
+    ends: tuple[float, float]
+    """Least and greatest parameter of the contour."""
     gap: float
     """Angle by which the rod would turn until it touches [rad]; out of reach, one and the distance that is missing."""
 
@@ -141,8 +141,7 @@ def _root(outline: Outline, beam: Beam, what: _Sought, positive: float, negative
 class _Nearest(NamedTuple):
     """The point of an outline that is nearest to the base of a rod, and the ends of the outline."""
 
-    low: float
-    high: float
+    ends: tuple[float, float]
     p: float
     distance: float
     """Distance from the base [L]."""
@@ -165,7 +164,7 @@ def _nearest(outline: Outline, beam: Beam, last_step: float) -> _Nearest:
         p = _root(outline, beam, _Sought.LEVER, high, low, last_step)
     at, tip = place(outline, p), beside(outline, p, 1.0)
     missing = math.hypot(tip.x, tip.y) - (beam.reach - _ROUNDING)
-    return _Nearest(low, high, p, math.hypot(at.x, at.y), missing, frame(at)[1] > 0.0, beyond_low, beyond_high)
+    return _Nearest((low, high), p, math.hypot(at.x, at.y), missing, frame(at)[1] > 0.0, beyond_low, beyond_high)
 
 
 @compiled
@@ -187,8 +186,8 @@ def _first(outline: Outline, beam: Beam, high: float, nearest: float, last_step:
 def approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
     """First contact of a rod; roots are found to a share of their brackets."""
     nearest = _nearest(outline, beam, last_step)
-    begin, tip_first = _first(outline, beam, nearest.high, nearest.p, last_step)
-    open_end = frame(beside(outline, nearest.high, 1.0))[1] > 0.0 and not _is_out(outline, beam, nearest.high)
+    begin, tip_first = _first(outline, beam, nearest.ends[1], nearest.p, last_step)
+    open_end = frame(beside(outline, nearest.ends[1], 1.0))[1] > 0.0 and not _is_out(outline, beam, nearest.ends[1])
     reach = _TOUCHES
     if not nearest.is_above:
         reach = _RUNS_OUT if nearest.beyond_low and not nearest.beyond_high else _CUTS_PIVOT
@@ -198,7 +197,7 @@ def approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
         reach = _TOO_FAR
     elif nearest.beyond_high or open_end:
         reach = _ENDS
-    return Approach(reach, nearest.distance, begin, tip_first, nearest.low, math.nan)
+    return Approach(reach, nearest.distance, begin, tip_first, nearest.ends, math.nan)
 
 
 @compiled
@@ -217,7 +216,7 @@ def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> Approach:
     pose = pose_at(line, travel)
     seen = from_base(outline, pose.x, pose.y)
     nearest = _nearest(seen, beam, _COARSE)
-    high, begin, tip_first, reach, gap = nearest.high, nearest.p, True, _TOUCHES, 1.0 + max(nearest.missing, 0.0)
+    high, begin, tip_first, reach, gap = nearest.ends[1], nearest.p, True, _TOUCHES, 1.0 + max(nearest.missing, 0.0)
     if not nearest.is_above:
         reach = _TOO_FAR if nearest.beyond_high or nearest.beyond_low else _CUTS_PIVOT
     elif nearest.distance < beam.stem + _CLEARANCE:
@@ -233,7 +232,7 @@ def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> Approach:
             begin, tip_first, reach = high, False, _ENDS
         there, chord = touch(seen, beam, begin, tip_first)
         gap = bearing(there) - chord.at_base - pose.angle
-    return Approach(reach, nearest.distance, begin, tip_first, nearest.low, gap)
+    return Approach(reach, nearest.distance, begin, tip_first, nearest.ends, gap)
 
 
 @compiled
@@ -324,9 +323,9 @@ def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int,
         line = line_of(lines, k)
         found, travel = _arrival_on(outline, beam, line, way, k == 0)
         if math.isfinite(travel) or _is_blocked(found):
-            reach, distance, begin, tip_first, low, gap = found
+            reach, distance, begin, tip_first, limits, gap = found
             if k == 0 and travel == line.travel and not _is_blocked(found):
                 reach = _BEGINS_INSIDE
-            return Approach(reach, distance, begin, tip_first, low, gap), k, travel
+            return Approach(reach, distance, begin, tip_first, limits, gap), k, travel
         least = min(least, found.distance)
-    return Approach(_TOO_FAR, least, math.nan, True, math.nan, math.nan), 0, math.nan
+    return Approach(_TOO_FAR, least, math.nan, True, (math.nan, math.nan), math.nan), 0, math.nan

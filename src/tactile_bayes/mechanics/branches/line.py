@@ -80,16 +80,9 @@ class LinePath(NamedTuple):
 def lines_through(poses: Floats, length: float, *, backward: bool = False, off: float = _STRAIGHT) -> LinePath:
     """Return the lines between consecutive poses of the base, those that continue each other put together.
 
-    Parameters
-    ----------
-    poses : ndarray, shape (n, 3)
-        Positions [length] and drive angles [rad] of the base in the laboratory frame, at least two that differ.
-    length : float
-        Length of the rod.
-    backward : bool
-        Whether the sweep frame is the mirror image.
-    off : float
-        Distance from its line [L and rad] up to which a pose lies on it.
+    Poses are positions [length] and drive angles [rad] in the laboratory frame, shape (n, 3), of which at least two
+    differ; `off` is the distance from its line [L and rad] up to which a pose lies on it. If `backward`, the sweep
+    frame is the mirror image.
     """
     own = np.array(poses, dtype=float)
     own[:, :2] = (own[:, :2] - own[0, :2]) / length

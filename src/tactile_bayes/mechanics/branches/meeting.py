@@ -44,7 +44,7 @@ from tactile_bayes.mechanics.branches.phase import following, limit
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 
-__all__ = ["KNOT", "OPEN", "Growth", "Leaving", "fate_of", "go_on", "meet"]
+__all__ = ["KNOT", "OPEN", "Meeting", "fate_of", "go_on", "meet"]
 
 _SMOOTHLY, KNOT, _PHASE, _LINE = range(4)
 """How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase, or the end
@@ -68,51 +68,46 @@ _ROOM_PAST_LINE = 1.1
 """Largest travel of a leg on a line of the drive, over the travel up to its end."""
 
 
-class Leaving(NamedTuple):
-    """How a leg is left."""
+class Meeting(NamedTuple):
+    """How a leg is left, and its part on which the travel of the drive grows before that."""
 
     kind: int
     share: float
-    """Position on the leg."""
-    at: Balance
-
-
-class Growth(NamedTuple):
-    """Part of a leg on which the travel of the drive grows."""
-
+    """Position on the leg at which it is left."""
+    left: Balance
     stop: float
-    """Position at which it ends: 0 if the travel falls from the beginning, −1 if the leg lies beyond a maximum."""
+    """Position at which it ends growing: 0 if it falls from the beginning, −1 if the leg lies beyond a maximum."""
     at: Balance
     is_maximum: bool
     """Whether the travel falls beyond it."""
 
 
 @inlined
-def meet(here: Here, step: Step, in_dip: bool, is_first: bool, work: LegSeries) -> tuple[Leaving, Growth]:
+def meet(here: Here, step: Step, in_dip: bool, is_first: bool, work: LegSeries) -> Meeting:
     """How a leg is left, and its part before that on which the travel grows: none if the branch is in a dip."""
     scene = here.scene
-    kind, share, at = _SMOOTHLY, 1.0, step.end
+    kind, share, left = _SMOOTHLY, 1.0, step.end
     change = change_of_phase(scene, work)
     if change <= 1.0:
-        kind, at = _PHASE, settle_at_limit(scene, guess(work, change))
-        share = min(max(share_of(step.leg, at), 0.0), 1.0)
+        kind, left = _PHASE, settle_at_limit(scene, guess(work, change))
+        share = min(max(share_of(step.leg, left), 0.0), 1.0)
     elif math.isfinite(step.knot):
-        kind, at = KNOT, step.at_knot
+        kind, left = KNOT, step.at_knot
     if in_dip:
-        return Leaving(kind, share, at), Growth(-1.0, here.begin, False)
+        return Meeting(kind, share, left, -1.0, here.begin, False)
     stop = first_fall(is_first, work)
     over = end_of_line(scene.line, min(stop, share), work)
     if over <= 1.0:
-        at = _ending(scene.line, settle_on(scene, step.leg, over, guess(work, over), SETTLED))
+        left = _ending(scene.line, settle_on(scene, step.leg, over, guess(work, over), SETTLED))
         kind, share, stop = _LINE, over, 2.0
-    leaving = Leaving(kind, share, at)
     if stop <= 0.0:
-        return leaving, Growth(stop, here.begin, True)
+        return Meeting(kind, share, left, stop, here.begin, True)
     if stop > share:
-        return leaving, Growth(share, at, False)
+        return Meeting(kind, share, left, share, left, False)
     if work.accuracy.exact:
         stop = polished_fold(scene, step.leg, stop, work)
-    return leaving, Growth(stop, settle_on(scene, step.leg, stop, guess(work, stop), SETTLED), True)
+    at = settle_on(scene, step.leg, stop, guess(work, stop), SETTLED)
+    return Meeting(kind, share, left, stop, at, True)
 
 
 @compiled
@@ -125,42 +120,40 @@ def _ending(line: Line | None, found: Balance) -> Balance:
 
 
 @inlined
-def fate_of(growth: Growth, step: Step, leaving: Leaving) -> int:
+def fate_of(step: Step, met: Meeting) -> int:
     """How the path ends on a leg, a `SnapOff`, or `OPEN`."""
-    if growth.is_maximum:
-        if abs(growth.at.holding_moment) <= _NO_MOMENT:
+    if met.is_maximum:
+        if abs(met.at.holding_moment) <= _NO_MOMENT:
             return _THRUST
-        return _FOLD if growth.stop > 0.0 else _CORNER
+        return _FOLD if met.stop > 0.0 else _CORNER
     is_free = step.is_released and step.end.at.force < _NO_LOAD
-    return _RELEASE if is_free and leaving.kind == _SMOOTHLY else OPEN
+    return _RELEASE if is_free and met.kind == _SMOOTHLY else OPEN
 
 
 @inlined
-def go_on(
-    here: Here, setting: Setting, step: Step, leaving: Leaving, growth: Growth, event: Any, work: LegSeries
-) -> Here:
+def go_on(here: Here, setting: Setting, step: Step, met: Meeting, event: Any, work: LegSeries) -> Here:
     """Where the branch goes on; NaN where it, the drive or the contour ends, which is written."""
     if event.snap_off > _NEVER:
-        position, begin = _regained_at(here, step, leaving, growth, event.snap_angle, work)
+        position, begin = _regained_at(here, step, met, event.snap_angle, work)
         if position == LOST:
             return _stopped(here)
         if position <= 1.0:
             event.snap_off = OPEN
             return Here(here.scene, here.line, begin, nowhere(), begin.tangent, here.longest)
-    elif leaving.kind == KNOT and step.knot == setting.low:
+    elif met.kind == KNOT and step.knot == setting.ends[0]:
         event.reach, event.snap_parameter = _RUNS_OUT, math.nan
-    elif leaving.kind == _LINE and not _goes_on(setting.lines, here.line):
+    elif met.kind == _LINE and not _goes_on(setting.lines, here.line):
         event.snap_off = _NEVER
-    if leaving.kind == _LINE:
-        return _on_next_line(here, setting.lines, step, leaving)
+    if met.kind == _LINE:
+        return _on_next_line(here, setting.lines, step, met)
     scene, before, onward = here.scene, nowhere(), step.end.tangent
-    if leaving.kind == _PHASE:
+    if met.kind == _PHASE:
         scene = in_phase(scene, following(scene.phase))
         q, sense = limit(scene.phase, tangential_psi1(scene))
-        begin = balance(scene, Equilibrium(leaving.at.at.p, q, leaving.at.at.force))[0]
+        begin = balance(scene, Equilibrium(met.left.at.p, q, met.left.at.force))[0]
         onward = Equilibrium(0.0, -sense, 0.0)
-    elif leaving.kind == KNOT:
-        begin = nowhere() if step.knot == setting.low else _past(scene, step.at_knot, onward.p)
+    elif met.kind == KNOT:
+        begin = nowhere() if step.knot == setting.ends[0] else _past(scene, step.at_knot, onward.p)
     else:
         begin, before = step.end, step.before_end
     return Here(scene, here.line, begin, before, onward, here.longest)
@@ -172,30 +165,28 @@ def _stopped(here: Here) -> Here:
 
 
 @inlined
-def _regained_at(
-    here: Here, step: Step, leaving: Leaving, growth: Growth, most: float, work: LegSeries
-) -> tuple[float, Balance]:
+def _regained_at(here: Here, step: Step, met: Meeting, most: float, work: LegSeries) -> tuple[float, Balance]:
     """Position on a leg at which the travel exceeds its maximum again, as `regained`, and the equilibrium there."""
-    scene, behind = here.scene, growth.stop
+    scene, behind = here.scene, met.stop
     if step.end.at.force < 0.0:
         return LOST, here.begin
-    if leaving.share < 1.0:
-        sample_leg(scene, shortened(step.leg, leaving.share), here.begin, nowhere(), leaving.share, work)
-        behind = min(behind / leaving.share, 1.0)
+    if met.share < 1.0:
+        sample_leg(scene, shortened(step.leg, met.share), here.begin, nowhere(), met.share, work)
+        behind = min(behind / met.share, 1.0)
     found = regained(behind, most, work)
     if not 0.0 <= found <= 1.0:
         return found, here.begin
-    return found, settle_on(scene, step.leg, leaving.share * found, guess(work, found), SETTLED)
+    return found, settle_on(scene, step.leg, met.share * found, guess(work, found), SETTLED)
 
 
 @inlined
-def _on_next_line(here: Here, lines: Floats | None, step: Step, leaving: Leaving) -> Here:
+def _on_next_line(here: Here, lines: Floats | None, step: Step, met: Meeting) -> Here:
     """Beginning of a leg on the next line of the drive; NaN after the last."""
     if not _goes_on(lines, here.line):
         return _stopped(here)
     line = here.line + 1
     scene = on_line(here.scene, lines, line)
-    begin = settle(scene, leaving.at.at, leaving.at.at, step.leg.normal, 0.0, SETTLED)
+    begin = settle(scene, met.left.at, met.left.at, step.leg.normal, 0.0, SETTLED)
     onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
     longest = _length_on_line(scene.line, scene, begin, onward) if _goes_on(lines, line) else LONGEST
     return Here(scene, line, begin, nowhere(), onward, longest)

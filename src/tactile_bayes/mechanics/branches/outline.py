@@ -238,9 +238,10 @@ def bearing(at: Place) -> float:
 
 
 @compiled
-def is_inside(outline: Outline, arclength: float, x: float, y: float, low: float, high: float) -> bool:
+def is_inside(outline: Outline, arclength: float, x: float, y: float, ends: tuple[float, float]) -> bool:
     """True if the rod at an arc length is within the object as far as it is known: between contour and chord of two of
     its points."""
+    low, high = ends
     left, right = beside(outline, low, arclength), beside(outline, high, arclength)
     if not (left.x < x < right.x and (y - left.y) * (right.x - left.x) < (x - left.x) * (right.y - left.y)):
         return False

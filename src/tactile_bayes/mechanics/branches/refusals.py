@@ -10,8 +10,8 @@ import math
 from tactile_bayes.mechanics.branches.advance import Here, Setting, Step
 from tactile_bayes.mechanics.branches.equilibrium import Balance, Equilibrium, Scene, dot, tangential_psi1
 from tactile_bayes.mechanics.branches.leg import PLACE, REST, Leg, LegSeries, guess
-from tactile_bayes.mechanics.branches.meeting import KNOT, Growth, Leaving
-from tactile_bayes.mechanics.branches.outline import Outline, Place, beside, ends, is_inside
+from tactile_bayes.mechanics.branches.meeting import KNOT, Meeting
+from tactile_bayes.mechanics.branches.outline import Place, beside, is_inside
 from tactile_bayes.mechanics.branches.phase import on_rod, sliding
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
@@ -34,19 +34,17 @@ _CLEARANCE = CLEARANCE
 
 
 @inlined
-def ruled_out(
-    here: Here, setting: Setting, step: Step, leaving: Leaving, growth: Growth, work: LegSeries
-) -> tuple[int, float]:
+def ruled_out(here: Here, setting: Setting, step: Step, met: Meeting, work: LegSeries) -> tuple[int, float]:
     """Reason why there is no path with the growing part of a leg, a `Reachability`, and the contact where it holds."""
-    scene, at, stop = here.scene, growth.at, growth.stop
+    scene, at, stop = here.scene, met.at, met.stop
     if stop > 0.0 and scene.phase == TANGENTIAL and setting.lines is not None and at.at.q < _CLEARANCE:
         return _TOO_CLOSE, at.at.p
     # A leg that continues the one before it begins where that was checked.
-    twice = _second_contact(scene, setting.seen, math.isfinite(here.before.at.p), stop, work)
+    twice = _second_contact(scene, setting.ends, math.isfinite(here.before.at.p), stop, work)
     if not math.isnan(twice):
         return _TOUCHES_TWICE, twice
     if stop > 0.0 and setting.slides:
-        before_knot = step.end if leaving.kind == KNOT and not growth.is_maximum else at
+        before_knot = step.end if met.kind == KNOT and not met.is_maximum else at
         stuck = _held(scene, step.leg, stop, before_knot, work)
         if not math.isnan(stuck):
             return _STICKS, stuck
@@ -86,27 +84,26 @@ def _held(scene: Scene, leg: Leg, stop: float, at_stop: Balance, work: LegSeries
 
 
 @inlined
-def _second_contact(scene: Scene, seen: Outline, goes_on: bool, stop: float, work: LegSeries) -> float:
+def _second_contact(scene: Scene, ends: tuple[float, float], goes_on: bool, stop: float, work: LegSeries) -> float:
     """Contact up to a position on a leg at which a rod curved toward the object would touch it twice; NaN without one.
 
     Unless the branch is exact, it is wholly looked for at the beginning and the end only.
     """
     if scene.beam.most_curvature <= 0.0:
         return math.nan
-    low, high = ends(seen)
     for k in range(1 if goes_on else 0, work.nodes.size):
         if k > 0 and work.nodes[k] > stop:
             break
         force = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k])
         at = Equilibrium(work.at_nodes[PLACE, k], work.at_nodes[REST, k], force)
-        if _touches_twice(scene, at, work.accuracy.exact or k == 0, low, high):
+        if _touches_twice(scene, at, work.accuracy.exact or k == 0, ends):
             return at.p
     at = guess(work, stop)
-    return at.p if _touches_twice(scene, at, True, low, high) else math.nan
+    return at.p if _touches_twice(scene, at, True, ends) else math.nan
 
 
 @inlined
-def _touches_twice(scene: Scene, at: Equilibrium, wholly: bool, low: float, high: float) -> bool:
+def _touches_twice(scene: Scene, at: Equilibrium, wholly: bool, ends: tuple[float, float]) -> bool:
     """True if a rod touches the object at another point too, between the ends of the contour.
 
     In tangential contact the free end has its rest shape. It is in the object at once where the contour is less
@@ -128,13 +125,13 @@ def _touches_twice(scene: Scene, at: Equilibrium, wholly: bool, low: float, high
             part = loaded_part(beam, q, at.force, j, part)
             u, v = part.state.u, part.state.v
             x, y = -u * cos + v * sin, -u * sin - v * cos
-            if y * spot.cos > x * spot.sin and is_inside(outline, 1.0 - j / PARTS, spot.x + x, spot.y + y, low, high):
+            if y * spot.cos > x * spot.sin and is_inside(outline, 1.0 - j / PARTS, spot.x + x, spot.y + y, ends):
                 return True
     elif q < 1.0 - _SHORT_END:
         along, across = free_end(beam, q)
         cos, sin = _along(spot, outline.half_angle)
         x, y = along * cos - across * sin, along * sin + across * cos
-        return is_inside(outline, 1.0, spot.x + x, spot.y + y, low, high)
+        return is_inside(outline, 1.0, spot.x + x, spot.y + y, ends)
     return False
 
 

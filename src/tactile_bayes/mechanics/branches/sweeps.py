@@ -378,33 +378,16 @@ def solve_sweeps(
     asks_clearance: bool = True,
     asks_sliding: bool = False,
 ) -> Solutions:
-    """Follow the paths of sweeps, and compute loads and states of their samples.
+    """Follow the paths of sweeps, and compute loads, and states if wanted, of their samples.
 
-    Parameters
-    ----------
-    shapes : Shapes
-    sweeps : Sweeps
-    segments : Segments
-    shape : (int, int)
-        Number of contours, and of rows for each.
-    profile : Profile, optional
-        Rod whose rest curvature or rigidity varies along it, the same in all sweeps except for the taper and an
-        addition to its rest curvature; by default rods are uniform and of constant rest curvature.
-    known : (ForwardTable, ForwardTable), optional
-        Tables of the profile, for loads with errors of some 1e-6 of the largest.
-    tolerance : ndarray, shape (3,), optional
-        Tolerated errors of moment and forces [EI/L and EI/L²], at least 1e-10 of the loads; by default events are
-        exact, and loads have errors of some 1e-8 of the largest.
-    states : bool
-        Whether states are computed.
-    polished : bool
-        Whether they are exact. Otherwise they come from the series, with an error of 1e-10 of the largest and without
-        derivatives.
-    asks_clearance : bool
-        Whether `clear_angle` is computed.
-    asks_sliding : bool
-        Whether there is a path only where friction opposes the slip all along it. It always does so where the base is
-        carried; in rotations it otherwise acts as on a straight rod, which is wrong where a curved one slides outward.
+    `shape` is the number of contours, and of rows for each. With a `profile`, rest curvature or rigidity vary along the
+    rod, the same in all sweeps except for the taper and an addition to its rest curvature; `known` are tables of it,
+    for loads with errors of some 1e-6 of the largest. `tolerance` are tolerated errors of moment and forces [EI/L and
+    EI/L²], at least 1e-10 of the loads; without it events are exact, and loads have errors of some 1e-8 of the largest.
+    States are exact if `polished`; otherwise they come from the series, with an error of 1e-10 of the largest.
+    `asks_sliding` says whether there is a path only where friction opposes the slip all along it, as it always does
+    where the base is carried; in rotations it otherwise acts as on a straight rod, which is wrong where a curved one
+    slides outward.
     """
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
