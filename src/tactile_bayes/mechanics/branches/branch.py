@@ -21,8 +21,8 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.advance import FIRST_LENGTH, LONGEST, Here, Setting, Step, advance, next_length
-from tactile_bayes.mechanics.branches.beginning import Beginning, beginning
 from tactile_bayes.mechanics.branches.equilibrium import Equilibrium, Scene, nowhere
+from tactile_bayes.mechanics.branches.first_contact import Beginning, beginning
 from tactile_bayes.mechanics.branches.leg import (
     RATE,
     Accuracy,

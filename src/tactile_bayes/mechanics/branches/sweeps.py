@@ -20,8 +20,8 @@ from tactile_bayes.mechanics.branches.branch import (
 )
 from tactile_bayes.mechanics.branches.clearance import travel_into
 from tactile_bayes.mechanics.branches.equilibrium import Rig, Scene
+from tactile_bayes.mechanics.branches.first_contact import clear_angle
 from tactile_bayes.mechanics.branches.leg import Accuracy
-from tactile_bayes.mechanics.branches.limits import clear_angle
 from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_of
 from tactile_bayes.mechanics.branches.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.branches.readings import STATE, STATE_COLUMNS, Found, Samples

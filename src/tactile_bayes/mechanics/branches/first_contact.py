@@ -1,7 +1,5 @@
-"""Limits of a path: whether a rod reaches the contour, and first contact.
-
-At first contact the rod has its rest shape.
-"""
+"""First contact: whether and where a rod in its rest shape touches the contour, and the state there, in which a branch
+begins."""
 
 from __future__ import annotations
 
@@ -10,7 +8,22 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.line import Line, line_of, pose_at
+from tactile_bayes.mechanics.branches.equilibrium import (
+    BY_FORCE,
+    NO_FORCE,
+    SETTLED,
+    Balance,
+    Equilibrium,
+    Scene,
+    balance,
+    in_phase,
+    nowhere,
+    on_line,
+    settle,
+    tangential_psi1,
+    with_friction,
+)
+from tactile_bayes.mechanics.branches.line import Line, line_of, only_turns, pose_at
 from tactile_bayes.mechanics.branches.outline import (
     Outline,
     Place,
@@ -23,12 +36,15 @@ from tactile_bayes.mechanics.branches.outline import (
     narrower,
     place,
 )
+from tactile_bayes.mechanics.branches.phase import touching
+from tactile_bayes.mechanics.branches.refusals import NOT_SLIPPING, slip
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import golden, newton_step
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.poses.beam import Beam, Chord, chord_to, mirrored_beam
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
-__all__ = ["Approach", "approach", "arrival", "clear_angle", "touch"]
+__all__ = ["Beginning", "beginning", "clear_angle"]
 
 
 class _Sought(IntEnum):
@@ -44,7 +60,9 @@ class _Sought(IntEnum):
 
 _TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reachability.TOUCHES), int(Reachability.TOO_FAR), int(Reachability.CUTS_PIVOT)
 _ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reachability.ENDS), int(Reachability.TOO_CLOSE), int(Reachability.RUNS_OUT)
-_BEGINS_INSIDE, _CLEARANCE = int(Reachability.BEGINS_INSIDE), CLEARANCE
+_BEGINS_INSIDE, _SLIPS_OFF = int(Reachability.BEGINS_INSIDE), int(Reachability.SLIPS_OFF)
+_TOUCHES_TWICE, _STICKS = int(Reachability.TOUCHES_TWICE), int(Reachability.STICKS)
+_CLEARANCE = CLEARANCE
 
 _MOST_MOVES = 50
 """Largest number of corrections of a standoff. Each reduces the error to a share of the order of the cone's angle."""
@@ -69,6 +87,11 @@ _JUMP = 0.02
 """Angle [rad] by which a rod that comes within reach of an object is past it, and has not touched it."""
 
 
+_NOT_TURNED = 1e-3
+"""Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried: as
+near as its first contact is found."""
+
+
 class Approach(NamedTuple):
     """First contact with an outline, as a parameter of the contour."""
 
@@ -86,8 +109,20 @@ class Approach(NamedTuple):
     """Angle by which the rod would turn until it touches [rad]; out of reach, one and the distance that is missing."""
 
 
+class Beginning(NamedTuple):
+    """First contact and the state there."""
+
+    reach: int
+    """A `Reachability`."""
+    near: Approach
+    scene: Scene
+    """With the phase, the line of the drive, and the friction that the rod has there."""
+    line: int
+    state: Balance
+
+
 @compiled
-def touch(outline: Outline, beam: Beam, p: float, tip: bool) -> tuple[Place, Chord]:
+def _touch(outline: Outline, beam: Beam, p: float, tip: bool) -> tuple[Place, Chord]:
     """Point beside which the unloaded rod lies at a contact, and the chord to it."""
     at = place(outline, p)
     narrow = narrower(outline, at, 1.0)
@@ -116,7 +151,7 @@ def _missing(outline: Outline, beam: Beam, what: _Sought, p: float) -> tuple[flo
         return beam.reach * beam.reach - at.x * at.x - at.y * at.y, -2.0 * along * at.speed
     # The angle between the line from the pivot and the contour's direction grows to the left as long as the contour
     # faces the pivot. It jumps below the pivot, where no contour is.
-    at, chord = touch(outline, beam, p, False)
+    at, chord = _touch(outline, beam, p, False)
     along, facing = frame(at)
     distance = math.hypot(at.x, at.y)
     angle = bearing(at) - math.atan2(at.sin, at.cos) + chord.at_point - outline.half_angle
@@ -183,7 +218,7 @@ def _first(outline: Outline, beam: Beam, high: float, nearest: float, last_step:
 
 
 @compiled
-def approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
+def _approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
     """First contact of a rod; roots are found to a share of their brackets."""
     nearest = _nearest(outline, beam, last_step)
     begin, tip_first = _first(outline, beam, nearest.ends[1], nearest.p, last_step)
@@ -204,8 +239,8 @@ def approach(outline: Outline, beam: Beam, last_step: float) -> Approach:
 def clear_angle(outline: Outline, beam: Beam, last_step: float) -> float:
     """Drive angle beyond which an unloaded rod has passed the contour: first contact of the opposite sweep [rad]."""
     opposite, of_opposite = mirrored(outline), mirrored_beam(beam)
-    near = approach(opposite, of_opposite, last_step)
-    at, chord = touch(opposite, of_opposite, near.begin, near.tip_first)
+    near = _approach(opposite, of_opposite, last_step)
+    at, chord = _touch(opposite, of_opposite, near.begin, near.tip_first)
     return math.pi - (math.atan2(at.y, at.x) - chord.at_base)
 
 
@@ -230,7 +265,7 @@ def _look(outline: Outline, beam: Beam, line: Line, travel: float) -> Approach:
             begin = _root(seen, beam, _Sought.WITHIN, nearest.p, high, _COARSE)
         else:
             begin, tip_first, reach = high, False, _ENDS
-        there, chord = touch(seen, beam, begin, tip_first)
+        there, chord = _touch(seen, beam, begin, tip_first)
         gap = bearing(there) - chord.at_base - pose.angle
     return Approach(reach, nearest.distance, begin, tip_first, nearest.ends, gap)
 
@@ -311,7 +346,7 @@ def _between(
 
 
 @compiled
-def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int, float]:
+def _arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int, float]:
     """First contact of a rod that is carried along lines, the number of the line, and the travel."""
     least, way = math.inf, 0.0
     for k in range(lines.shape[0]):
@@ -329,3 +364,70 @@ def arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int,
             return Approach(reach, distance, begin, tip_first, limits, gap), k, travel
         least = min(least, found.distance)
     return Approach(_TOO_FAR, least, math.nan, True, (math.nan, math.nan), math.nan), 0, math.nan
+
+
+@compiled
+def beginning(scene: Scene, lines: Floats | None, slides: bool, first_step: float) -> Beginning:
+    """Beginning of a branch, on the first line that leads to contact if the drive carries the base.
+
+    Friction opposes the slip there if `slides`; otherwise it acts as in a forward sweep of a straight rod.
+    """
+    near, scene, line, seen = _arrive(scene, lines, first_step)
+    if near.reach != _TOUCHES:
+        return Beginning(near.reach, near, scene, line, nowhere())
+    reach, scene, state = _first_state(scene, lines, seen, near, slides)
+    least_psi1 = tangential_psi1(scene) - (0.0 if lines is None else _NOT_TURNED)
+    if reach == _TOUCHES and scene.phase == TIP and state.at.q < least_psi1:
+        reach = _TOUCHES_TWICE
+    return Beginning(reach, near, scene, line, state)
+
+
+@compiled
+def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> tuple[Approach, Scene, int, Outline]:
+    """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
+    if lines is None:
+        return _approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline
+    near, k, travel = _arrival(scene.outline, scene.beam, lines)
+    pose = pose_at(line_of(lines, k), travel)
+    return near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y)
+
+
+@compiled
+def _first_state(
+    scene: Scene, lines: Floats | None, seen: Outline, near: Approach, slides: bool
+) -> tuple[int, Scene, Balance]:
+    """State at first contact, with the friction that it has: it opposes the slip of the rod along the contour.
+
+    A tip that is carried head-on does not slip to first order: rounding would decide the sense.
+    """
+    scene = in_phase(scene, touching(near.tip_first))
+    begin = _unloaded(scene, lines, seen, near)
+    if scene.phase == TANGENTIAL and lines is not None and begin.at.q > 1.0:  # the approach is not exact
+        near = Approach(near.reach, near.distance, near.begin, True, near.ends, near.gap)
+        scene = in_phase(scene, TIP)
+        begin = _unloaded(scene, lines, seen, near)
+    delta = scene.rig.friction_angle
+    if slides and delta > 0.0:
+        slipping = slip(scene, begin)
+        if scene.phase == TIP and not only_turns(scene.line) and not abs(slipping) > NOT_SLIPPING:
+            return _STICKS, scene, begin
+        if slipping > NOT_SLIPPING:
+            scene = with_friction(scene, -delta)
+            begin = _unloaded(scene, lines, seen, near)
+            if not slip(scene, begin) > 0.0:
+                return _STICKS, scene, begin
+    pushed = lines is None or begin.rates.travel * begin.tangent.force > 0.0
+    return _TOUCHES if pushed else _SLIPS_OFF, scene, begin
+
+
+@compiled
+def _unloaded(scene: Scene, lines: Floats | None, seen: Outline, near: Approach) -> Balance:
+    """Equilibrium without force at first contact with an outline relative to the base."""
+    at, chord = _touch(seen, scene.beam, near.begin, near.tip_first)
+    q = chord.arclength
+    if near.tip_first:
+        q = bearing(at) + chord.at_point - math.atan2(at.sin, at.cos) - scene.rig.friction_angle
+    start = Equilibrium(near.begin, q, 0.0)
+    if lines is None:
+        return balance(scene, start)[0]
+    return settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED)
