@@ -281,19 +281,19 @@ def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direc
         raise ParameterError(
             f"one contour is wanted here, not an array of shape {contour.shape}: scan_many takes those of shape (n,)"
         )
-    return frame_of(contour.broadcast_to((1,)), base, direction, rod)
+    return frame_of(contour, 1, base, direction, rod)
 
 
-def frame_of(contours: Contour, base: tuple[Any, Any], direction: Direction, rod: Rod) -> SweepFrame:
-    """Convert contours with parameters of shape (n,) to the frame of sweeps of a rod about a pivot each."""
-    x, y = (np.array(np.broadcast_to(b, contours.shape), dtype=float) for b in base)
+def frame_of(contours: Contour, count: int, base: tuple[Any, Any], direction: Direction, rod: Rod) -> SweepFrame:
+    """Convert so many contours to the frame of sweeps of a rod, each about a pivot."""
+    x, y = (np.array(np.broadcast_to(b, (count,)), dtype=float) for b in base)
     return SweepFrame(
-        contours,
+        contours.broadcast_to((count,)),
         x,
         y,
         rod.length,
         0.5 * rod.diameter,
-        np.full(contours.shape, direction == "backward"),
+        np.full(count, direction == "backward"),
         rod.arc_curvature,
         rod.taper,
         rod.stem / rod.length,

@@ -98,7 +98,7 @@ def scan_many(
             f"drive_angles must be angles in radians, at most a turn (2π), but {largest:g} is among them: those in "
             "degrees are converted by np.radians"
         )
-    sweep_frame = frame_of(contours.broadcast_to((count,)), (x, y), direction, rod)
+    sweep_frame = frame_of(contours, count, (x, y), direction, rod)
     paths = rotated_paths(sweep_frame, rod, friction_angle_of(friction), compliance, angles, polished=False)
     units = ManyUnits.of_rod(rod)
     system = "dimensionless" if rod.is_dimensionless else "SI"
