@@ -278,8 +278,7 @@ def scan(
         for paths, sense, every in _paths_of(contour, one, *acts):
             sweep = events_of(paths, sense, one, acts[0])
             _warn_of(sweep, one, acts[0])
-            chosen = _before_return(every, sweep) if isinstance(one, Carried) else _within_a_turn(one, every, sweep)
-            poses = one.at(every[chosen]) if isinstance(one, Carried) else _turned(one.base, every[chosen])
+            chosen, poses = _sampled(one, every, sweep)
             columns.append(_columns(paths, chosen, poses, len(sweeps), sweep.direction, acts[0]))
             sweeps.append(sweep)
     if not any(len(of_sweep["drive_angle"]) for of_sweep in columns):
@@ -352,9 +351,16 @@ def _paths_of(
         yield paths, sense, angles
 
 
-def _before_return(travels: Floats, sweep: SweepEvents) -> Index:
-    """Indices of the travels up to where the rod is in another contact."""
-    return np.flatnonzero(~(travels > (sweep.touches_again if sweep.clear else sweep.snap_off.travel)))
+def _sampled(drive: Drive, every: Floats, sweep: SweepEvents) -> tuple[Index, Floats]:
+    """Indices of the drive angles or travels that are sampled, in the order of the drive, and poses of the base there.
+
+    Where a rod is in another contact, its state is not known.
+    """
+    if isinstance(drive, Carried):
+        chosen = np.flatnonzero(~(every > (sweep.touches_again if sweep.clear else sweep.snap_off.travel)))
+        return chosen, drive.at(every[chosen])
+    chosen = _within_a_turn(drive, every, sweep)
+    return chosen, np.column_stack([*(np.full(chosen.size, value) for value in drive.base), every[chosen]])
 
 
 def _within_a_turn(drive: Rotation, every: Floats, sweep: SweepEvents) -> Index:
@@ -377,15 +383,10 @@ def _within_a_turn(drive: Rotation, every: Floats, sweep: SweepEvents) -> Index:
             f"before and later: {np.count_nonzero(~kept)} of the drive angles, up to {snap - sense * _TURN:.6g} or "
             f"from {first + sense * _TURN:.6g} rad on, are left out",
             ClearanceWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     sticks = (sense * (angles - first) >= 0.0) & (sense * (sweep.slides_from - angles) > 0.0)
     return np.asarray(chosen[kept & ~sticks][:: int(sense)])
-
-
-def _turned(base: tuple[float, float], angles: Floats) -> Floats:
-    """Poses of a base that rests."""
-    return np.column_stack([*(np.full(angles.size, value) for value in base), angles])
 
 
 def _floats(values: ArrayLike) -> Floats:
