@@ -4,8 +4,9 @@
 `along` → `profile` → `taylor` (the same for any other rod, by Taylor series: `profile_pose`, `profile_contact`,
 `profile_shape`) meet in `beam`, the rod as the forward model sees it → `equilibrium` (rod and contour) → `leg` and
 `branch` (one rod along one contour, from `first_contact` to snap-off, with what it meets on its legs, `meeting`, and
-what rules them out, `refusals`) → `readings` and `sweeps` (loads and states at drive angles, of many of them). All of this is scalar code
-that numba compiles, for any strictly convex contour, with friction and compliance, in both directions.
+what rules them out, `refusals`) → `readings` and `sweeps` (loads and states at drive angles, of many of them). All of
+this is scalar code that numba compiles, for any strictly convex contour, with friction and compliance, in both
+directions.
 `leg.Accuracy` decides whether it is exact or as accurate as noise requires. `elastica` (single states, and Step 2:
 `arc`, `chord`, `tables` and `states` for straight rods, `continuation` and `arc_states` for others) and `paths` are
 its interface for arrays; they load numba when they are called. `rod` is what users give, and `traced` a rod from
