@@ -12,8 +12,7 @@ from tactile_bayes.mechanics.branches.outline import Outline, Place, ends, is_in
 from tactile_bayes.mechanics.branches.phase import on_rod
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.phases import TIP
-from tactile_bayes.mechanics.poses.beam import free_end, from_tip, loaded_part, rest_curvature
-from tactile_bayes.mechanics.poses.forward_table import PARTS
+from tactile_bayes.mechanics.poses.beam import PARTS, free_end, from_tip, loaded_part, rest_curvature
 
 __all__ = ["folded_over", "second_contact"]
 

@@ -71,16 +71,10 @@ def _column(bend: Pose, beta: float, growth: float, cos: float, sin: float, by: 
 
 @compiled
 def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> Bend:
-    """Write one contact, NaN if there is none.
+    """Write one contact, with the coordinates in row i of z, to `by`, shape (5, 6); NaN if there is none.
 
-    Parameters
-    ----------
-    z : ndarray, shape (n, 4)
-        Coordinates as in `contact_states`; row i is used.
-    beam : Beam
-    by : ndarray, shape (5, 6)
-        Result: moment and force at the base, contact point, and direction β of the force; then their derivatives by
-        each coordinate.
+    Its rows are moment and force at the base, contact point, and direction β of the force; then their derivatives by
+    each coordinate.
     """
     force, psi1, arclength, drive_angle = z[i, 0], z[i, 1], z[i, 2], z[i, 3]
     curvature, is_arc = beam.curvature, beam.varied is None
@@ -140,34 +134,22 @@ def moved(
 ) -> tuple[float, float, float, float, float]:
     """Shift of the place and of ψ1, to first order, for changes of drive angle and loads: the derivatives of Step 2.
 
-    With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945) and the curvature κ = κ0 − m0 at the
-    pivot, sin ψ1 = sin ψ0 + (κ0² − κ²)/(2 f). The arc length follows from the changes of ψ0 and of the lever u = m0/f
-    that remain; each of them alone would be 0/0 in some rods. Rods that vary along their length have no first integral:
-    the changes of ψ0 and u together determine those of ψ1 and the arc length. Moments are those where the rod begins.
+    With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945) the changes of ψ0 and of the lever
+    u = m0/f determine those of ψ1 and the arc length. Moments are those where the rod begins.
     """
-    force, psi1 = z[i, 0], z[i, 1]
-    at_rod = by[0, 0]
+    force = z[i, 0]
     if beam.stem != 0.0:
-        at_rod -= lever_of_stem(beam.stem, z[i, 3], by[0, 1], by[0, 2])
         moment -= lever_of_stem(beam.stem, z[i, 3], fx, fy)
         moment += angle * beam.stem * (by[0, 2] * math.sin(z[i, 3]) + by[0, 1] * math.cos(z[i, 3]))
     here, by_force, by_psi1, longer = bend
     growth = (by[0, 1] * fx + by[0, 2] * fy) / (force * force)
     beta = (by[0, 1] * fy - by[0, 2] * fx) / (force * force)
-    psi0, df = angle - beta, growth * force
-    du = moment / force - here.u * growth
-    if beam.varied is None:
-        curvature = beam.curvature
-        at_pivot, cos0, cos1 = curvature - at_rod, longer.u, math.cos(psi1)
-        shift = (cos0 * psi0 + at_pivot * moment / force + 0.5 * here.u * (at_rod - 2.0 * curvature) * growth) / cos1
-        turned = psi0 - (1.0 + by_psi1.turn) * shift - by_force.turn * df
-        levered = du - by_psi1.u * shift - by_force.u * df
-        by_length = (longer.turn * turned + force * cos0 * levered) / (at_pivot * at_pivot + force * cos0 * cos0)
-    else:
-        turned, levered, turning = psi0 - by_force.turn * df, du - by_force.u * df, 1.0 + by_psi1.turn
-        det = turning * longer.u - longer.turn * by_psi1.u
-        shift = (turned * longer.u - longer.turn * levered) / det
-        by_length = (turning * levered - by_psi1.u * turned) / det
+    df, turning = growth * force, 1.0 + by_psi1.turn
+    turned = angle - beta - by_force.turn * df
+    levered = moment / force - here.u * growth - by_force.u * df
+    det = turning * longer.u - longer.turn * by_psi1.u  # cos ψ1 in uniform rods
+    shift = (turned * longer.u - longer.turn * levered) / det
+    by_length = (turning * levered - by_psi1.u * turned) / det
     return (
         by[1, 3] * df + by[2, 3] * shift + by[3, 3] * by_length + by[4, 3] * angle,
         by[1, 4] * df + by[2, 4] * shift + by[3, 4] * by_length + by[4, 4] * angle,
@@ -191,22 +173,10 @@ def write_contact_states(
     place_by: Floats,
     by: Floats,
 ) -> None:
-    """Write loads and places of contacts, NaN where there is none.
+    """Write loads, places and volumes of contacts as in `ContactStates`, NaN where there is none, and derivatives.
 
-    Parameters
-    ----------
-    coordinates : ndarray, shape (n, 4)
-        As in `contact_states`.
-    delta : ndarray, shape (n,)
-        Friction angle [rad].
-    curvature, varied, stem
-        As in `Rods`.
-    loads, place, volumes : ndarray, shapes (3, n), (4, n) and (2, n)
-        As in `ContactStates`.
-    loads_by, place_by : ndarray, shapes (n, 3, 4) and (n, 4, 4), or without rows
-        As in `ContactStateSlopes`.
-    by : ndarray
-        As in `contact_state`.
+    Coordinates as in `contact_states`, `by` as in `contact_state`; `loads_by` and `place_by` as in
+    `ContactStateSlopes`, or without rows.
     """
     for i in range(delta.size):
         bend = contact_state(coordinates, i, mirrored_by(curvature[i], varied, stem), by)

@@ -25,11 +25,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.jacobi import Jacobi, jacobi, jacobi_and_slopes
 
-__all__ = ["Pose", "by_arclength", "pose", "pose_and_slopes", "write_poses"]
+__all__ = ["ACROSS", "Chord", "Pose", "by_arclength", "pose", "pose_and_slopes"]
+
+ACROSS = 1e-6
+"""Cosine of the angle of a chord to the rod that counts as zero: the rod goes no farther from the pivot."""
 
 
 class Pose(NamedTuple):
@@ -41,6 +43,19 @@ class Pose(NamedTuple):
     """Its component against the force."""
     turn: float
     """Slope of the rod at the pivot less the slope at the contact [rad]."""
+
+
+class Chord(NamedTuple):
+    """Line from the pivot to a point of the rod at rest."""
+
+    arclength: float
+    """Arc length of the point [L], < 0 on the stem."""
+    at_base: float
+    """Angle from the rod at the pivot to the chord [rad]."""
+    at_point: float
+    """Angle from the chord to the rod at the point [rad]."""
+    rate: float
+    """Derivative of `at_point` by the length of the chord."""
 
 
 class _Start(NamedTuple):
@@ -181,11 +196,3 @@ def _scaled(
     cos_by = (cos_by + parts.cos_turn * shrink) * parts.inverse
     turn_by = -2.0 * (parts.cos_turn * sin_by - parts.sin_turn * cos_by)
     return Pose(scale * arclength * u_by, scale * arclength * v_by, scale * turn_by)
-
-
-@cached
-def write_poses(columns: Floats, out: Floats) -> None:
-    """Write u and v, shape (2, n), for rows of ψ1, arc length, force and rest curvature, shape (n, 4)."""
-    for i in range(columns.shape[0]):
-        here = pose(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3])
-        out[0, i], out[1, i] = here.u, here.v

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.poses.rises import peak, rise
 from tactile_bayes.mechanics.poses.taylor import (
+    EXACT,
     FARTHEST,
     FORWARD,
     ROUGH,
@@ -23,7 +23,9 @@ from tactile_bayes.mechanics.poses.taylor import (
     bending_at,
     cell_at,
     moved,
+    peak,
     rest_curvature_at,
+    rise,
 )
 from tactile_bayes.mechanics.rods.profile import Profile
 
@@ -87,7 +89,7 @@ def shape_along(
             state = before.state
             unloaded = State(state.psi, 0.0, state.u, state.v)
             before, acting, end = March(before.at, before.cell, unloaded, before.steps), 0.0, tip
-        step, march = advance(profile, before, FORWARD, end, acting, work)
+        step, march = advance(profile, before, FORWARD, end, acting, work, EXACT)
         for k in range(arclengths.size):
             if before.at < arclengths[k] <= march.at:
                 share = step.share * (arclengths[k] - before.at) / (march.at - before.at)
@@ -100,7 +102,7 @@ def rest_along(profile: Profile, stem: float, arclength: float, work: Floats) ->
     """Point of the rod at rest at an arc length."""
     march = begin(profile, 0.0, FORWARD, State(0.0, 0.0, stem, 0.0))
     while march.at < arclength:
-        _, march = advance(profile, march, FORWARD, arclength, 0.0, work)
+        _, march = advance(profile, march, FORWARD, arclength, 0.0, work, EXACT)
     return _chord(profile, march.at, march.state)
 
 
@@ -109,7 +111,7 @@ def beyond_along(profile: Profile, arclength: float, work: Floats) -> tuple[floa
     """Tip of the rod at rest, along the rod at an arc length, and to its left."""
     march = begin(profile, arclength, FORWARD, _AT_REST)
     while march.at < 1.0:
-        _, march = advance(profile, march, FORWARD, 1.0, 0.0, work)
+        _, march = advance(profile, march, FORWARD, 1.0, 0.0, work, EXACT)
     return march.state.u, march.state.v
 
 
@@ -123,7 +125,7 @@ def chord_along(profile: Profile, stem: float, distance: float, work: Floats) ->
     found, farthest, at = beginning, 0.0, 0.0
     while march.at < FARTHEST:
         before = march
-        step, march = advance(profile, before, FORWARD, FARTHEST, 0.0, work)
+        step, march = advance(profile, before, FORWARD, FARTHEST, 0.0, work, EXACT)
         x = rise(before.state, 0.0, step, 0.0, distance, work)
         reaches = x >= 0.0
         if not reaches:
