@@ -87,4 +87,5 @@ def rod_shape(
     if rods.stem:  # it moves where the rod begins; the pivot is before it
         x, y = x + rods.stem * np.cos(phi0)[:, None], y + rods.stem * np.sin(phi0)[:, None]
         x, y = (np.concatenate([np.zeros_like(of[:, :1]), of], axis=1) for of in (x, y))
-    return (sign[:, None] * x).reshape(*shape, -1), y.reshape(*shape, -1)
+    shape = (*shape, x.shape[1])
+    return (sign[:, None] * x).reshape(shape), y.reshape(shape)

@@ -14,7 +14,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, Found, arc_zeros
 from tactile_bayes.mechanics.poses.arc import SHORT_COSINE, arc_at
-from tactile_bayes.mechanics.poses.beam import Beam, Varied, end_of_arc, lever_of_stem, mirrored_by
+from tactile_bayes.mechanics.poses.beam import Beam, Varied, by_kind, end_of_arc, lever_of_stem, mirrored_by
 from tactile_bayes.mechanics.poses.pose import pose
 from tactile_bayes.mechanics.poses.profile_shape import shape_along
 from tactile_bayes.mechanics.poses.taylor import EXACT, FARTHEST, FORWARD, State, advance, begin, moved, rise
@@ -91,36 +91,31 @@ def _zeros_along(
     return rising, falling
 
 
-@compiled
-def contact_pair(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> tuple[Found, Found]:
+@by_kind
+def contact_pair(
+    varied: Varied | None, beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float
+) -> tuple[Found, Found]:
     """Points of any rod that may be its contact: the moment rises through zero at the first, and falls at the second.
 
     A contact along the rod is of the first kind, and so is that of a tip, unless it is turned beyond the normal of the
     contour. Straight, uniform rods are past snap-off when they are bent both ways: they have the first kind only.
     """
     h = beam.stem
-    if h == 0.0:
-        return _contact_pair(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
-    moment -= lever_of_stem(h, phi0, fx, fy)
-    rising, falling = _contact_pair(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
-    return _on_stem(h, phi0, rising), _on_stem(h, phi0, falling)
+    if h != 0.0:
+        moment -= lever_of_stem(h, phi0, fx, fy)
+    if varied is not None:
+        rising, falling = _zeros_along(varied.profile, phi0, moment, fx, fy, delta, varied.work)
+    elif beam.curvature == 0.0:
+        rising, falling = contact(phi0, moment, fx, fy, delta), NO_CONTACT
+    else:
+        rising, falling = arc_zeros(phi0, moment, fx, fy, delta, beam.curvature)
+    return (rising, falling) if h == 0.0 else (_on_stem(h, phi0, rising), _on_stem(h, phi0, falling))
 
 
 @compiled
 def _on_stem(stem: float, phi0: float, found: Found) -> Found:
     x, y, slope_angle, arclength, tip_angle, modulus = found
     return Found(x + stem * math.cos(phi0), y + stem * math.sin(phi0), slope_angle, arclength, tip_angle, modulus)
-
-
-@compiled
-def _contact_pair(
-    varied: Varied | None, curvature: float, phi0: float, moment: float, fx: float, fy: float, delta: float
-) -> tuple[Found, Found]:
-    if varied is None:
-        if curvature == 0.0:
-            return contact(phi0, moment, fx, fy, delta), NO_CONTACT
-        return arc_zeros(phi0, moment, fx, fy, delta, curvature)
-    return _zeros_along(varied.profile, phi0, moment, fx, fy, delta, varied.work)
 
 
 @compiled
@@ -195,10 +190,10 @@ def write_shapes(
         if math.isnan(end):
             x[i], y[i] = math.nan, math.nan
         else:
-            _write_shape(beam.varied, beam, phi0, moment, fx, fy, psi1, end, arclengths, x[i], y[i])
+            _write_shape(beam, phi0, moment, fx, fy, psi1, end, arclengths, x[i], y[i])
 
 
-@compiled
+@by_kind
 def _write_shape(
     varied: Varied | None,
     beam: Beam,

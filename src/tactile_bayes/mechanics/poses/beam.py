@@ -1,7 +1,7 @@
 """A rod as the forward model sees it: its pose under a force, and its shape at rest.
 
 Uniform rods of constant rest curvature have closed forms (`pose`); all others are integrated (`taylor`). Functions are
-compiled for each of the two kinds (`_by_kind`).
+compiled for each of the two kinds (`by_kind`).
 
 A rigid, straight stem may lie between pivot and rod. It continues the rod beyond its base, in the direction ψ0 that the
 rod has there, so that with its length h
@@ -52,6 +52,7 @@ __all__ = [
     "beam_of",
     "beam_pose",
     "bending",
+    "by_kind",
     "chord_to",
     "end_of_arc",
     "free_end",
@@ -117,12 +118,12 @@ Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
 
 
-def _by_kind(
+def by_kind(
     function: Callable[Concatenate[Varied | None, Beam, Rest], Result],
 ) -> Callable[Concatenate[Beam, Rest], Result]:
     """Compile a function of `beam.varied`, the beam and more as one of the beam and more.
 
-    numba leaves out what an `is None` excludes if an argument is None, and not if a field of one is.
+    numba leaves out what an `is None` excludes of an argument, and not of its field.
     """
     part: Any = inlined(function)
 
@@ -162,7 +163,7 @@ def beam_of(curvature: float, varied: Varied | None, stem: float) -> Beam:
     return Beam(0.0, reach, most_rest_curvature(varied.profile), varied, stem, own)
 
 
-@_by_kind
+@by_kind
 def mirrored_beam(varied: Varied | None, beam: Beam) -> Beam:
     """Rod in the frame of the opposite sweep."""
     if varied is None:
@@ -180,7 +181,7 @@ def with_sign(varied: Varied, sign: float) -> Varied:
     return Varied(turned, work, own, slenderness, own_sign, other, other_slenderness)
 
 
-@_by_kind
+@by_kind
 def rubbed_otherwise(varied: Varied | None, beam: Beam) -> Beam:
     """Rod with the coefficients for friction that acts in the other sense: they hold for one angle of friction."""
     if varied is None:
@@ -190,7 +191,7 @@ def rubbed_otherwise(varied: Varied | None, beam: Beam) -> Beam:
     return Beam(beam.curvature, beam.reach, beam.most_curvature, rubbed, beam.stem, beam.own_reach)
 
 
-@_by_kind
+@by_kind
 def beam_pose(
     varied: Varied | None, beam: Beam, psi1: float, arclength: float, force: float, tip: bool
 ) -> tuple[Pose, Pose, Pose]:
@@ -223,7 +224,7 @@ def _pose(
     return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work)
 
 
-@_by_kind
+@by_kind
 def whole_pose(
     varied: Varied | None, beam: Beam, psi1: float, arclength: float, force: float
 ) -> tuple[Pose, Pose, Pose, Pose]:
@@ -252,7 +253,7 @@ def lever_of_stem(stem: float, drive_angle: float, force_x: float, force_y: floa
     return stem * (force_y * math.cos(drive_angle) - force_x * math.sin(drive_angle))
 
 
-@_by_kind
+@by_kind
 def is_far_from_table(varied: Varied | None, beam: Beam, arclength: float, force: float) -> bool:
     """True if a force is far beyond those of a table: the search for an equilibrium has gone astray."""
     if varied is None:
@@ -260,7 +261,7 @@ def is_far_from_table(varied: Varied | None, beam: Beam, arclength: float, force
     return varied.slenderness > 0.0 and is_far(varied.slenderness, varied.profile.taper, arclength, force)
 
 
-@_by_kind
+@by_kind
 def chord_to(varied: Varied | None, beam: Beam, distance: float) -> Chord:
     """Chord of the rod at rest to its first point at a distance from the pivot."""
     if beam.stem == 0.0:
@@ -328,7 +329,7 @@ def _chord(varied: Varied | None, beam: Beam, distance: float) -> Chord:
     return _to_chord(found.arclength, found.bearing, found.slope, found.curvature, distance)
 
 
-@_by_kind
+@by_kind
 def bending(
     varied: Varied | None,
     beam: Beam,
@@ -357,7 +358,7 @@ def bending(
     return max(abs(moment), beam.curvature + bent)
 
 
-@_by_kind
+@by_kind
 def rest_curvature(varied: Varied | None, beam: Beam, arclength: float) -> float:
     """Rest curvature at an arc length [1/L]."""
     if varied is None:
@@ -371,7 +372,7 @@ def is_straight(beam: Beam) -> bool:
     return beam.varied is None and beam.curvature == 0.0
 
 
-@_by_kind
+@by_kind
 def free_end(varied: Varied | None, beam: Beam, arclength: float) -> tuple[float, float]:
     """Tip of the free end beyond a contact, along the rod there and to its left [L]."""
     if varied is None:
@@ -387,7 +388,7 @@ def end_of_arc(curvature: float, length: float) -> tuple[float, float]:
     return chord * math.cos(turn), chord * math.sin(turn)
 
 
-@_by_kind
+@by_kind
 def rest_point(varied: Varied | None, beam: Beam, way: float) -> tuple[float, float]:
     """Point of stem or rod at rest at a way along them from the pivot: along the stem, and to its left [L]."""
     if way <= beam.stem:
@@ -399,7 +400,7 @@ def rest_point(varied: Varied | None, beam: Beam, way: float) -> tuple[float, fl
     return found.distance * math.cos(found.bearing), found.distance * math.sin(found.bearing)
 
 
-@_by_kind
+@by_kind
 def from_tip(varied: Varied | None, beam: Beam, psi1: float) -> March:
     """Start of a walk along a rod in tip contact; see `loaded_part`."""
     if varied is None:
@@ -407,7 +408,7 @@ def from_tip(varied: Varied | None, beam: Beam, psi1: float) -> March:
     return at_contact(varied.profile, psi1, 1.0)
 
 
-@_by_kind
+@by_kind
 def loaded_part(varied: Varied | None, beam: Beam, psi1: float, force: float, part: int, before: March) -> March:
     """End of one of the `PARTS` of a rod in tip contact, counted from the tip, as seen from there as in `pose`.
 

@@ -57,9 +57,6 @@ class Chord(NamedTuple):
     """Rest curvature there [1/L]."""
 
 
-_AT_REST = State(0.0, 0.0, 0.0, 0.0)
-
-
 @compiled
 def shape_along(
     profile: Profile,
@@ -100,26 +97,29 @@ def shape_along(
 @compiled
 def rest_along(profile: Profile, stem: float, arclength: float, work: Floats) -> Chord:
     """Point of the rod at rest at an arc length."""
-    march = begin(profile, 0.0, FORWARD, State(0.0, 0.0, stem, 0.0))
-    while march.at < arclength:
-        _, march = advance(profile, march, FORWARD, arclength, 0.0, work, EXACT)
+    march = _at_rest(profile, begin(profile, 0.0, FORWARD, State(0.0, 0.0, stem, 0.0)), arclength, work)
     return _chord(profile, march.at, march.state)
 
 
 @compiled
 def beyond_along(profile: Profile, arclength: float, work: Floats) -> tuple[float, float]:
     """Tip of the rod at rest, along the rod at an arc length, and to its left."""
-    march = begin(profile, arclength, FORWARD, _AT_REST)
-    while march.at < 1.0:
-        _, march = advance(profile, march, FORWARD, 1.0, 0.0, work, EXACT)
-    return march.state.u, march.state.v
+    end = _at_rest(profile, begin(profile, arclength, FORWARD, State(0.0, 0.0, 0.0, 0.0)), 1.0, work).state
+    return end.u, end.v
+
+
+@compiled
+def _at_rest(profile: Profile, march: March, until: float, work: Floats) -> March:
+    while march.at < until:
+        _, march = advance(profile, march, FORWARD, until, 0.0, work, EXACT)
+    return march
 
 
 @compiled
 def chord_along(profile: Profile, stem: float, distance: float, work: Floats) -> Chord:
     """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
 
-    The rod is continued beyond its tip as in `zeros_along`."""
+    The rod is continued beyond its tip as in `contacts.states`."""
     beginning = State(0.0, 0.0, stem, 0.0)
     march = begin(profile, 0.0, FORWARD, beginning)
     found, farthest, at = beginning, 0.0, 0.0
