@@ -239,11 +239,11 @@ def _deviation(found: Found, sample: _Sample, noisy: bool, room: Room, which: in
         z, errors, shifts = room.z, room.errors, room.shifts[which]
         z[0, 0], z[0, 1] = math.hypot(sample.force_x, sample.force_y), turn - sample.friction_angle
         z[0, 2], z[0, 3] = found.arclength, sample.drive_angle
-        bend = contact_state(z, 0, sample.beam, room.by)
+        pose = contact_state(z, 0, sample.beam, room.by)
         length_variance, turn_variance = 0.0, 0.0
         for k in range(4):
             error = errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3]
-            shift = moved(z, 0, sample.beam, bend, room.by, *error)
+            shift = moved(z, 0, pose, room.by, *error)
             for p in range(5):
                 shifts[k, p] = shift[p]
             length_variance += shift[3] * shift[3]

@@ -49,6 +49,7 @@ __all__ = [
     "Beam",
     "Chord",
     "Varied",
+    "WholePose",
     "beam_of",
     "beam_pose",
     "bending",
@@ -63,7 +64,6 @@ __all__ = [
     "loaded_part",
     "mirrored_beam",
     "mirrored_by",
-    "moved_by_stem",
     "rest_curvature",
     "rest_point",
     "rubbed_otherwise",
@@ -71,7 +71,6 @@ __all__ = [
     "varied_of",
     "whole_pose",
     "with_sign",
-    "with_stem",
 ]
 
 PARTS = 8
@@ -202,9 +201,9 @@ def beam_pose(
     psi0, h = psi1 + here.turn, beam.stem
     by_psi0 = by_q.turn + 1.0 if tip else by_q.turn
     return (
-        with_stem(h, psi0, here),
-        moved_by_stem(h, psi0, by_q, by_psi0),
-        moved_by_stem(h, psi0, by_force, by_force.turn),
+        _with_stem(h, psi0, here),
+        _moved_by_stem(h, psi0, by_q, by_psi0),
+        _moved_by_stem(h, psi0, by_force, by_force.turn),
     )
 
 
@@ -224,25 +223,42 @@ def _pose(
     return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work)
 
 
+class WholePose(NamedTuple):
+    """Pose, and its derivatives by all its variables; NaN where there is none."""
+
+    here: Pose
+    by_psi1: Pose
+    by_arclength: Pose
+    by_force: Pose
+
+
 @by_kind
-def whole_pose(
-    varied: Varied | None, beam: Beam, psi1: float, arclength: float, force: float
-) -> tuple[Pose, Pose, Pose, Pose]:
-    """Pose as seen from where the rod begins, and its derivatives by ψ1, by the arc length and by the force."""
+def whole_pose(varied: Varied | None, beam: Beam, psi1: float, arclength: float, force: float) -> WholePose:
+    """Pose and derivatives without a table; see `beam_pose`."""
     if varied is None:
         here, by_psi1, by_force = pose_and_slopes(psi1, arclength, force, beam.curvature, True)
-        return here, by_psi1, by_arclength(psi1, force, beam.curvature, here), by_force
-    return pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
+        longer = by_arclength(psi1, force, beam.curvature, here)
+    else:
+        here, by_psi1, longer, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
+    if beam.stem == 0.0:
+        return WholePose(here, by_psi1, longer, by_force)
+    psi0, h = psi1 + here.turn, beam.stem
+    return WholePose(
+        _with_stem(h, psi0, here),
+        _moved_by_stem(h, psi0, by_psi1, 1.0 + by_psi1.turn),
+        _moved_by_stem(h, psi0, longer, longer.turn),
+        _moved_by_stem(h, psi0, by_force, by_force.turn),
+    )
 
 
 @compiled
-def with_stem(stem: float, psi0: float, here: Pose) -> Pose:
+def _with_stem(stem: float, psi0: float, here: Pose) -> Pose:
     """Pose as seen from the pivot, from that seen from where the rod begins."""
     return Pose(here.u + stem * math.cos(psi0), here.v + stem * math.sin(psi0), here.turn)
 
 
 @compiled
-def moved_by_stem(stem: float, psi0: float, by: Pose, by_psi0: float) -> Pose:
+def _moved_by_stem(stem: float, psi0: float, by: Pose, by_psi0: float) -> Pose:
     """Derivative of such a pose, from that without the stem and that of ψ0."""
     return Pose(by.u - stem * math.sin(psi0) * by_psi0, by.v + stem * math.cos(psi0) * by_psi0, by.turn)
 

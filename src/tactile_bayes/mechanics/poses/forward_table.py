@@ -162,20 +162,16 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
     forces = SCALE * np.expm1(span * loading)
     tip, tangential = np.empty((2, *outer[:2], rows, TERMS, 3)), np.empty((2, *outer, 2, rows, TERMS, 3))
     chord, distances = np.empty((2, outer[1], 3, TERMS)), chebyshev.nodes(TERMS)
-    psi1, at_tip = low + (high - low) * ways, np.ones(rows)
+    psi1 = low + (high - low) * ways
     rods = list(product(enumerate((1.0, -1.0)), enumerate(bends), enumerate(tapers)))
 
     def write(part: slice) -> None:
         work = workspace()
         for (i, sign), (b, bend), (a, taper) in rods[part]:
-            rod = profile._replace(taper=taper, bend=bend, sign=sign)
-            _write_poses(rod, psi1, at_tip, forces, slenderness, work, tip[i, a, b])
-            for (d, delta), k in product(enumerate(deltas), range(2)):
-                lengths, out = (1.0 + BEYOND * (1.0 - taper) * ways if k else ways), tangential[i, a, b, d, k]
-                _write_poses(rod, -delta * at_tip, lengths, forces, slenderness, work, out)
-                out[..., :2] /= lengths[:, None, None]
-            if a == 0:  # the rod at rest does not depend on the taper
-                _write_chords(rod, distances, work, chord[i, b])
+            rod, out = profile._replace(taper=taper, bend=bend, sign=sign), (tip[i, a, b], tangential[i, a, b])
+            # The rod at rest does not depend on the taper.
+            known = psi1, ways, deltas, forces, slenderness, distances[: 0 if a else TERMS]
+            _write_rod(rod, *known, work, *out, chord[i, b])
 
     in_parts(write, len(rods), 1)
     felt = np.where(forces > 0.0, forces < _THRUST, _AT_ONSET)[:, None]
@@ -225,28 +221,42 @@ def _slenderness(profile: Profile) -> float:
 
 
 @cached
-def _write_poses(
-    profile: Profile,
+def _write_rod(
+    rod: Profile,
     psi1: Floats,
-    arclengths: Floats,
+    ways: Floats,
+    deltas: Floats,
     forces: Floats,
     slenderness: float,
+    distances: Floats,
     work: Floats,
-    out: Floats,
+    tip: Floats,
+    tangential: Floats,
+    chord: Floats,
 ) -> None:
-    for i in range(psi1.size):
-        length = length_of(slenderness, profile.taper, arclengths[i])[0]
-        for k in range(forces.size):
-            here = pose_along(profile, psi1[i], arclengths[i], forces[k] / (length * length), work)
-            out[i, k, 0], out[i, k, 1], out[i, k, 2] = here.u, here.v, here.turn
-
-
-@cached
-def _write_chords(profile: Profile, distances: Floats, work: Floats, out: Floats) -> None:
-    reach = rest_along(profile, 0.0, 1.0, work).distance
+    """Write the poses of a rod in tip contact, in tangential contact up to the tip and beyond it, and its shape at
+    rest."""
+    for i in range(ways.size):
+        _write_row(rod, psi1[i], 1.0, forces, slenderness, work, tip[i])
+        for d in range(deltas.size):
+            for k in range(2):
+                arclength = 1.0 + BEYOND * (1.0 - rod.taper) * ways[i] if k else ways[i]
+                _write_row(rod, -deltas[d], arclength, forces, slenderness, work, tangential[d, k, i])
+    reach = rest_along(rod, 0.0, 1.0, work).distance
     for k in range(distances.size):
-        found = chord_along(profile, 0.0, distances[k] * reach, work)
-        out[0, k], out[1, k], out[2, k] = found.arclength, found.bearing, found.slope
+        found = chord_along(rod, 0.0, distances[k] * reach, work)
+        chord[0, k], chord[1, k], chord[2, k] = found.arclength, found.bearing, found.slope
+
+
+@compiled
+def _write_row(
+    rod: Profile, psi1: float, arclength: float, forces: Floats, slenderness: float, work: Floats, out: Floats
+) -> None:
+    """Write poses under forces, u and v over the arc length."""
+    length = length_of(slenderness, rod.taper, arclength)[0]
+    for k in range(forces.size):
+        here = pose_along(rod, psi1, arclength, forces[k] / (length * length), work)
+        out[k, 0], out[k, 1], out[k, 2] = here.u / arclength, here.v / arclength, here.turn
 
 
 @compiled

@@ -20,11 +20,11 @@ from tactile_bayes.mechanics.poses.taylor import (
     State,
     advance,
     begin,
-    bending_at,
     cell_at,
     moved,
     peak,
     rest_curvature_at,
+    rigidity_in,
     rise,
 )
 from tactile_bayes.mechanics.rods.profile import Profile
@@ -164,6 +164,6 @@ def largest_bending_along(
         count = 2 + int(_SAMPLES * step.share * step.length)
         for k in range(count):
             x = step.share * k / (count - 1)
-            bending, _ = bending_at(step, moved(before.state, force, step, x, work).load, x, work)
+            bending = moved(before.state, force, step, x, work).load / rigidity_in(step, x, work)
             strain = max(strain, abs(bending) * (1.0 - profile.taper * (before.at + x * step.length)))
     return math.nan if math.isnan(march.state.psi) else strain

@@ -42,12 +42,12 @@ __all__ = [
     "Step",
     "advance",
     "begin",
-    "bending_at",
     "cell_at",
     "most_rest_curvature",
     "moved",
     "peak",
     "rest_curvature_at",
+    "rigidity_in",
     "rise",
     "slopes_moved",
     "workspace",
@@ -340,12 +340,12 @@ def advance(
 
 
 @compiled
-def bending_at(step: Step, load: float, x: float, work: Floats) -> tuple[float, float]:
-    """Curvature less the rest curvature at a point of a step, and the rigidity there."""
+def rigidity_in(step: Step, x: float, work: Floats) -> float:
+    """Rigidity at a point of a step."""
     rigidity = 0.0
     for n in range(step.rigid - 1, -1, -1):
         rigidity = rigidity * x + work[n, _RIGIDITY]
-    return load / rigidity, rigidity
+    return rigidity
 
 
 @compiled
