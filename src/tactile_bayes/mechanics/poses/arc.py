@@ -36,6 +36,7 @@ __all__ = [
     "chord_deficit_rate",
     "chord_direction",
     "chord_direction_rate",
+    "slopes_by_chi",
 ]
 
 SHORT_COSINE = math.cos(1.0)
@@ -107,6 +108,12 @@ def arc_to(chi: float, m: float) -> tuple[Arc, Arc]:
     """Arc to the amplitude χ ∈ [0, 3π/2) for the parameter m ∈ (0, 1), and its derivatives by χ."""
     at = _amplitude(chi, m)
     return _arc(at), _by_chi(at)
+
+
+@compiled
+def slopes_by_chi(chi: float, m: float) -> Arc:
+    """Derivatives of the arc by χ alone; see `arc_to`."""
+    return _by_chi(_amplitude(chi, m))
 
 
 @compiled

@@ -17,6 +17,7 @@ from tactile_bayes.mechanics.poses.arc import (
     chord_deficit_rate,
     chord_direction,
     chord_direction_rate,
+    slopes_by_chi,
 )
 
 __all__ = ["NO_ARC", "tangential_arc", "tip_arc"]
@@ -47,8 +48,15 @@ def tangential_arc(angle: float, m: float, guess: float) -> tuple[float, Arc, Ar
             root = math.sqrt(chord_direction(arc))
             step = (root - target) * 2.0 * root / chord_direction_rate(arc, by_chi)
         if abs(step) <= _SETTLED * x:
-            arc, by_chi = arc_to(x - step, m)
-            return x - step, arc, by_chi
+            # To first order, which leaves rounding errors only, and costs less than another arc.
+            length, shortfall, offset, turn = arc
+            moved = Arc(
+                length - by_chi.length * step,
+                shortfall - by_chi.shortfall * step,
+                offset - by_chi.offset * step,
+                turn - by_chi.turn * step,
+            )
+            return x - step, moved, slopes_by_chi(x - step, m)
         x = min(max(x - step, 0.5 * x), math.pi)
     return math.nan, NO_ARC, NO_ARC
 

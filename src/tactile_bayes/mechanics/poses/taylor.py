@@ -226,6 +226,19 @@ def _size(work: Floats, n: int, length: float, quotient: int) -> float:
 
 
 @compiled
+def _write_start(start: State, by_q: Slope | None, other: Slope | None, by_force: Slope | None, work: Floats) -> None:
+    """Write the first terms of series."""
+    work[0, _SIN], work[0, _COS], work[0, _PSI] = math.sin(start.psi), math.cos(start.psi), start.psi
+    work[0, _U], work[0, _V] = start.u, start.v
+    if by_q is not None:
+        work[0, _PSI_Q], work[0, _U_Q] = by_q.psi, by_q.u
+    if other is not None:
+        work[0, _PSI_O], work[0, _U_O] = other.psi, other.u
+    if by_force is not None:
+        work[0, _PSI_F], work[0, _U_F], work[0, _V_F] = by_force.psi, by_force.u, by_force.v
+
+
+@compiled
 def series(
     profile: Profile,
     march: March,
@@ -245,14 +258,7 @@ def series(
     bent, rigid = _expand(profile, march.cell, march.at, direction, length, work)
     inverse, least, start = 1.0 / work[0, _RIGIDITY], max(bent, rigid, 3), march.state
     load, quotient, size, before = start.load, _QUOTIENT if by_force is None else _QUOTIENT_F, 0.0, 0.0
-    work[0, _SIN], work[0, _COS], work[0, _PSI] = math.sin(start.psi), math.cos(start.psi), start.psi
-    work[0, _U], work[0, _V] = start.u, start.v
-    if by_q is not None:
-        work[0, _PSI_Q], work[0, _U_Q] = by_q.psi, by_q.u
-    if other is not None:
-        work[0, _PSI_O], work[0, _U_O] = other.psi, other.u
-    if by_force is not None:
-        work[0, _PSI_F], work[0, _U_F], work[0, _V_F] = by_force.psi, by_force.u, by_force.v
+    _write_start(start, by_q, other, by_force, work)
     for n in range(_TERMS):
         rate = _divided(work, rigid, inverse, n, load, _QUOTIENT)
         if n < bent:
