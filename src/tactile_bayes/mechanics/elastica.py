@@ -298,8 +298,8 @@ def _states(
 
     `bent` is the rest curvature [1/L] of arcs, mirrored with them; of rods with a profile, the sign that mirrors it.
     """
-    from tactile_bayes.mechanics.contacts.states import continued_wrenches, wrenches
     from tactile_bayes.mechanics.contacts.tables import tables, workspace
+    from tactile_bayes.mechanics.contacts.wrenches import continued_wrenches, wrenches
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
     _refuse_friction(np.asarray(delta, dtype=float), 0.0 if profile is None else -MAX_FRICTION_ANGLE)
@@ -420,7 +420,9 @@ def forward_contacts(wrenches: Floats, rods: Rods) -> Floats:
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
     out = np.empty((len(wrenches), 6))
-    write_contacts(np.ascontiguousarray(wrenches), rods.curvature, varied_of(rods.profile), rods.stem, out)
+    write_contacts(
+        np.ascontiguousarray(wrenches), rods.curvature, varied_of(rods.profile), rods.stem, out, np.empty((0, 2, 2))
+    )
     return np.ascontiguousarray(out.T)
 
 

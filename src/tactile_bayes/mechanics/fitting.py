@@ -34,6 +34,9 @@ _OUTDONE = 2.0, 10.0
 _STARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Arc lengths to start from in tangential contact, and shares of the range of ψ1 in tip contact."""
 
+_ROUNDING, _BEYOND_ALL = 1e-15, 1e300
+"""Correlation that counts as zero, and the value that replaces a covariance that is not finite."""
+
 _LEAST_MOMENT = 0.1
 """Least moment of a start, in its standard deviations."""
 
@@ -53,27 +56,28 @@ def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike, has_no
     noisy = count if has_noise else 0
     (place, other), (tip_angle, deviation, other_deviation) = np.empty((2, count, 4)), np.empty((3, count))
     fit = RawFit(place, tip_angle, np.empty((noisy, 4, 4)), np.empty(noisy), deviation, other, other_deviation)
-    (matrix, axes), shifts = np.empty((2, 3, 3)), np.empty((2, 4, 5))
-    room = Room(np.empty((1, 4)), np.empty((4, 4)), shifts, matrix, axes, contact_workspace())
+    room = Room(np.empty((1, 4)), np.empty((4, 4)), np.empty((2, 4, 5)), contact_workspace())
     curvature, profile, stem = rods_of(rods, count)
-    if not has_noise:
-        reading = reading._replace(covariance=reading.covariance[:0])
-    raw_fits(plain(reading), np.array(delta), curvature, varied_of(profile), stem, fit, room)
+    axes = _principal_axes(reading.covariance[:noisy])
+    reading = plain(reading._replace(covariance=reading.covariance[:0]))
+    raw_fits(reading, axes, np.array(delta), curvature, varied_of(profile), stem, fit, room)
     return fit
 
 
-def fit_contacts(reading: Reading, friction_angle: Floats, rods: Rods | ArrayLike = 0.0) -> ContactFit:
-    """Find the most likely contacts of samples.
+def _principal_axes(covariance: Floats) -> Floats:
+    """Principal axes of covariances, one standard deviation long, in columns."""
+    matrix = np.where(np.isfinite(covariance), covariance, _BEYOND_ALL)
+    deviation = np.sqrt(np.abs(np.diagonal(matrix, axis1=1, axis2=2)))
+    matrix[np.abs(matrix) <= _ROUNDING * deviation[:, :, None] * deviation[:, None, :]] = 0.0
+    axes = deviation[:, :, None] * np.eye(3)
+    correlated = (matrix != 0.0).sum(axis=(1, 2)) > 3
+    variances, turned = np.linalg.eigh(matrix[correlated])
+    axes[correlated] = turned * np.sqrt(np.maximum(variances, 0.0))[:, None, :]
+    return axes
 
-    Parameters
-    ----------
-    reading : Reading
-        n samples.
-    friction_angle : ndarray, shape (n,)
-        Friction angle δ = arctan μ [rad].
-    rods : Rods or array_like, shape (n,)
-        Rods, or the rest curvatures of arcs, mirrored like the samples [1/L].
-    """
+
+def fit_contacts(reading: Reading, friction_angle: Floats, rods: Rods | ArrayLike = 0.0) -> ContactFit:
+    """Find the most likely contacts of samples, for rods, or rest curvatures of arcs that are mirrored like these."""
     size = reading.drive_angle.size
     each, blocks = rods_of(rods, size), []
     for begin in range(0, max(size, 1), _BLOCK):
@@ -139,17 +143,7 @@ def fit_sheet(
 ) -> SheetFit:
     """Find the best contact of one phase, beyond its edge too, or on the edge (None).
 
-    Parameters
-    ----------
-    reading : Reading
-        n samples.
-    delta : ndarray, shape (n,)
-        Friction angle δ = arctan μ [rad].
-    phase : TIP, TANGENTIAL or None
-    rods : Rods or array_like, shape (n,)
-        As in `fit_contacts`.
-    is_over : bool
-        Whether to start from a tip that is turned beyond the normal of the contour.
+    With `is_over` it starts from a tip that is turned beyond the normal of the contour.
     """
     descent = _Descent(_Target(reading, delta, rods_of(rods, delta.size)), phase, is_over)
     descent.go(np.arange(delta.size), _SETTLED, _MOST_STEPS)
@@ -273,10 +267,10 @@ def plain(reading: Reading) -> Reading:
 
 def contact_pairs(reading: Reading, moment: Floats, delta: Floats, rods: Rods) -> Floats:
     """Arc lengths and ψ1 of the two points at which a rod may touch by raw Step 2, shape (n, 2, 2)."""
-    from tactile_bayes.mechanics.contacts.states import write_contact_pairs
+    from tactile_bayes.mechanics.contacts.states import write_contacts
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
     wrenches = np.column_stack([reading.drive_angle, moment, reading.loads[:, 1:], delta])
     out = np.empty((delta.size, 2, 2))
-    write_contact_pairs(wrenches, rods.curvature, varied_of(rods.profile), rods.stem, out)
+    write_contacts(wrenches, rods.curvature, varied_of(rods.profile), rods.stem, np.empty((0, 6)), out)
     return out

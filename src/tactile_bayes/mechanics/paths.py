@@ -103,19 +103,10 @@ class Paths:
         return np.asarray(at[:, 2] + (travels - at[:, 6]) * at[:, 5])
 
     def observables(self, drive_angles: Floats) -> Floats:
-        """Holding moment and forces at given drive angles; zero out of contact.
+        """Holding moment [EI/L] and forces [EI/L²] in the laboratory frame, shape (n, k, 3); zero out of contact.
 
-        They are interpolated, with an error of some 1e-8 of the largest.
-
-        Parameters
-        ----------
-        drive_angles : ndarray, shape (k,) or (n, k)
-            Drive angles in the sweep frame [rad].
-
-        Returns
-        -------
-        ndarray, shape (n, k, 3)
-            Holding moment [EI/L] and forces [EI/L²], with the signs of the laboratory frame.
+        They are interpolated at drive angles in the sweep frame [rad], shape (k,) or (n, k), with an error of some 1e-8
+        of the largest.
         """
         sign = np.where(self.sweep_frame.mirrored[:, None, None], [-1.0, -1.0, 1.0], 1.0)
         return np.asarray(sign * self._swept(drive_angles).loads)
@@ -137,15 +128,7 @@ class Paths:
         return _as_states(found.states[index, rank])
 
     def loaded_states(self) -> tuple[Index, Index, States]:
-        """States in contact at the drive angles given to `trace`.
-
-        Returns
-        -------
-        index, sample : ndarray, shape (m,)
-            Indices of contour and sample.
-        states : States
-            Their states, shape (m,).
-        """
+        """Indices of contour and sample, and states, shape (m,), in contact at the drive angles given to `trace`."""
         index, sample = np.nonzero(self.sampled[..., 0] != NONE)
         return index, sample, _as_states(self.sampled[index, sample])
 
@@ -188,23 +171,17 @@ def trace(
 
     Parameters
     ----------
-    sweep_frame : SweepFrame
-        n contours.
-    friction_angle : float or array_like, shape (n,)
-        Friction angle δ = arctan μ [rad].
-    suspension_compliance : float or array_like, shape (n,)
-        Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)].
+    sweep_frame, friction_angle, suspension_compliance
+        n contours; friction angles δ = arctan μ [rad], and turns of the pivot's suspension per holding moment, c in
+        (drive angle) = φ0 + c m0 [rad/(EI/L)], for each or for all.
     profile : Profile, optional
         Rod whose rest curvature or rigidity varies along it; by default it is uniform and a circular arc at rest.
     tolerance : ndarray, shape (3,), optional
-        Tolerated errors of the loads [EI/L and EI/L²], for likelihoods, which is several times faster; at least 1e-10
-        of the loads. By default events are computed to rounding.
-    drive_angles : ndarray, shape (k,) or (n, k), optional
-        Drive angles of states, in the sweep frame [rad].
-    relative : bool
-        Whether they are shares of the drive angle from first contact to snap-off.
-    polished : bool
-        Whether states at drive angles are exact. Otherwise they come from the series, with an error of 1e-10 of the
+        Tolerated errors of the loads [EI/L and EI/L²], at least 1e-10 of them, for likelihoods, which is several times
+        faster. By default events are computed to rounding.
+    drive_angles, relative, polished
+        Drive angles of states in the sweep frame [rad], shape (k,) or (n, k), or their shares of those from first
+        contact to snap-off. Unless they are polished, states come from the series, with an error of 1e-10 of the
         largest and without derivatives, in a third of the time.
     lines : ndarray, shape (1 or n, lines, columns), optional
         Lines of drives that carry the base, in the sweep frame from the first pose of each, as in `lines_through`; NaN
@@ -245,27 +222,11 @@ def trace(
 def _sweeps_of(sweep_frame: SweepFrame, friction_angle: ArrayLike, compliance: ArrayLike) -> Sweeps:
     """One sweep along each contour, with loads in EI/L and EI/L²."""
     count, every = sweep_frame.size, np.arange(sweep_frame.size)
-    return Sweeps(
-        contour=every,
-        segment=every,
-        base_x=_each(sweep_frame.base_x, count),
-        base_y=_each(sweep_frame.base_y, count),
-        length=_each(sweep_frame.length, count),
-        standoff=_each(sweep_frame.standoff, count),
-        backward=np.ascontiguousarray(sweep_frame.mirrored),
-        friction_angle=_each(friction_angle, count),
-        compliance=_each(compliance, count),
-        rest_curvature=_each(sweep_frame.rest_curvature, count),
-        taper=_each(sweep_frame.taper, count),
-        stem=_each(sweep_frame.stem, count),
-        offset=np.zeros(count),
-        rigidity=np.ones(count),
-        relative_length=np.ones(count),
-    )
-
-
-def _each(values: Any, count: int) -> Floats:
-    return np.array(np.broadcast_to(values, (count,)), dtype=float)
+    values = {name: getattr(sweep_frame, name) for name in ("base_x", "base_y", "length", "standoff", "taper", "stem")}
+    values |= {"rest_curvature": sweep_frame.rest_curvature, "friction_angle": friction_angle, "compliance": compliance}
+    values |= {"offset": 0.0, "rigidity": 1.0, "relative_length": 1.0}
+    each: dict[str, Any] = {name: np.array(np.broadcast_to(of, (count,)), dtype=float) for name, of in values.items()}
+    return Sweeps(contour=every, segment=every, backward=np.ascontiguousarray(sweep_frame.mirrored), **each)
 
 
 def _swept(

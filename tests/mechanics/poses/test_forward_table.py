@@ -7,16 +7,13 @@ import pytest
 
 from helpers.profiled_rods import drawn_rods
 from tactile_bayes.mechanics.compiler import cached
-from tactile_bayes.mechanics.poses import beam, forward_table, profile_pose, taylor
-from tactile_bayes.mechanics.poses.forward_table import NO_TABLE, PARTS, Box
+from tactile_bayes.mechanics.poses import beam, forward_table, taylor
+from tactile_bayes.mechanics.poses.forward_table import NO_TABLE, Box
 from tactile_bayes.mechanics.poses.forward_table import forward_table as tabulated
 from tactile_bayes.mechanics.rods.profile import profile_of
-from tactile_bayes.mechanics.rods.rod import Rod
 
 _beam_of, _beam_pose, _chord_to, _prepare = beam.beam_of, beam.beam_pose, beam.chord_to, forward_table.prepare
 _Varied, _mirrored_beam = beam.Varied, beam.mirrored_beam
-_write_parts, _part_in, _has_parts = forward_table._write_parts, forward_table.part_in, forward_table.has_parts
-_State, _at_contact, _part_along = taylor.State, profile_pose.at_contact, profile_pose.part_along
 
 RODS = {name: drawn_rods()[name].profile for name in ("uniform", "half cone", "cone", "parabolic")}
 
@@ -189,36 +186,3 @@ def test_strong_friction_of_a_hooked_rod_needs_a_small_range_of_the_force():
         assert held
         before = exact[:, 0, 0] >= 0.0
         assert np.abs(found - exact)[before, 0].max() < 1e-5
-
-
-@cached
-def _write_distances(profile, psi1, forces, sheet, work, out):
-    """Distances of the ends of parts from those of the exact walk; NaN where parts do not hold."""
-    _write_parts(profile, sheet)
-    for i in range(psi1.size):
-        state, march = _State(psi1[i], 0.0, 0.0, 0.0), _at_contact(profile, psi1[i], 1.0)
-        for part in range(1, PARTS):
-            state = _part_in(sheet, psi1[i], forces[i], part, state)
-            march = _part_along(profile, march, 1.0 - part / PARTS, forces[i], work)
-            apart = np.hypot(state.u - march.state.u, state.v - march.state.v)
-            out[i, part] = apart if _has_parts(sheet, forces[i]) and march.state.u >= 0.0 else np.nan
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize(
-    "rod",
-    [
-        Rod(rest_curvature=lambda s: 1.5 + 1.5 * np.tanh((s - 0.65) / 0.2)),
-        Rod(rest_curvature=0.8, taper=0.5),
-        Rod(rest_curvature=0.8, taper=0.8),
-    ],
-    ids=["bent", "cone", "sharp cone"],
-)
-def test_parts_of_a_rod_in_tip_contact_lie_where_it_is(rod, sign):
-    """Under forces of all sizes for which they hold, with the moment of a push."""
-    rng, profile, out = np.random.default_rng(1), rod.as_profile()._replace(sign=sign), np.zeros((2000, PARTS))
-    forces = 10.0 ** rng.uniform(-4.0, 2.0, 2000)
-    _write_distances(profile, rng.uniform(-0.3, 1.4, 2000), forces, forward_table.sheet(), taylor.workspace(), out)
-    holds = np.isfinite(out).all(axis=1)
-    assert np.count_nonzero(holds) > 500
-    assert out[holds].max() < 4e-4

@@ -15,8 +15,7 @@ from tactile_bayes.mechanics.branches.outline import Place, beside, is_inside
 from tactile_bayes.mechanics.branches.phase import on_rod, sliding
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.poses.beam import free_end, from_tip, loaded_part, rest_curvature
-from tactile_bayes.mechanics.poses.forward_table import PARTS
+from tactile_bayes.mechanics.poses.beam import PARTS, free_end, from_tip, loaded_part, rest_curvature
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
 __all__ = ["NOT_SLIPPING", "ruled_out", "slip"]

@@ -179,22 +179,20 @@ def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, 
 
 @compiled
 def arc_zeros(phi0: float, moment: float, fx: float, fy: float, delta: float, curvature: float) -> tuple[Found, Found]:
-    """Points at which the moment first rises and first falls through zero; see `zeros_along`."""
+    """Points at which the moment first rises and first falls through zero; see `states.contact_pair`."""
     rising = arc_contact(phi0, moment, fx, fy, delta, curvature)
     if moment > 0.0:
-        return rising, _mirrored_beyond(rising, fx, fy, curvature)
-    falling = arc_contact(math.pi - phi0, -moment, -fx, fy, -delta, -curvature)
-    falling = Found(
-        -falling.x,
-        falling.y,
-        -falling.slope_angle,
-        falling.arclength,
-        math.pi - falling.tip_angle,
-        falling.modulus,
-    )
+        return rising, _mirrored(_beyond(_mirrored(rising), -fx, fy, -curvature))
+    falling = _mirrored(arc_contact(math.pi - phi0, -moment, -fx, fy, -delta, -curvature))
     if math.isnan(rising.arclength):
         rising = _beyond(falling, fx, fy, curvature)
     return rising, falling
+
+
+@compiled
+def _mirrored(found: Found) -> Found:
+    x, y, slope_angle, arclength, tip_angle, modulus = found
+    return Found(-x, y, -slope_angle, arclength, math.pi - tip_angle, modulus)
 
 
 @compiled
@@ -204,11 +202,3 @@ def _beyond(zero: Found, fx: float, fy: float, curvature: float) -> Found:
         return NO_CONTACT
     x, y, _, arclength, tip_angle, modulus = arc_contact(zero.tip_angle, 0.0, fx, fy, 0.0, curvature)
     return Found(zero.x + x, zero.y + y, zero.slope_angle, zero.arclength + arclength, tip_angle, modulus)
-
-
-@compiled
-def _mirrored_beyond(zero: Found, fx: float, fy: float, curvature: float) -> Found:
-    """Point at which the moment falls through zero, beyond one at which it rises."""
-    mirrored = Found(-zero.x, zero.y, -zero.slope_angle, zero.arclength, math.pi - zero.tip_angle, zero.modulus)
-    x, y, slope_angle, arclength, tip_angle, modulus = _beyond(mirrored, -fx, fy, -curvature)
-    return Found(-x, y, -slope_angle, arclength, math.pi - tip_angle, modulus)

@@ -65,21 +65,10 @@ class ContactStateSlopes(NamedTuple):
 def contact_states(
     coordinates: Floats, friction_angle: Floats | float = 0.0, rods: Rods | ArrayLike = 0.0
 ) -> ContactStates:
-    """Base wrench and place of contacts with given coordinates.
+    """Base wrench and place of contacts with given coordinates, in rows: contact force f > 0 [EI/L²], ψ1 ∈ (−π/2, π/2)
+    [rad], arc length s1 > 0 [L], and slope φ0 at the pivot [rad]; for rods, or rest curvatures of arcs.
 
-    Parameters
-    ----------
-    coordinates : ndarray, shape (n, 4)
-        Contact force f > 0 [EI/L²], ψ1 ∈ (−π/2, π/2) [rad], arc length s1 > 0 [L], and slope φ0 at the pivot [rad].
-    friction_angle : ndarray, shape (n,), or float
-        Friction angle δ = arctan μ [rad].
-    rods : Rods or array_like, shape (n,)
-        Rods, or the rest curvatures κ0 of arcs, mirrored like the contacts [1/L].
-
-    Examples
-    --------
-    >>> rod = contact_states(np.array([[2.0, 0.3, 1.0, 2.0]]))
-    >>> rod.place.round(4).ravel()
+    >>> contact_states(np.array([[2.0, 0.3, 1.0, 2.0]])).place.round(4).ravel()
     array([0.1457, 0.9536, 0.8156, 1.    ])
     """
     return _contact_states(coordinates, friction_angle, rods, 0)[0]
@@ -116,13 +105,7 @@ def contact_workspace() -> Floats:
 
 
 def place_by_wrench(coordinates: Floats, rods: Rods | ArrayLike = 0.0) -> Floats:
-    """Derivatives of `PLACE` by drive angle and loads, shape (n, 4, 4): those of Step 2, in closed form.
-
-    Examples
-    --------
-    >>> place_by_wrench(np.array([[2.0, 0.3, 0.9, 2.0]]))[0, 3].round(3)  # of the arc length
-    array([ 0.419,  0.361,  0.416, -0.031])
-    """
+    """Derivatives of `PLACE` by drive angle and loads, shape (n, 4, 4): those of Step 2, in closed form."""
     from tactile_bayes.mechanics.contacts.contact_map import wrench_slopes
     from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 

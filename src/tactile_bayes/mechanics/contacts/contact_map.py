@@ -8,20 +8,11 @@ u ≥ 0 of the contact force and |ψ1| < π/2, and other arcs are shorter than a
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.contacts.arc_states import MOST_LOAD
-from tactile_bayes.mechanics.poses.beam import (
-    Beam,
-    Varied,
-    lever_of_stem,
-    mirrored_by,
-    moved_by_stem,
-    whole_pose,
-    with_stem,
-)
+from tactile_bayes.mechanics.poses.beam import Beam, Varied, WholePose, mirrored_by, whole_pose
 from tactile_bayes.mechanics.poses.pose import Pose
 
 __all__ = ["contact_state", "moved", "wrench_slopes", "write_contact_states"]
@@ -34,13 +25,9 @@ _MOST_INTEGRATED = 1e3
 """Largest load f s1² of a rod that is integrated."""
 
 
-class Bend(NamedTuple):
-    """Pose of a contact, as seen from where the rod begins, and its derivatives; NaN where there is none."""
+_NONE = Pose(math.nan, math.nan, math.nan)
 
-    here: Pose
-    by_force: Pose
-    by_psi1: Pose
-    by_arclength: Pose
+_NOWHERE = WholePose(_NONE, _NONE, _NONE, _NONE)
 
 
 @compiled
@@ -70,17 +57,11 @@ def _column(bend: Pose, beta: float, growth: float, cos: float, sin: float, by: 
 
 
 @compiled
-def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> Bend:
-    """Write one contact, NaN if there is none.
+def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> WholePose:
+    """Write one contact, with the coordinates in row i of z, to `by`, shape (5, 6); NaN if there is none.
 
-    Parameters
-    ----------
-    z : ndarray, shape (n, 4)
-        Coordinates as in `contact_states`; row i is used.
-    beam : Beam
-    by : ndarray, shape (5, 6)
-        Result: moment and force at the base, contact point, and direction β of the force; then their derivatives by
-        each coordinate.
+    Its rows are moment and force at the base, contact point, and direction β of the force; then their derivatives by
+    each coordinate.
     """
     force, psi1, arclength, drive_angle = z[i, 0], z[i, 1], z[i, 2], z[i, 3]
     curvature, is_arc = beam.curvature, beam.varied is None
@@ -89,10 +70,9 @@ def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> Bend:
     if possible and load < (MOST_LOAD if is_arc else _MOST_INTEGRATED) and half * half < MOST_LOAD:
         if is_arc:
             possible = _is_first(half * half + load * math.sin(0.25 * math.pi - 0.5 * psi1) ** 2, load)
-        here, by_psi1, longer, by_force = whole_pose(beam, psi1, arclength, force)
-        if possible and (here.u >= 0.0 or not is_straight):
-            bend = Bend(here, by_force, by_psi1, longer)
-            here, by_force, by_psi1, longer = from_pivot(bend, psi1, beam.stem)
+        pose = whole_pose(beam, psi1, arclength, force)
+        here, by_psi1, longer, by_force = pose
+        if possible and (here.u >= beam.stem * math.cos(psi1 + here.turn) or not is_straight):
             beta = drive_angle - psi1 - here.turn
             cos, sin = math.cos(beta), math.sin(beta)
             x, y = here.u * cos - here.v * sin, here.u * sin + here.v * cos
@@ -103,35 +83,18 @@ def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> Bend:
             _column(longer, -longer.turn, 0.0, cos, sin, by, 3)
             by[1, 0], by[2, 0], by[3, 0] = here.u + force * by_force.u, force * by_psi1.u, force * longer.u
             by[4, 0], by[4, 1], by[4, 2], by[4, 3], by[4, 4], by[4, 5] = 0.0, -by[0, 2], by[0, 1], -y, x, 1.0
-            return bend
+            return pose
     for c in range(5):
         for k in range(6):
             by[c, k] = math.nan
-    nothing = Pose(math.nan, math.nan, math.nan)
-    return Bend(nothing, nothing, nothing, nothing)
-
-
-@compiled
-def from_pivot(bend: Bend, psi1: float, stem: float) -> Bend:
-    """Pose of a contact and its derivatives as seen from the pivot."""
-    if stem == 0.0:
-        return bend
-    here, by_force, by_psi1, by_arclength = bend
-    psi0 = psi1 + here.turn
-    return Bend(
-        with_stem(stem, psi0, here),
-        moved_by_stem(stem, psi0, by_force, by_force.turn),
-        moved_by_stem(stem, psi0, by_psi1, 1.0 + by_psi1.turn),
-        moved_by_stem(stem, psi0, by_arclength, by_arclength.turn),
-    )
+    return _NOWHERE
 
 
 @compiled
 def moved(
     z: Floats,
     i: int,
-    beam: Beam,
-    bend: Bend,
+    pose: WholePose,
     by: Floats,
     angle: float,
     moment: float,
@@ -140,34 +103,19 @@ def moved(
 ) -> tuple[float, float, float, float, float]:
     """Shift of the place and of ψ1, to first order, for changes of drive angle and loads: the derivatives of Step 2.
 
-    With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945) and the curvature κ = κ0 − m0 at the
-    pivot, sin ψ1 = sin ψ0 + (κ0² − κ²)/(2 f). The arc length follows from the changes of ψ0 and of the lever u = m0/f
-    that remain; each of them alone would be 0/0 in some rods. Rods that vary along their length have no first integral:
-    the changes of ψ0 and u together determine those of ψ1 and the arc length. Moments are those where the rod begins.
+    With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945) the changes of ψ0 and of the lever
+    u = m0/f determine those of ψ1 and the arc length.
     """
-    force, psi1 = z[i, 0], z[i, 1]
-    at_rod = by[0, 0]
-    if beam.stem != 0.0:
-        at_rod -= lever_of_stem(beam.stem, z[i, 3], by[0, 1], by[0, 2])
-        moment -= lever_of_stem(beam.stem, z[i, 3], fx, fy)
-        moment += angle * beam.stem * (by[0, 2] * math.sin(z[i, 3]) + by[0, 1] * math.cos(z[i, 3]))
-    here, by_force, by_psi1, longer = bend
+    force = z[i, 0]
+    here, by_psi1, longer, by_force = pose
     growth = (by[0, 1] * fx + by[0, 2] * fy) / (force * force)
     beta = (by[0, 1] * fy - by[0, 2] * fx) / (force * force)
-    psi0, df = angle - beta, growth * force
-    du = moment / force - here.u * growth
-    if beam.varied is None:
-        curvature = beam.curvature
-        at_pivot, cos0, cos1 = curvature - at_rod, longer.u, math.cos(psi1)
-        shift = (cos0 * psi0 + at_pivot * moment / force + 0.5 * here.u * (at_rod - 2.0 * curvature) * growth) / cos1
-        turned = psi0 - (1.0 + by_psi1.turn) * shift - by_force.turn * df
-        levered = du - by_psi1.u * shift - by_force.u * df
-        by_length = (longer.turn * turned + force * cos0 * levered) / (at_pivot * at_pivot + force * cos0 * cos0)
-    else:
-        turned, levered, turning = psi0 - by_force.turn * df, du - by_force.u * df, 1.0 + by_psi1.turn
-        det = turning * longer.u - longer.turn * by_psi1.u
-        shift = (turned * longer.u - longer.turn * levered) / det
-        by_length = (turning * levered - by_psi1.u * turned) / det
+    df, turning = growth * force, 1.0 + by_psi1.turn
+    turned = angle - beta - by_force.turn * df
+    levered = moment / force - here.u * growth - by_force.u * df
+    det = turning * longer.u - longer.turn * by_psi1.u  # cos ψ1 in uniform rods
+    shift = (turned * longer.u - longer.turn * levered) / det
+    by_length = (turning * levered - by_psi1.u * turned) / det
     return (
         by[1, 3] * df + by[2, 3] * shift + by[3, 3] * by_length + by[4, 3] * angle,
         by[1, 4] * df + by[2, 4] * shift + by[3, 4] * by_length + by[4, 4] * angle,
@@ -191,26 +139,13 @@ def write_contact_states(
     place_by: Floats,
     by: Floats,
 ) -> None:
-    """Write loads and places of contacts, NaN where there is none.
+    """Write loads, places and volumes of contacts as in `ContactStates`, NaN where there is none, and derivatives.
 
-    Parameters
-    ----------
-    coordinates : ndarray, shape (n, 4)
-        As in `contact_states`.
-    delta : ndarray, shape (n,)
-        Friction angle [rad].
-    curvature, varied, stem
-        As in `Rods`.
-    loads, place, volumes : ndarray, shapes (3, n), (4, n) and (2, n)
-        As in `ContactStates`.
-    loads_by, place_by : ndarray, shapes (n, 3, 4) and (n, 4, 4), or without rows
-        As in `ContactStateSlopes`.
-    by : ndarray
-        As in `contact_state`.
+    Coordinates as in `contact_states`, `by` as in `contact_state`; `loads_by` and `place_by` as in
+    `ContactStateSlopes`, or without rows.
     """
     for i in range(delta.size):
-        bend = contact_state(coordinates, i, mirrored_by(curvature[i], varied, stem), by)
-        _, by_force, by_psi1, longer = from_pivot(bend, coordinates[i, 1], stem)
+        _, by_psi1, longer, by_force = contact_state(coordinates, i, mirrored_by(curvature[i], varied, stem), by)
         for k in range(3):
             loads[k, i] = by[0, k]
         place[0, i], place[1, i], place[2, i], place[3, i] = by[0, 3], by[0, 4], by[0, 5] - delta[i], coordinates[i, 2]
@@ -230,10 +165,9 @@ def wrench_slopes(
 ) -> None:
     """Write the derivatives of places by drive angle and loads, shape (n, 4, 4)."""
     for i in range(coordinates.shape[0]):
-        beam = mirrored_by(curvature[i], varied, stem)
-        bend = contact_state(coordinates, i, beam, by)
+        pose = contact_state(coordinates, i, mirrored_by(curvature[i], varied, stem), by)
         for c in range(4):
             errors = 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3)
-            change = moved(coordinates, i, beam, bend, by, *errors)
+            change = moved(coordinates, i, pose, by, *errors)
             for k in range(4):
                 out[i, k, c] = change[k]

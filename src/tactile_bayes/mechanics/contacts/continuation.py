@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.contacts.arc_states import is_moderate
-from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_pose
+from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_pose, by_kind
 from tactile_bayes.mechanics.poses.pose import Pose
 from tactile_bayes.mechanics.poses.taylor import FARTHEST
 from tactile_bayes.mechanics.rods.profile import Profile
@@ -73,17 +73,12 @@ def unloaded_arc(u: float, v: float, delta: float) -> Start:
     return Start(-2.0 * sine / distance, distance * (angle / sine if sine != 0.0 else 1.0), 0.0)
 
 
-@compiled
-def _between(beam: Beam, begin: float, way: float, room: Profile | None) -> Beam:
+@by_kind
+def _between(varied: Varied | None, beam: Beam, begin: float, way: float, room: Profile | None) -> Beam:
     """Rod on the way of a continuation that begins with a rest curvature; its profile is written to the room."""
-    return _mixed(beam.varied, beam.curvature, begin, way, room)
-
-
-@compiled
-def _mixed(varied: Varied | None, curvature: float, begin: float, way: float, room: Profile | None) -> Beam:
     left = min(_WHOLE - way, 1.0)
     if varied is None or room is None:
-        return Beam(curvature - left * (curvature - begin), 1.0, math.inf, varied, 0.0, 1.0)
+        return Beam(beam.curvature - left * (beam.curvature - begin), 1.0, math.inf, varied, 0.0, 1.0)
     edges, bent, rigidity, taper, bend, sign = varied.profile
     bent_share, rigid_share = 1.0 - left, min(way, 1.0)
     for i in range(edges.size):
@@ -96,13 +91,6 @@ def _mixed(varied: Varied | None, curvature: float, begin: float, way: float, ro
     profile = Profile(edges, room.curvature, room.rigidity, rigid_share * taper, bend, sign)
     varied = Varied(profile, varied.work, varied.sheet, 0.0, 1.0, varied.other_sheet, 0.0)
     return Beam(0.0, 1.0, math.inf, varied, 0.0, 1.0)
-
-
-@compiled
-def _begins_at(varied: Varied | None, tip: bool) -> float:
-    if varied is None:
-        return _STIFFENED
-    return _UNIFORM if tip else _STIFFENED
 
 
 class _Slopes(NamedTuple):
@@ -128,15 +116,11 @@ def _step(at: _Slopes, du: float, dv: float) -> tuple[float, float]:
     return (du * by_force.v - dv * by_force.u) / det, (by_q.u * dv - by_q.v * du) / det
 
 
-@compiled
-def _has_pose(q: float, force: float, beam: Beam, tip: bool) -> bool:
-    return _is_in_range(beam.varied, 1.0 if tip else q, force, beam.curvature)
-
-
-@compiled
-def _is_in_range(varied: Varied | None, arclength: float, force: float, curvature: float) -> bool:
+@by_kind
+def _has_pose(varied: Varied | None, beam: Beam, q: float, force: float, tip: bool) -> bool:
+    arclength = 1.0 if tip else q
     if varied is None:
-        return is_moderate(arclength, force, curvature)
+        return is_moderate(arclength, force, beam.curvature)
     return 0.0 < arclength < FARTHEST and is_moderate(arclength, force, 0.0)
 
 
@@ -144,7 +128,7 @@ def _is_in_range(varied: Varied | None, arclength: float, force: float, curvatur
 def _settled(u: float, v: float, delta: float, beam: Beam, tip: bool, q: float, force: float) -> tuple[float, float]:
     """(q, f) near a guess by Newton's method; NaN if its steps are large or do not shrink fast."""
     before = _NEAR / _SHRINKS
-    while force > 0.0 and _has_pose(q, force, beam, tip):
+    while force > 0.0 and _has_pose(beam, q, force, tip):
         at = _slopes(q, force, beam, delta, tip)
         dq, df = _step(at, u - at.here.u, v - at.here.v)
         size = max(abs(dq), abs(df) / (1.0 + force))
@@ -165,9 +149,9 @@ def _continued(
     The start may be somewhat off the contact: it is left behind at the same time.
     """
     begin, q, force = start
-    way = _begins_at(beam.varied, tip)
+    way = _UNIFORM if tip and beam.varied is not None else _STIFFENED
     rod = _between(beam, begin, way, room)
-    if not _has_pose(q, force, rod, tip):
+    if not _has_pose(rod, q, force, tip):
         return math.nan, math.nan
     here = _slopes(q, force, rod, delta, tip)
     step, whole = 1.0, _WHOLE - way

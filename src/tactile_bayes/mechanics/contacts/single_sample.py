@@ -15,14 +15,6 @@ from tactile_bayes.mechanics.poses.beam import Beam, Varied, mirrored_by
 
 __all__ = ["Room", "Workspace", "descents", "raw_fits"]
 
-_MOST_SWEEPS = 30
-
-_ROUNDING = 1e-15
-"""Correlation that counts as zero."""
-
-_BEYOND_ALL = 1e300
-"""Value that replaces a covariance that is not finite."""
-
 _SAME = 1e-9
 """Distance [L] below which two contact points differ by rounding only."""
 
@@ -91,24 +83,11 @@ def descents(
 ) -> None:
     """Descend by Levenberg–Marquardt steps until the gain that the next step promises is small.
 
-    Parameters
-    ----------
-    reading : Reading
-    curvature, varied, stem
-        As in `Rods`.
-    whitening : ndarray, shape (n, 3, 3)
-        Inverse of the lower triangular root of the covariance of the loads.
-    who : ndarray
-        Indices of the samples that descend.
-    free : ndarray, shape (k,)
-        Free coordinates; the drive angle is the last if it is among them.
-    gain : float
-        Gain that is small, relative to one plus the sum of squares.
-    steps : int
-        Largest number of steps; with 0 the samples are evaluated where they are.
-    z, misfit, normal, hardness : ndarray, shapes (n, 4), (n,), (n, k, k + 1) and (n,)
-        Coordinates; sums of squares; half of their second derivatives in the Gauss–Newton approximation, with half of
-        the first derivatives in the last column; damping of the diagonal.
+    `whitening` is the inverse of the root of the covariance of the loads, `who` are the samples that descend, in the
+    coordinates `free` (the drive angle last), for at most `steps`; with 0 they are evaluated where they are. `gain` is
+    relative to one plus the sum of squares, the misfit. `normal`, shape (n, k, k + 1), holds half of its second
+    derivatives in the Gauss–Newton approximation, and half of the first ones in the last column; `hardness` is the
+    damping of the diagonal.
     """
     count, inverse, slopes, trial = free.size, workspace.inverse, workspace.slopes, workspace.trial
     for j in range(who.size):
@@ -181,9 +160,6 @@ class Room(NamedTuple):
     """Four independent errors of drive angle and loads, one standard deviation long, in rows, shape (4, 4)."""
     shifts: Floats
     """Shifts of the place and of ψ1 by them, of the two points that may be the contact, shape (2, 4, 5)."""
-    matrix: Floats
-    axes: Floats
-    """Shape (3, 3)."""
     by: Floats
     """As in `contact_state`."""
 
@@ -202,6 +178,7 @@ class _Sample(NamedTuple):
 @cached
 def raw_fits(
     reading: Reading,
+    axes: Floats,
     delta: Floats,
     curvature: Floats,
     varied: Varied | None,
@@ -209,14 +186,14 @@ def raw_fits(
     out: RawFit,
     room: Room,
 ) -> None:
-    """Write the contacts of Step 2; see `raw_contacts`. Without noise there is no room for covariances."""
-    has_noise = out.bend.size > 0
+    """Write the contacts of Step 2; see `raw_contacts`. Without noise `axes`, those of the covariance, have no rows."""
+    has_noise = axes.shape[0] > 0
     for i in range(delta.size):
         loads = reading.loads[i]
         beam = mirrored_by(curvature[i], varied, stem)
         sample = _Sample(beam, reading.drive_angle[i], loads[0], loads[1], loads[2], delta[i])
         rising, falling = contact_pair(*sample)
-        noisy = has_noise and _write_errors(reading, i, room)
+        noisy = has_noise and _write_errors(reading, axes, i, room)
         deviation = _deviation(rising, sample, noisy, room, 0)
         other_deviation = _deviation(falling, sample, noisy, room, 1)
         found, other, falls = rising, falling, other_deviation < deviation or math.isnan(rising.arclength)
@@ -234,22 +211,16 @@ def raw_fits(
 
 
 @compiled
-def _write_errors(reading: Reading, i: int, room: Room) -> bool:
+def _write_errors(reading: Reading, axes: Floats, i: int, room: Room) -> bool:
     """Write the errors of a sample, and return whether any is not zero."""
-    matrix, axes, errors = room.matrix, room.axes, room.errors
-    for a in range(3):
-        for b in range(3):
-            value = reading.covariance[i, a, b]
-            matrix[a, b] = value if math.isfinite(value) else _BEYOND_ALL
-    _principal(matrix, axes)
-    deviation = reading.angle_deviation[i]
+    errors, deviation = room.errors, reading.angle_deviation[i]
     noisy = deviation != 0.0
+    errors[3, 0] = deviation
     for k in range(3):
         errors[k, 0], errors[3, k + 1] = 0.0, deviation * reading.leaning[i, k]
         for a in range(3):
-            errors[k, a + 1] = axes[a, k]
-            noisy = noisy or axes[a, k] != 0.0
-    errors[3, 0] = deviation
+            errors[k, a + 1] = axes[i, a, k]
+            noisy = noisy or axes[i, a, k] != 0.0
     if not noisy:
         room.shifts[:] = 0.0
     return noisy
@@ -268,11 +239,11 @@ def _deviation(found: Found, sample: _Sample, noisy: bool, room: Room, which: in
         z, errors, shifts = room.z, room.errors, room.shifts[which]
         z[0, 0], z[0, 1] = math.hypot(sample.force_x, sample.force_y), turn - sample.friction_angle
         z[0, 2], z[0, 3] = found.arclength, sample.drive_angle
-        bend = contact_state(z, 0, sample.beam, room.by)
+        pose = contact_state(z, 0, sample.beam, room.by)
         length_variance, turn_variance = 0.0, 0.0
         for k in range(4):
             error = errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3]
-            shift = moved(z, 0, sample.beam, bend, room.by, *error)
+            shift = moved(z, 0, pose, room.by, *error)
             for p in range(5):
                 shifts[k, p] = shift[p]
             length_variance += shift[3] * shift[3]
@@ -316,39 +287,3 @@ def _bent(bend: float, x: float, y: float, covariance: Floats) -> float:
     xx, yy, xy = covariance[0, 0], covariance[1, 1], covariance[0, 1]
     shift = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
     return bend if shift <= bend else shift
-
-
-@compiled
-def _principal(matrix: Floats, axes: Floats) -> None:
-    """Principal axes of a covariance, one standard deviation long, in columns, by Jacobi rotations; the matrix is
-    overwritten."""
-    for a in range(3):
-        for b in range(3):
-            axes[a, b] = 1.0 * (a == b)
-    for _ in range(_MOST_SWEEPS):
-        turns = False
-        for p in range(2):
-            for q in range(p + 1, 3):
-                size = math.sqrt(abs(matrix[p, p])) * math.sqrt(abs(matrix[q, q]))
-                if abs(matrix[p, q]) > _ROUNDING * size:
-                    turns = True
-                    ratio = 0.5 * (matrix[q, q] - matrix[p, p]) / matrix[p, q]
-                    tan = math.copysign(1.0 / (abs(ratio) + math.sqrt(1.0 + ratio * ratio)), ratio)
-                    cos = 1.0 / math.sqrt(1.0 + tan * tan)
-                    sin = tan * cos
-                    for k in range(3):
-                        one, other = axes[k, p], axes[k, q]
-                        axes[k, p], axes[k, q] = cos * one - sin * other, sin * one + cos * other
-                        one, other = matrix[k, p], matrix[k, q]
-                        matrix[k, p], matrix[k, q] = cos * one - sin * other, sin * one + cos * other
-                    for k in range(3):
-                        one, other = matrix[p, k], matrix[q, k]
-                        matrix[p, k], matrix[q, k] = cos * one - sin * other, sin * one + cos * other
-                    matrix[p, q] = matrix[q, p] = 0.0
-        if not turns:
-            break
-    for k in range(3):
-        variance = matrix[k, k]
-        length = 0.0 if variance < 0.0 else math.sqrt(variance)
-        for a in range(3):
-            axes[a, k] *= length

@@ -1,203 +1,29 @@
-"""One state of a rod in contact, exactly or from tables: contact → base wrench, and back.
+"""Step 2 for single states: base wrench → contact, of any rod.
 
-Quantities are dimensionless (length L, moment EI/L, force EI/L²) and relative to the pivot; contacts are forward ones.
-A contact force of magnitude f acts on the rod along (sin β, −cos β), with β = α + δ for slope angle α and friction
-angle δ. With ψ = φ − β the rod obeys κ' = f cos ψ and κ(s1) = 0 (equations 19, 20 and 27 of Merker et al. 2018, doi
-10.1155/2018/1613945): a piece of Euler's elastica that begins at a point of zero curvature, the contact (`arc`).
+Slope and moment at the pivot determine the rod, and its moment vanishes at the contact. It may vanish once before, if
+the rod is bent both ways. Straight rods have a closed form (`contact`), and so have arcs (`arc_states`); others are
+integrated, and continued beyond their tip with its rest curvature and rigidity. Quantities are dimensionless and
+relative to the pivot; contacts are forward ones.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, Found, arc_zeros
-from tactile_bayes.mechanics.contacts.continuation import NOWHERE, Start, State, continued_state, unloaded_arc
-from tactile_bayes.mechanics.contacts.profile_contact import is_exact, zeros_along
-from tactile_bayes.mechanics.contacts.tables import (
-    MOST_FRICTION,
-    Tables,
-    Workspace,
-    in_polar,
-    prepare,
-    series,
-)
-from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
-from tactile_bayes.mechanics.poses.arc import (
-    SHORT_COSINE,
-    Arc,
-    arc_and_slopes,
-    arc_at,
-    chord_deficit,
-    chord_deficit_rate,
-    chord_direction_rate,
-)
-from tactile_bayes.mechanics.poses.beam import Beam, Varied, lever_of_stem, mirrored_by, with_sign
-from tactile_bayes.mechanics.poses.chord import tangential_arc, tip_arc
+from tactile_bayes.mechanics.poses.arc import SHORT_COSINE, arc_at
+from tactile_bayes.mechanics.poses.beam import Beam, Varied, by_kind, end_of_arc, lever_of_stem, mirrored_by
+from tactile_bayes.mechanics.poses.pose import pose
 from tactile_bayes.mechanics.poses.profile_shape import shape_along
+from tactile_bayes.mechanics.poses.taylor import EXACT, FARTHEST, FORWARD, State, advance, begin, moved, rise
 from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = [
-    "contact",
-    "contact_of",
-    "contact_pair",
-    "continued_wrenches",
-    "profile_shapes",
-    "wrenches",
-    "write_contact_pairs",
-    "write_contacts",
-]
+__all__ = ["contact", "contact_of", "contact_pair", "write_contacts", "write_shapes"]
 
-_BEYOND = 1e-12
-"""Angle by which rounding may turn a chord beyond the line of force through the pivot [rad]."""
-
-_NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
-
-
-@compiled
-def _tangential(x: float, y: float, alpha: float, delta: float, workspace: Workspace) -> tuple[float, Arc, Arc]:
-    """Arc length of tangential contact, its arc, and the derivatives of the arc by the amplitude."""
-    sin, cos = math.sin(alpha), math.cos(alpha)
-    along, across = x * cos + y * sin, y * cos - x * sin
-    angle, largest = math.atan2(across, along), 0.5 * math.pi + delta
-    if not (across >= 0.0 and angle <= largest + _BEYOND and abs(alpha) <= 0.5 * math.pi):
-        return math.nan, _NO_ARC, _NO_ARC
-    angle = min(angle, largest)
-    m = 0.5 * (1.0 + math.sin(delta))
-    if delta <= MOST_FRICTION:
-        guess = math.sqrt(max(angle * series(workspace, angle / largest), 0.0))
-    else:
-        guess = min(math.sqrt(3.0 * angle / math.sqrt(m * (1.0 - m))), math.pi)
-    chi, arc, by_chi = tangential_arc(angle, m, guess)
-    length = math.sqrt(x * x + y * y)
-    if chi > 0.0:
-        length *= arc.length / math.hypot(arc.length - arc.shortfall, arc.offset)
-    return length, arc, by_chi
-
-
-@compiled
-def _tangential_state(x: float, y: float, alpha: float, delta: float, length: float, arc: Arc, by_chi: Arc) -> State:
-    """State in tangential contact (Phase B)."""
-    force = (arc.length / length) ** 2
-    turning = by_chi.turn / chord_direction_rate(arc, by_chi) if arc.turn > 0.0 else 3.0
-    beta = alpha + delta
-    sin, cos = math.sin(beta), math.cos(beta)
-    moment = force * (x * cos + y * sin)
-    return State(alpha + arc.turn, moment, -force * sin, force * cos, length, alpha, 1.0 - turning, 0.0)
-
-
-@compiled
-def _tip_state(x: float, y: float, alpha: float, delta: float, known: Tables, workspace: Workspace) -> State:
-    """State in tip contact (Phase A): distance and direction of the tip give amplitude and direction at the contact."""
-    larger, smaller = max(abs(x), abs(y)), min(abs(x), abs(y))
-    deficit2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
-    if not deficit2 >= 0.0:
-        return NOWHERE
-    beta = alpha + delta
-    sin, cos = math.sin(beta), math.cos(beta)
-    u, v = x * cos + y * sin, y * cos - x * sin
-    deficit, chord_angle = math.sqrt(deficit2), max(math.atan2(u, v), 0.0)
-    angle, share, by_angle, by_share = in_polar(known, deficit, chord_angle, workspace)
-    chi, epsilon1, arc, by_chi, by_psi1 = tip_arc(
-        deficit, chord_angle, math.sqrt(max(angle * by_angle, 0.0)), share * by_share
-    )
-    by_slope, by_distance = math.nan, -math.inf
-    if chi > 0.0:
-        _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * epsilon1) ** 2)
-        angle_x, angle_1, value = (
-            chord_direction_rate(arc, by_chi),
-            1.0 + chord_direction_rate(arc, by_psi1),
-            chord_deficit(arc),
-        )
-        value_x, value_1 = chord_deficit_rate(arc, value, by_chi), chord_deficit_rate(arc, value, by_psi1)
-        det = value_x * angle_1 - value_1 * angle_x
-        by_slope = 1.0 - (value_x * (1.0 + by_psi1.turn) - value_1 * by_chi.turn) / det
-        by_distance = -0.5 * (angle_1 * by_chi.turn - angle_x * (1.0 + by_psi1.turn)) / det / value
-    force, tip_angle = arc.length * arc.length, beta + 0.5 * math.pi - epsilon1
-    return State(tip_angle + arc.turn, force * u, -force * sin, force * cos, 1.0, tip_angle, by_slope, by_distance)
-
-
-@cached
-def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArray[np.int8], out: Floats) -> None:
-    """Write states, and arc lengths of tangential contact, of contacts mirrored to forward ones.
-
-    Parameters
-    ----------
-    columns : ndarray, shape (n, 4)
-        Contact point, slope angle, friction angle.
-    phase : ndarray, shape (n,)
-        Known phases; a phase that is `NONE` is determined and stored.
-    out : ndarray, shape (n, 9)
-        Fields of `State`, and the arc length of tangential contact.
-    """
-    prepared = math.nan
-    for i in range(columns.shape[0]):
-        x, y, alpha, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
-        if delta != prepared:
-            prepare(known, delta, workspace)
-            prepared = delta
-        out[i] = math.nan
-        if phase[i] != TIP:
-            length, arc, by_chi = _tangential(x, y, alpha, delta, workspace)
-            out[i, 8] = length
-            if phase[i] == TANGENTIAL or length <= 1.0:
-                _store(_tangential_state(x, y, alpha, delta, length, arc, by_chi), out[i])
-                phase[i] = TANGENTIAL
-        if phase[i] == TIP or (phase[i] == NONE and out[i, 8] > 1.0):
-            ending = _tip_state(x, y, alpha, delta, known, workspace)
-            _store(ending, out[i])
-            phase[i] = NONE if math.isnan(ending.arclength) else TIP
-
-
-@cached
-def continued_wrenches(
-    varied: Varied | None,
-    room: Profile | None,
-    columns: Floats,
-    known: Tables,
-    workspace: Workspace,
-    phase: NDArray[np.int8],
-    out: Floats,
-) -> None:
-    """Write states of arcs, or of a rod with a profile, as `wrenches` does.
-
-    Parameters
-    ----------
-    varied, room : Varied and Profile, optional
-        The rod, and a profile of the same shape to be written to, unless the rods are arcs.
-    columns : ndarray, shape (n, 5)
-        The last column is the rest curvature of an arc; with a profile −1 for the mirrored rod, else 1.
-    """
-    for i in range(columns.shape[0]):
-        x, y, alpha, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
-        beam = mirrored_by(columns[i, 4], varied, 0.0)
-        sin, cos = math.sin(alpha + delta), math.cos(alpha + delta)
-        u, v = x * cos + y * sin, y * cos - x * sin
-        out[i] = math.nan
-        if phase[i] != TIP:
-            lying = continued_state(x, y, alpha, delta, beam, False, unloaded_arc(u, v, delta), room)
-            out[i, 8] = lying.arclength
-            if phase[i] == TANGENTIAL or lying.arclength <= 1.0:
-                _store(lying, out[i])
-                phase[i] = TANGENTIAL
-                continue
-        straight = _tip_state(x, y, alpha, delta, known, workspace)
-        psi1 = straight.tip_angle - alpha - delta
-        start = Start(0.0, psi1, math.hypot(straight.force_x, straight.force_y))
-        ending = continued_state(x, y, alpha, delta, beam, True, start, room)
-        if phase[i] == TIP or ending.tip_angle >= alpha:
-            _store(ending, out[i])
-        phase[i] = NONE if math.isnan(out[i, 4]) else TIP
-
-
-@compiled
-def _store(state: State, out: Floats) -> None:
-    for k in range(8):
-        out[k] = state[k]
+_EXACT = 1e-6
+"""Arc length [L] and angle [rad] that count as zero in Step 2 without errors."""
 
 
 @compiled
@@ -232,18 +58,58 @@ def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> F
 
 
 @compiled
-def contact_pair(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> tuple[Found, Found]:
+def _zeros_along(
+    profile: Profile, phi0: float, moment: float, fx: float, fy: float, delta: float, work: Floats
+) -> tuple[Found, Found]:
+    """First two points without moment, for drive angle, holding moment, support reaction and friction angle.
+
+    The moment rises through zero at one of them and falls at the other, which are returned in this order. There is no
+    second one if the first lies beyond the tip.
+    """
+    force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
+    state, rising, falling = State(phi0 - beta, -moment, 0.0, 0.0), NO_CONTACT, NO_CONTACT
+    if not (0.0 < force < math.inf and math.isfinite(moment)):
+        return rising, falling
+    # A force without moment passes through the pivot: the rod must bend away from it before it returns.
+    sense = 1.0 if moment > 0.0 or (moment == 0.0 and math.cos(state.psi) < 0.0) else -1.0
+    march = begin(profile, 0.0, FORWARD, state)
+    while march.at < FARTHEST:
+        before = march
+        step, march = advance(profile, before, FORWARD, FARTHEST, force, work, EXACT)
+        x = rise(before.state, force, step, sense, 0.0, work)
+        if x >= 0.0:
+            end, at = moved(before.state, force, step, x, work), before.at + x * step.length
+            cos, sin = math.cos(beta), math.sin(beta)
+            x, y = end.u * cos - end.v * sin, end.u * sin + end.v * cos
+            if sense > 0.0:
+                rising = Found(x, y, beta - delta, at, beta + end.psi, math.nan)
+            else:
+                falling = Found(x, y, beta - delta, at, beta + end.psi, math.nan)
+            if at > 1.0 or (rising.arclength > 0.0 and falling.arclength > 0.0):
+                break
+            march, sense = begin(profile, at, FORWARD, State(end.psi, 0.0, end.u, end.v)), -sense
+    return rising, falling
+
+
+@by_kind
+def contact_pair(
+    varied: Varied | None, beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float
+) -> tuple[Found, Found]:
     """Points of any rod that may be its contact: the moment rises through zero at the first, and falls at the second.
 
     A contact along the rod is of the first kind, and so is that of a tip, unless it is turned beyond the normal of the
     contour. Straight, uniform rods are past snap-off when they are bent both ways: they have the first kind only.
     """
     h = beam.stem
-    if h == 0.0:
-        return _contact_pair(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
-    moment -= lever_of_stem(h, phi0, fx, fy)
-    rising, falling = _contact_pair(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
-    return _on_stem(h, phi0, rising), _on_stem(h, phi0, falling)
+    if h != 0.0:
+        moment -= lever_of_stem(h, phi0, fx, fy)
+    if varied is not None:
+        rising, falling = _zeros_along(varied.profile, phi0, moment, fx, fy, delta, varied.work)
+    elif beam.curvature == 0.0:
+        rising, falling = contact(phi0, moment, fx, fy, delta), NO_CONTACT
+    else:
+        rising, falling = arc_zeros(phi0, moment, fx, fy, delta, beam.curvature)
+    return (rising, falling) if h == 0.0 else (_on_stem(h, phi0, rising), _on_stem(h, phi0, falling))
 
 
 @compiled
@@ -253,77 +119,108 @@ def _on_stem(stem: float, phi0: float, found: Found) -> Found:
 
 
 @compiled
-def _contact_pair(
-    varied: Varied | None, curvature: float, phi0: float, moment: float, fx: float, fy: float, delta: float
-) -> tuple[Found, Found]:
-    if varied is None:
-        if curvature == 0.0:
-            return contact(phi0, moment, fx, fy, delta), NO_CONTACT
-        return arc_zeros(phi0, moment, fx, fy, delta, curvature)
-    return zeros_along(varied.profile, phi0, moment, fx, fy, delta, varied.work)
+def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
+    """Contact of any rod that follows from a base wrench without errors."""
+    return _exact_one(beam, contact_pair(beam, phi0, moment, fx, fy, delta))
 
 
 @compiled
-def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
-    """Contact of any rod that follows from a base wrench without errors.
-
-    It is the point at which the moment rises through zero, unless the rod ends at the other one.
-    """
-    rising, falling = contact_pair(beam, phi0, moment, fx, fy, delta)
-    is_contact = is_exact(rising.arclength, rising.tip_angle - rising.slope_angle)
-    if not is_contact and is_exact(falling.arclength, math.pi):
+def _exact_one(beam: Beam, pair: tuple[Found, Found]) -> Found:
+    """Point of a pair at which the moment rises through zero, unless the rod ends at the other one."""
+    rising, falling = pair
+    is_contact = _is_exact(rising.arclength, rising.tip_angle - rising.slope_angle)
+    if not is_contact and _is_exact(falling.arclength, math.pi):
         return falling
     is_first = beam.varied is None or not falling.arclength < rising.arclength
     return rising if is_contact or is_first else NO_CONTACT
 
 
-@cached
-def write_contacts(columns: Floats, curvature: Floats, varied: Varied | None, stem: float, out: Floats) -> None:
-    """Write the contacts that follow from base wrenches, mirrored to forward ones.
+@compiled
+def _is_exact(arclength: float, turn: float) -> bool:
+    """True if a rod ends at a point, or lies along the contour there."""
+    turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+    return abs(arclength - 1.0) < _EXACT or (arclength < 1.0 and abs(turn) < _EXACT)
 
-    Parameters
-    ----------
-    columns : ndarray, shape (n, 5)
-        Drive angle, holding moment and support reaction, friction angle.
-    curvature, varied, stem
-        As in `Rods`.
-    out : ndarray, shape (n, 6)
-        As `Contact`.
+
+@cached
+def write_contacts(
+    columns: Floats, curvature: Floats, varied: Varied | None, stem: float, out: Floats, pairs: Floats
+) -> None:
+    """Write the contacts that follow from base wrenches, mirrored to forward ones, or the points that may be.
+
+    Columns are drive angle, holding moment, support reaction and friction angle, shape (n, 5). `out` takes the fields
+    of `Contact`, shape (n, 6), and `pairs` arc length and ψ1 of both points of `contact_pair`, shape (n, 2, 2); either
+    may have no rows.
     """
-    for i in range(columns.shape[0]):
-        beam = mirrored_by(curvature[i], varied, stem)
-        found = contact_of(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
-        for k in range(6):
-            out[i, k] = found[k]
-
-
-@cached
-def write_contact_pairs(columns: Floats, curvature: Floats, varied: Varied | None, stem: float, out: Floats) -> None:
-    """Write arc length and ψ1 of both points of `contact_pair`, shape (n, 2, 2); see `write_contacts`."""
     for i in range(columns.shape[0]):
         beam = mirrored_by(curvature[i], varied, stem)
         pair = contact_pair(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
-        for k in range(2):
-            out[i, k, 0], out[i, k, 1] = pair[k].arclength, pair[k].tip_angle - pair[k].slope_angle - columns[i, 4]
+        if out.shape[0]:
+            found = _exact_one(beam, pair)
+            for k in range(6):
+                out[i, k] = found[k]
+        if pairs.shape[0]:
+            for k in range(2):
+                pairs[i, k, 0] = pair[k].arclength
+                pairs[i, k, 1] = pair[k].tip_angle - pair[k].slope_angle - columns[i, 4]
 
 
 @cached
-def profile_shapes(wrenches: Floats, varied: Varied, arclengths: Floats, x: Floats, y: Floats) -> None:
-    """Write the centrelines of a rod with a profile, NaN where no contact makes a wrench, shape (n, points).
+def write_shapes(
+    wrenches: Floats, curvature: Floats, varied: Varied | None, arclengths: Floats, x: Floats, y: Floats
+) -> None:
+    """Write centrelines from base wrenches (drive angle, holding moment, support reaction), shape (n, points).
 
-    Parameters
-    ----------
-    wrenches : ndarray, shape (n, 5)
-        Drive angle, holding moment, support reaction, and −1 for the mirrored rod, else 1.
+    Without a force they have their rest shape; they are NaN where no contact makes a wrench.
     """
     for i in range(wrenches.shape[0]):
+        beam = mirrored_by(curvature[i], varied, 0.0)
         phi0, moment, fx, fy = wrenches[i, 0], wrenches[i, 1], wrenches[i, 2], wrenches[i, 3]
-        profile, end = with_sign(varied, wrenches[i, 4]).profile, 0.0
+        end, psi1, modulus = 0.0, 0.0, math.nan
         if fx * fx + fy * fy > 0.0 and math.isfinite(moment):
-            end = contact_of(mirrored_by(wrenches[i, 4], varied, 0.0), phi0, moment, fx, fy, 0.0).arclength
+            found = contact_of(beam, phi0, moment, fx, fy, 0.0)
+            end, psi1, modulus = found.arclength, found.tip_angle - found.slope_angle, found.modulus
         else:
             moment, fx, fy = 0.0, 0.0, 0.0
-        shape_along(profile, phi0, moment, fx, fy, end, arclengths, x[i], y[i], varied.work)
+        # A force at the pivot itself, without moment, leaves a rod in its rest shape: it has a modulus, but no arc.
+        if math.isnan(end) and modulus < 1.0:
+            end, moment, fx, fy = 0.0, 0.0, 0.0, 0.0
+        if end == 0.0:
+            psi1 = phi0
         if math.isnan(end):
-            for k in range(arclengths.size):
-                x[i, k], y[i, k] = math.nan, math.nan
+            x[i], y[i] = math.nan, math.nan
+        else:
+            _write_shape(beam, phi0, moment, fx, fy, psi1, end, arclengths, x[i], y[i])
+
+
+@by_kind
+def _write_shape(
+    varied: Varied | None,
+    beam: Beam,
+    phi0: float,
+    moment: float,
+    fx: float,
+    fy: float,
+    psi1: float,
+    contact: float,
+    arclengths: Floats,
+    x: Floats,
+    y: Floats,
+) -> None:
+    """Write a centreline that is loaded up to a contact: a point of an arc is the pivot of a shorter rod."""
+    if varied is not None:
+        shape_along(varied.profile, phi0, moment, fx, fy, contact, arclengths, x, y, varied.work)
+        return
+    force, beta = math.hypot(fx, fy), math.atan2(-fx, fy)
+    cos, sin = math.cos(beta), math.sin(beta)
+    whole = pose(psi1, contact, force, beam.curvature)
+    for k in range(arclengths.size):
+        u, v, beyond = whole.u, whole.v, arclengths[k] - contact
+        if beyond <= 0.0:
+            rest = pose(psi1, -beyond, force, beam.curvature)
+            u, v = u - rest.u, v - rest.v
+        else:
+            along, across = end_of_arc(beam.curvature, beyond)
+            u += along * math.cos(psi1) - across * math.sin(psi1)
+            v += along * math.sin(psi1) + across * math.cos(psi1)
+        x[k], y[k] = u * cos - v * sin, u * sin + v * cos

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.compiler import compiled, inlined
 
 __all__ = [
     "SHORT_COSINE",
@@ -120,14 +120,17 @@ def slopes_by_chi(chi: float, m: float) -> Arc:
 def arc_and_slopes(chi: float, m: float) -> tuple[Arc, Arc, Arc]:
     """Arc to the amplitude χ, and its derivatives by χ and by ψ1; see `arc_to`."""
     at = _amplitude(chi, m)
-    if at.cos > SHORT_COSINE:
-        F, C, S, F_1, C_1, S_1 = _short(at)
-    else:
-        F, C, S, F_1, C_1, S_1 = _long(at)
+    F, C, S, F_1, C_1, S_1 = _integrals(at)
     # (c w)² + (1 − 2 m w)² = Δ²; the turn by ψ1 is 2 [flat · c_1 − c · flat_1] w / Δ².
     w = at.half * at.half
     turn = -2.0 * w * ((1.0 - 2.0 * m) * (1.0 - 2.0 * m * w) + at.c * at.c * w) / at.d2
     return Arc(F, C, S, _turn(at)), _by_chi(at), Arc(F_1, C_1, S_1, turn)
+
+
+@compiled
+def _arc(at: _Amplitude) -> Arc:
+    F, C, S, _, _, _ = _integrals(at)
+    return Arc(F, C, S, _turn(at))
 
 
 @compiled
@@ -145,31 +148,15 @@ def _by_chi(at: _Amplitude) -> Arc:
     return Arc(1.0 / d, kernel * cw, kernel * (1.0 - 2.0 * at.m * w), at.c * at.sin / at.d2)
 
 
-@compiled
-def _arc(at: _Amplitude) -> Arc:
-    if at.cos > SHORT_COSINE:
-        F, first, second = 0.0, 0.0, 0.0
-        square = at.half * at.half
-        for i in range(_SQUARES.size):
-            h = _SQUARES[i] * square
-            d2 = 1.0 - 4.0 * at.m * h * (1.0 - h)
-            kernel = _WEIGHTS[i] / math.sqrt((1.0 - h) * d2)
-            F += kernel
-            kernel *= h / d2
-            first += kernel
-            second += kernel * h
-        step = 2.0 * at.half
-        c = at.c
-        return Arc(step * F, 2.0 * c * c * step * second, 2.0 * c * step * (first - 2.0 * at.m * second), _turn(at))
-    F, D = _legendre(at)
-    m, slope = at.m, at.sin / math.sqrt(at.d2)
-    P, Q = F - slope, 2.0 * at.half * at.half * slope - D
-    return Arc(F, 2.0 * m * (P - (1.0 - 2.0 * m) * Q), at.c * (P + 2.0 * m * Q), _turn(at))
+@inlined  # so that derivatives cost nothing where they are not used
+def _integrals(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
+    """F, C and S, and their derivatives by ψ1, with dm/dψ1 = −c/2 and dc/dψ1 = −p; p = sin ψ1."""
+    return _short(at) if at.cos > SHORT_COSINE else _long(at)
 
 
-@compiled
+@inlined
 def _short(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
-    """F, C and S of a short arc, and their derivatives by ψ1, with dm/dψ1 = −c/2 and dc/dψ1 = −p; p = sin ψ1."""
+    """Integrals of a short arc, by quadrature."""
     m, c = at.m, at.c
     F, first, second, third, fourth, fifth = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     square = at.half * at.half
@@ -195,9 +182,9 @@ def _short(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
     return F, 2.0 * c * c * second, 2.0 * c * leaning, -c * (first - second), C_1, S_1
 
 
-@compiled
+@inlined
 def _long(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
-    """F, C and S of a long arc, and their derivatives by ψ1; see `_short`."""
+    """Integrals of a long arc, in closed form."""
     sin, m, c = at.sin, at.m, at.c
     p, w = 1.0 - 2.0 * m, at.half * at.half
     F, D = _legendre(at)

@@ -1,7 +1,7 @@
 """A rod as the forward model sees it: its pose under a force, and its shape at rest.
 
 Uniform rods of constant rest curvature have closed forms (`pose`); all others are integrated (`taylor`). Functions are
-compiled for each of the two: where an argument is None, numba leaves out what an `is None` excludes.
+compiled for each of the two kinds (`by_kind`).
 
 A rigid, straight stem may lie between pivot and rod. It continues the rod beyond its base, in the direction ψ0 that the
 rod has there, so that with its length h
@@ -14,15 +14,15 @@ and the turn is the same. The moment at the pivot is f u as before. Arc lengths 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
-import numpy as np
+from numpy import void
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled, inlined
-from tactile_bayes.mechanics.poses.forward_table import PARTS, chord_in, has_parts, is_far, part_in, pose_in, sheet
-from tactile_bayes.mechanics.poses.pose import Pose, by_arclength, pose, pose_and_slopes
+from tactile_bayes.mechanics.poses.pose import ACROSS, Chord, Pose, by_arclength, pose, pose_and_slopes
 from tactile_bayes.mechanics.poses.profile_pose import (
     at_contact,
     part_along,
@@ -30,8 +30,11 @@ from tactile_bayes.mechanics.poses.profile_pose import (
     pose_along_in_phase,
 )
 from tactile_bayes.mechanics.poses.profile_shape import beyond_along, chord_along, largest_bending_along, rest_along
+from tactile_bayes.mechanics.poses.sheet import chord_in, is_far, pose_in, sheet
 from tactile_bayes.mechanics.poses.taylor import (
+    EXACT,
     FORWARD,
+    ROUGH,
     March,
     State,
     cell_at,
@@ -42,21 +45,25 @@ from tactile_bayes.mechanics.poses.taylor import (
 from tactile_bayes.mechanics.rods.profile import Profile
 
 __all__ = [
+    "PARTS",
     "Beam",
     "Chord",
     "Varied",
+    "WholePose",
     "beam_of",
     "beam_pose",
     "bending",
+    "by_kind",
     "chord_to",
+    "end_of_arc",
     "free_end",
     "from_tip",
+    "is_far_from_table",
     "is_straight",
     "lever_of_stem",
     "loaded_part",
     "mirrored_beam",
     "mirrored_by",
-    "moved_by_stem",
     "rest_curvature",
     "rest_point",
     "rubbed_otherwise",
@@ -64,12 +71,10 @@ __all__ = [
     "varied_of",
     "whole_pose",
     "with_sign",
-    "with_stem",
 ]
 
-
-_ACROSS = 1e-6
-"""Cosine of the angle of a chord to the rod that counts as zero: the rod goes no farther from the pivot."""
+PARTS = 8
+"""Number of parts of a rod between which a second contact is sought in `loaded_part`."""
 
 _MOST_STEPS, _SETTLED = 20, 1e-10
 """Largest number of Newton steps to a distance from the pivot, and the last one [L]."""
@@ -80,13 +85,13 @@ class Varied(NamedTuple):
 
     profile: Profile
     work: Floats
-    sheet: NDArray[np.void]
+    sheet: NDArray[void]
     """Coefficients of its pose, from a table."""
     slenderness: float
     """Slenderness of the table; 0 if there are no coefficients."""
     sign: float
     """Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose."""
-    other_sheet: NDArray[np.void]
+    other_sheet: NDArray[void]
     other_slenderness: float
     """Coefficients and slenderness for friction that acts in the other sense."""
 
@@ -108,17 +113,24 @@ class Beam(NamedTuple):
     """Distance from where the rod begins to its tip at rest [L], for tables."""
 
 
-class Chord(NamedTuple):
-    """Line from the pivot to a point of the rod at rest."""
+Rest = ParamSpec("Rest")
+Result = TypeVar("Result")
 
-    arclength: float
-    """Arc length of the point [L], < 0 on the stem."""
-    at_base: float
-    """Angle from the rod at the pivot to the chord [rad]."""
-    at_point: float
-    """Angle from the chord to the rod at the point [rad]."""
-    rate: float
-    """Derivative of `at_point` by the length of the chord."""
+
+def by_kind(
+    function: Callable[Concatenate[Varied | None, Beam, Rest], Result],
+) -> Callable[Concatenate[Beam, Rest], Result]:
+    """Compile a function of `beam.varied`, the beam and more as one of the beam and more.
+
+    numba leaves out what an `is None` excludes of an argument, and not of its field.
+    """
+    part: Any = inlined(function)
+
+    def of_beam(beam: Beam, *rest: Any) -> Any:
+        return part(beam.varied, beam, *rest)
+
+    made: Any = compiled(of_beam)
+    return made
 
 
 def varied_of(profile: Profile | None) -> Varied | None:
@@ -143,80 +155,110 @@ def mirrored_by(curvature: float, varied: Varied | None, stem: float) -> Beam:
 def beam_of(curvature: float, varied: Varied | None, stem: float) -> Beam:
     """Uniform rod whose rest shape is an arc of length one, or a rod whose properties vary along it, on a stem."""
     if varied is None:
-        half = 0.5 * curvature
-        chord = 1.0 if half == 0.0 else math.sin(half) / half
-        reach = chord if stem == 0.0 else math.hypot(stem + chord * math.cos(half), chord * math.sin(half))
-        return Beam(curvature, reach, curvature, varied, stem, chord)
-    chord = rest_along(varied.profile, 0.0, 1.0, varied.work).distance
-    reach = chord if stem == 0.0 else rest_along(varied.profile, stem, 1.0, varied.work).distance
-    return Beam(0.0, reach, most_rest_curvature(varied.profile), varied, stem, chord)
+        along, across = end_of_arc(curvature, 1.0)
+        return Beam(curvature, math.hypot(stem + along, across), curvature, varied, stem, math.hypot(along, across))
+    own = rest_along(varied.profile, 0.0, 1.0, varied.work).distance
+    reach = own if stem == 0.0 else rest_along(varied.profile, stem, 1.0, varied.work).distance
+    return Beam(0.0, reach, most_rest_curvature(varied.profile), varied, stem, own)
 
 
-@compiled
-def mirrored_beam(beam: Beam) -> Beam:
+@by_kind
+def mirrored_beam(varied: Varied | None, beam: Beam) -> Beam:
     """Rod in the frame of the opposite sweep."""
-    return Beam(-beam.curvature, beam.reach, math.inf, _mirrored(beam.varied), beam.stem, beam.own_reach)
-
-
-@compiled
-def _mirrored(varied: Varied | None) -> Varied | None:
     if varied is None:
-        return varied
-    return with_sign(varied, -varied.profile.sign)
+        return Beam(-beam.curvature, beam.reach, math.inf, varied, beam.stem, beam.own_reach)
+    turned = with_sign(varied, -varied.profile.sign)
+    return Beam(0.0, beam.reach, math.inf, turned, beam.stem, beam.own_reach)
 
 
 @compiled
 def with_sign(varied: Varied, sign: float) -> Varied:
     """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
-    edges, curvature, rigidity, taper, bend, _ = varied.profile
-    return _with_profile(varied, Profile(edges, curvature, rigidity, taper, bend, sign))
+    profile, work, own, slenderness, own_sign, other, other_slenderness = varied
+    edges, curvature, rigidity, taper, bend, _ = profile
+    turned = Profile(edges, curvature, rigidity, taper, bend, sign)
+    return Varied(turned, work, own, slenderness, own_sign, other, other_slenderness)
 
 
-@compiled
-def _with_profile(varied: Varied, profile: Profile) -> Varied:
-    """Rod with another profile."""
-    _, work, own, slenderness, sign, other, other_slenderness = varied
-    return Varied(profile, work, own, slenderness, sign, other, other_slenderness)
-
-
-@compiled
-def rubbed_otherwise(beam: Beam) -> Beam:
+@by_kind
+def rubbed_otherwise(varied: Varied | None, beam: Beam) -> Beam:
     """Rod with the coefficients for friction that acts in the other sense: they hold for one angle of friction."""
-    varied = _rubbed_otherwise(beam.varied)
-    return Beam(beam.curvature, beam.reach, beam.most_curvature, varied, beam.stem, beam.own_reach)
-
-
-@compiled
-def _rubbed_otherwise(varied: Varied | None) -> Varied | None:
     if varied is None:
-        return varied
+        return beam
     profile, work, own, slenderness, sign, other, other_slenderness = varied
-    return Varied(profile, work, other, other_slenderness, sign, own, slenderness)
+    rubbed = Varied(profile, work, other, other_slenderness, sign, own, slenderness)
+    return Beam(beam.curvature, beam.reach, beam.most_curvature, rubbed, beam.stem, beam.own_reach)
 
 
-@compiled
-def beam_pose(beam: Beam, psi1: float, arclength: float, force: float, tip: bool) -> tuple[Pose, Pose, Pose]:
+@by_kind
+def beam_pose(
+    varied: Varied | None, beam: Beam, psi1: float, arclength: float, force: float, tip: bool
+) -> tuple[Pose, Pose, Pose]:
     """Pose, and its derivatives by ψ1 in tip contact or by the arc length in tangential contact, and by the force."""
-    here, by_q, by_force = _pose(beam.varied, beam.curvature, psi1, arclength, force, tip)
+    here, by_q, by_force = _pose(varied, beam.curvature, psi1, arclength, force, tip)
     if beam.stem == 0.0:
         return here, by_q, by_force
     psi0, h = psi1 + here.turn, beam.stem
     by_psi0 = by_q.turn + 1.0 if tip else by_q.turn
     return (
-        with_stem(h, psi0, here),
-        moved_by_stem(h, psi0, by_q, by_psi0),
-        moved_by_stem(h, psi0, by_force, by_force.turn),
+        _with_stem(h, psi0, here),
+        _moved_by_stem(h, psi0, by_q, by_psi0),
+        _moved_by_stem(h, psi0, by_force, by_force.turn),
+    )
+
+
+@inlined
+def _pose(
+    varied: Varied | None, curvature: float, psi1: float, arclength: float, force: float, tip: bool
+) -> tuple[Pose, Pose, Pose]:
+    if varied is None:
+        return pose_and_slopes(psi1, arclength, force, curvature, tip)
+    # The coefficients are those of the rod itself and not of its mirror image.
+    if varied.slenderness > 0.0 and varied.sign == varied.profile.sign:
+        inside, here, by_q, by_force = pose_in(
+            varied.sheet, varied.slenderness, varied.profile.taper, psi1, arclength, force, tip
+        )
+        if inside:
+            return here, by_q, by_force
+    return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work)
+
+
+class WholePose(NamedTuple):
+    """Pose, and its derivatives by all its variables; NaN where there is none."""
+
+    here: Pose
+    by_psi1: Pose
+    by_arclength: Pose
+    by_force: Pose
+
+
+@by_kind
+def whole_pose(varied: Varied | None, beam: Beam, psi1: float, arclength: float, force: float) -> WholePose:
+    """Pose and derivatives without a table; see `beam_pose`."""
+    if varied is None:
+        here, by_psi1, by_force = pose_and_slopes(psi1, arclength, force, beam.curvature, True)
+        longer = by_arclength(psi1, force, beam.curvature, here)
+    else:
+        here, by_psi1, longer, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
+    if beam.stem == 0.0:
+        return WholePose(here, by_psi1, longer, by_force)
+    psi0, h = psi1 + here.turn, beam.stem
+    return WholePose(
+        _with_stem(h, psi0, here),
+        _moved_by_stem(h, psi0, by_psi1, 1.0 + by_psi1.turn),
+        _moved_by_stem(h, psi0, longer, longer.turn),
+        _moved_by_stem(h, psi0, by_force, by_force.turn),
     )
 
 
 @compiled
-def with_stem(stem: float, psi0: float, here: Pose) -> Pose:
+def _with_stem(stem: float, psi0: float, here: Pose) -> Pose:
     """Pose as seen from the pivot, from that seen from where the rod begins."""
     return Pose(here.u + stem * math.cos(psi0), here.v + stem * math.sin(psi0), here.turn)
 
 
 @compiled
-def moved_by_stem(stem: float, psi0: float, by: Pose, by_psi0: float) -> Pose:
+def _moved_by_stem(stem: float, psi0: float, by: Pose, by_psi0: float) -> Pose:
     """Derivative of such a pose, from that without the stem and that of ψ0."""
     return Pose(by.u - stem * math.sin(psi0) * by_psi0, by.v + stem * math.cos(psi0) * by_psi0, by.turn)
 
@@ -227,67 +269,20 @@ def lever_of_stem(stem: float, drive_angle: float, force_x: float, force_y: floa
     return stem * (force_y * math.cos(drive_angle) - force_x * math.sin(drive_angle))
 
 
-@compiled
-def _is_tabulated(varied: Varied) -> bool:
-    """True if there are coefficients of a pose, of the rod itself and not of its mirror image."""
-    return varied.slenderness > 0.0 and varied.sign == varied.profile.sign
-
-
-@compiled
-def is_far_from_table(beam: Beam, arclength: float, force: float) -> bool:
+@by_kind
+def is_far_from_table(varied: Varied | None, beam: Beam, arclength: float, force: float) -> bool:
     """True if a force is far beyond those of a table: the search for an equilibrium has gone astray."""
-    return _is_far_from_table(beam.varied, arclength, force)
-
-
-@inlined
-def _is_far_from_table(varied: Varied | None, arclength: float, force: float) -> bool:
     if varied is None:
         return False
     return varied.slenderness > 0.0 and is_far(varied.slenderness, varied.profile.taper, arclength, force)
 
 
-@inlined
-def _pose(
-    varied: Varied | None,
-    curvature: float,
-    psi1: float,
-    arclength: float,
-    force: float,
-    tip: bool,
-) -> tuple[Pose, Pose, Pose]:
-    if varied is None:
-        return pose_and_slopes(psi1, arclength, force, curvature, tip)
-    if _is_tabulated(varied):
-        inside, here, by_q, by_force = pose_in(
-            varied.sheet, varied.slenderness, varied.profile.taper, psi1, arclength, force, tip
-        )
-        if inside:
-            return here, by_q, by_force
-    return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work)
-
-
-@compiled
-def whole_pose(beam: Beam, psi1: float, arclength: float, force: float) -> tuple[Pose, Pose, Pose, Pose]:
-    """Pose as seen from where the rod begins, and its derivatives by ψ1, by the arc length and by the force."""
-    return _whole_pose(beam.varied, beam.curvature, psi1, arclength, force)
-
-
-@compiled
-def _whole_pose(
-    varied: Varied | None, curvature: float, psi1: float, arclength: float, force: float
-) -> tuple[Pose, Pose, Pose, Pose]:
-    if varied is None:
-        here, by_psi1, by_force = pose_and_slopes(psi1, arclength, force, curvature, True)
-        return here, by_psi1, by_arclength(psi1, force, curvature, here), by_force
-    return pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
-
-
-@compiled
-def chord_to(beam: Beam, distance: float) -> Chord:
+@by_kind
+def chord_to(varied: Varied | None, beam: Beam, distance: float) -> Chord:
     """Chord of the rod at rest to its first point at a distance from the pivot."""
     if beam.stem == 0.0:
-        return _chord(beam.varied, beam.curvature, beam.reach, distance)
-    return _chord_over_stem(beam.varied, beam, distance)
+        return _chord(varied, beam, distance)
+    return _chord_over_stem(varied, beam, distance)
 
 
 @compiled
@@ -302,16 +297,16 @@ def _chord_over_stem(varied: Varied | None, beam: Beam, distance: float) -> Chor
         square = (distance - h) * (distance + h)
         root = math.sqrt(max(4.0 * distance * distance - curvature * curvature * square * square, 0.0))
         c = square / math.sqrt(square + h * (2.0 * h + root))
-        return _over_stem(h, c, _chord(varied, curvature, 1.0, c), curvature, distance)
+        return _over_stem(h, c, _chord(varied, beam, c), curvature, distance)
     if varied.slenderness > 0.0:
         c = max(distance - h, 0.0)
-        own = _chord(varied, curvature, beam.own_reach, c)
+        own = _chord(varied, beam, c)
         for _ in range(_MOST_STEPS):
             cos, sin = math.cos(own.at_base), math.sin(own.at_base)
             rate = (c + h * cos - h * sin * math.tan(own.at_point)) / distance
             step = (math.hypot(h + c * cos, c * sin) - distance) / rate
             c = max(c - step, 0.0)
-            own = _chord(varied, curvature, beam.own_reach, c)
+            own = _chord(varied, beam, c)
             if not abs(step) > _SETTLED:
                 break
         bent = own.rate * math.cos(own.at_point)
@@ -332,68 +327,58 @@ def _to_chord(arclength: float, bearing: float, slope: float, curvature: float, 
     """Chord to a point of given bearing, slope and curvature."""
     at_point = slope - bearing
     cos = math.cos(at_point)
-    rate = (curvature - math.sin(at_point) / distance) / cos if cos > _ACROSS else 0.0
+    rate = (curvature - math.sin(at_point) / distance) / cos if cos > ACROSS else 0.0
     return Chord(arclength, bearing, at_point, rate)
 
 
 @inlined
-def _chord(varied: Varied | None, curvature: float, reach: float, distance: float) -> Chord:
+def _chord(varied: Varied | None, beam: Beam, distance: float) -> Chord:
     if varied is None:
+        curvature = beam.curvature
         sine = min(max(0.5 * curvature * distance, -1.0), 1.0)
         angle, cos = math.asin(sine), math.sqrt((1.0 - sine) * (1.0 + sine))
         arclength = distance if curvature == 0.0 else 2.0 * angle / curvature
-        return Chord(arclength, angle, angle, 0.5 * curvature / cos if cos > _ACROSS else 0.0)
+        return Chord(arclength, angle, angle, 0.5 * curvature / cos if cos > ACROSS else 0.0)
     if varied.slenderness > 0.0:
-        in_table = chord_in(varied.sheet, varied.sign != varied.profile.sign, reach, distance)
-        return Chord(in_table.arclength, in_table.at_base, in_table.at_point, in_table.rate)
+        return chord_in(varied.sheet, varied.sign != varied.profile.sign, beam.own_reach, distance)
     found = chord_along(varied.profile, 0.0, distance, varied.work)
     return _to_chord(found.arclength, found.bearing, found.slope, found.curvature, distance)
 
 
-@compiled
-def bending(beam: Beam, drive_angle: float, moment: float, force_x: float, force_y: float, arclength: float) -> float:
-    """Largest change of curvature between pivot and contact in a forward contact, times the diameter over that at the
-    base [1/L]."""
-    if beam.stem != 0.0:
-        moment -= lever_of_stem(beam.stem, drive_angle, force_x, force_y)
-    return _bending(beam.varied, beam.curvature, drive_angle, moment, force_x, force_y, arclength)
-
-
-@compiled
-def _bending(
+@by_kind
+def bending(
     varied: Varied | None,
-    curvature: float,
+    beam: Beam,
     drive_angle: float,
     moment: float,
     force_x: float,
     force_y: float,
     arclength: float,
 ) -> float:
-    if varied is None:
-        # It is extreme at the pivot, and where the rod lies across the force, if it does so.
-        cos, sin = math.cos(drive_angle), math.sin(drive_angle)
-        lever, across = force_x * cos + force_y * sin, force_y * cos - force_x * sin
-        if across >= 0.0:
-            return abs(moment)
-        at_pivot = curvature - moment
-        before = at_pivot * at_pivot - 2.0 * (math.hypot(force_x, force_y) + lever)
-        if at_pivot > 0.0 and before > 0.0:  # the curvature keeps its sign
-            return max(abs(moment), curvature - math.sqrt(before))
-        bent = math.sqrt(at_pivot * at_pivot + 2.0 * (math.hypot(force_x, force_y) - lever))
-        return max(abs(moment), curvature + bent)
-    return largest_bending_along(varied.profile, drive_angle, moment, force_x, force_y, arclength, varied.work)
+    """Largest change of curvature between pivot and contact in a forward contact, times the diameter over that at the
+    base [1/L]."""
+    if beam.stem != 0.0:
+        moment -= lever_of_stem(beam.stem, drive_angle, force_x, force_y)
+    if varied is not None:
+        return largest_bending_along(varied.profile, drive_angle, moment, force_x, force_y, arclength, varied.work)
+    # It is extreme at the pivot, and where the rod lies across the force, if it does so.
+    cos, sin = math.cos(drive_angle), math.sin(drive_angle)
+    lever, across = force_x * cos + force_y * sin, force_y * cos - force_x * sin
+    if across >= 0.0:
+        return abs(moment)
+    at_pivot = beam.curvature - moment
+    before = at_pivot * at_pivot - 2.0 * (math.hypot(force_x, force_y) + lever)
+    if at_pivot > 0.0 and before > 0.0:  # the curvature keeps its sign
+        return max(abs(moment), beam.curvature - math.sqrt(before))
+    bent = math.sqrt(at_pivot * at_pivot + 2.0 * (math.hypot(force_x, force_y) - lever))
+    return max(abs(moment), beam.curvature + bent)
 
 
-@compiled
-def rest_curvature(beam: Beam, arclength: float) -> float:
+@by_kind
+def rest_curvature(varied: Varied | None, beam: Beam, arclength: float) -> float:
     """Rest curvature at an arc length [1/L]."""
-    return _rest_curvature(beam.varied, beam.curvature, arclength)
-
-
-@compiled
-def _rest_curvature(varied: Varied | None, curvature: float, arclength: float) -> float:
     if varied is None:
-        return curvature
+        return beam.curvature
     return rest_curvature_at(varied.profile, cell_at(varied.profile, arclength, FORWARD), arclength)
 
 
@@ -403,72 +388,51 @@ def is_straight(beam: Beam) -> bool:
     return beam.varied is None and beam.curvature == 0.0
 
 
-@compiled
-def free_end(beam: Beam, arclength: float) -> tuple[float, float]:
+@by_kind
+def free_end(varied: Varied | None, beam: Beam, arclength: float) -> tuple[float, float]:
     """Tip of the free end beyond a contact, along the rod there and to its left [L]."""
-    return _free_end(beam.varied, beam.curvature, arclength)
-
-
-@compiled
-def _free_end(varied: Varied | None, curvature: float, arclength: float) -> tuple[float, float]:
     if varied is None:
-        return _end_of_arc(curvature, 1.0 - arclength)
+        return end_of_arc(beam.curvature, 1.0 - arclength)
     return beyond_along(varied.profile, arclength, varied.work)
 
 
 @compiled
-def _end_of_arc(curvature: float, length: float) -> tuple[float, float]:
+def end_of_arc(curvature: float, length: float) -> tuple[float, float]:
     """End of an arc, along it at its beginning, and to its left [L]."""
     turn = 0.5 * curvature * length
     chord = length if turn == 0.0 else length * math.sin(turn) / turn
     return chord * math.cos(turn), chord * math.sin(turn)
 
 
-@compiled
-def rest_point(beam: Beam, way: float) -> tuple[float, float]:
+@by_kind
+def rest_point(varied: Varied | None, beam: Beam, way: float) -> tuple[float, float]:
     """Point of stem or rod at rest at a way along them from the pivot: along the stem, and to its left [L]."""
     if way <= beam.stem:
         return way, 0.0
-    return _rest_point(beam.varied, beam.curvature, beam.stem, way - beam.stem)
-
-
-@compiled
-def _rest_point(varied: Varied | None, curvature: float, stem: float, arclength: float) -> tuple[float, float]:
     if varied is None:
-        along, across = _end_of_arc(curvature, arclength)
-        return stem + along, across
-    found = rest_along(varied.profile, stem, arclength, varied.work)
+        along, across = end_of_arc(beam.curvature, way - beam.stem)
+        return beam.stem + along, across
+    found = rest_along(varied.profile, beam.stem, way - beam.stem, varied.work)
     return found.distance * math.cos(found.bearing), found.distance * math.sin(found.bearing)
 
 
-@compiled
-def from_tip(beam: Beam, psi1: float) -> March:
+@by_kind
+def from_tip(varied: Varied | None, beam: Beam, psi1: float) -> March:
     """Start of a walk along a rod in tip contact; see `loaded_part`."""
-    return _from_tip(beam.varied, psi1)
-
-
-@compiled
-def _from_tip(varied: Varied | None, psi1: float) -> March:
     if varied is None:
         return March(1.0, 0, State(psi1, 0.0, 0.0, 0.0), 0)
     return at_contact(varied.profile, psi1, 1.0)
 
 
-@compiled
-def loaded_part(beam: Beam, psi1: float, force: float, part: int, before: March) -> March:
-    """End of a part of a rod in tip contact, counted from the tip, as seen from there as in `pose`.
+@by_kind
+def loaded_part(varied: Varied | None, beam: Beam, psi1: float, force: float, part: int, before: March) -> March:
+    """End of one of the `PARTS` of a rod in tip contact, counted from the tip, as seen from there as in `pose`.
 
-    There are `PARTS` of the same length, and the walk goes on from the end of the part before.
+    The walk goes on from the end of the part before; where there are tables, roughly.
     """
-    return _loaded_part(beam.varied, beam.curvature, psi1, force, part, before)
-
-
-@compiled
-def _loaded_part(varied: Varied | None, curvature: float, psi1: float, force: float, part: int, before: March) -> March:
     share = part / PARTS
     if varied is None:
-        here = pose(psi1, share, force, curvature)
+        here = pose(psi1, share, force, beam.curvature)
         return March(1.0 - share, 0, State(psi1 + here.turn, 0.0, here.u, here.v), 0)
-    if _is_tabulated(varied) and has_parts(varied.sheet, force):
-        return March(1.0 - share, 0, part_in(varied.sheet, psi1, force, part, before.state), 0)
-    return part_along(varied.profile, before, 1.0 - share, force, varied.work)
+    remainder = ROUGH if varied.slenderness > 0.0 else EXACT
+    return part_along(varied.profile, before, 1.0 - share, force, varied.work, remainder)

@@ -20,15 +20,17 @@ from tactile_bayes.mechanics.poses.arc import (
     slopes_by_chi,
 )
 
-__all__ = ["tangential_arc", "tip_arc"]
+__all__ = ["NO_ARC", "tangential_arc", "tip_arc"]
 
 _SETTLED = 1e-8
-"""Relative Newton step at which a first-order correction of the arc leaves rounding errors only."""
+"""Relative Newton step after which only rounding errors are left."""
 
 _MAX_STEPS = 40
 
 _CHI_MAX = 3.2
 """Bound on the amplitude, a little over π, at which the line of force passes through the pivot."""
+
+NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
 
 
 @compiled
@@ -46,14 +48,22 @@ def tangential_arc(angle: float, m: float, guess: float) -> tuple[float, Arc, Ar
             root = math.sqrt(chord_direction(arc))
             step = (root - target) * 2.0 * root / chord_direction_rate(arc, by_chi)
         if abs(step) <= _SETTLED * x:
-            return x - step, _moved(arc, by_chi, -step), slopes_by_chi(x - step, m)
+            # To first order, which leaves rounding errors only, and costs less than another arc.
+            length, shortfall, offset, turn = arc
+            moved = Arc(
+                length - by_chi.length * step,
+                shortfall - by_chi.shortfall * step,
+                offset - by_chi.offset * step,
+                turn - by_chi.turn * step,
+            )
+            return x - step, moved, slopes_by_chi(x - step, m)
         x = min(max(x - step, 0.5 * x), math.pi)
-    return math.nan, Arc(math.nan, math.nan, math.nan, math.nan), Arc(math.nan, math.nan, math.nan, math.nan)
+    return math.nan, NO_ARC, NO_ARC
 
 
 @compiled
 def tip_arc(deficit: float, chord_angle: float, chi: float, epsilon1: float) -> tuple[float, float, Arc, Arc, Arc]:
-    """Amplitude χ ∈ [0, π], ε1 = π/2 − ψ1, arc, and its derivatives by χ and ψ1 (to 1e-8), of a rod of length one.
+    """Amplitude χ ∈ [0, π], ε1 = π/2 − ψ1, arc, and its derivatives by χ and ψ1, of a rod of length one.
 
     Its chord has the length √(1 − deficit²). `chord_angle` ∈ [0, π/2 + δ] is π/2 minus the chord's angle to the
     direction across the force; `chi` and `epsilon1` are a first guess. NaN where Newton's method does not converge.
@@ -71,19 +81,8 @@ def tip_arc(deficit: float, chord_angle: float, chi: float, epsilon1: float) -> 
             dx = (miss * (1.0 - angle_t) - value_t * angle_miss) / det
             dt = (value_x * angle_miss + angle_x * miss) / det
         if abs(dx) <= _SETTLED * x and abs(dt) <= _SETTLED * t:
-            return x - dx, t - dt, _moved(_moved(arc, by_chi, -dx), by_psi1, dt), by_chi, by_psi1
+            arc, by_chi, by_psi1 = arc_and_slopes(x - dx, math.sin(0.5 * (t - dt)) ** 2)
+            return x - dx, t - dt, arc, by_chi, by_psi1
         x = min(max(x - dx, 0.5 * x), min(1.5 * x, _CHI_MAX))
         t = min(max(t - dt, 0.5 * t), 0.5 * (t + math.pi))
-    nowhere = Arc(math.nan, math.nan, math.nan, math.nan)
-    return math.nan, math.nan, nowhere, nowhere, nowhere
-
-
-@compiled
-def _moved(arc: Arc, by: Arc, step: float) -> Arc:
-    """Arc after a small step, to first order."""
-    return Arc(
-        arc.length + by.length * step,
-        arc.shortfall + by.shortfall * step,
-        arc.offset + by.offset * step,
-        arc.turn + by.turn * step,
-    )
+    return math.nan, math.nan, NO_ARC, NO_ARC, NO_ARC

@@ -16,13 +16,12 @@ with D = 1 − x y s⁴ (DLMF 22.6.5 to 22.6.7, and 22.16.27 for J), to some rou
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.compiler import compiled, inlined
 
 __all__ = ["Jacobi", "jacobi", "jacobi_and_slopes"]
 
@@ -44,62 +43,34 @@ class Jacobi(NamedTuple):
     j: float
 
 
-Polynomial = dict[tuple[int, int], Fraction]
-"""Coefficients by the powers of x + y and of x y."""
-
-
 def _power_series() -> tuple[Floats, Floats]:
-    """Coefficients of s and J, in powers of x y (rows) and x + y; those of t follow, since terms are homogeneous."""
+    """Coefficients of s and J, in powers of x y (rows) and x + y; those of t follow, since terms are homogeneous.
 
-    def product(one: Polynomial, other: Polynomial) -> Polynomial:
-        found: Polynomial = {}
-        for (i, j), a in one.items():
-            for (k, m), b in other.items():
-                found[i + k, j + m] = found.get((i + k, j + m), Fraction(0)) + a * b
+    Each iteration of s'' = −(x + y) s + 2 x y s³ makes one more order exact.
+    """
+    rows, columns = _TERMS // 2 + 1, _TERMS
+    order = np.add.outer(2 * np.arange(rows), np.arange(columns))  # n of t^(2 n + 1)
+    one, total, both = (np.zeros((rows, columns)) for _ in range(3))
+    one[0, 0], total[0, 1], both[1, 0] = 1.0, 1.0, 2.0
+
+    def product(a: Floats, b: Floats) -> Floats:
+        found = np.zeros((rows, columns))
+        for j, i in np.argwhere(a):
+            found[j:, i:] += a[j, i] * b[: rows - j, : columns - i]
         return found
 
-    def convolved(one: list[Polynomial], other: list[Polynomial], order: int) -> Polynomial:
-        found: Polynomial = {}
-        for i in range(order + 1):
-            for power, a in product(one[i], other[order - i]).items():
-                found[power] = found.get(power, Fraction(0)) + a
-        return found
-
-    def table(series: list[Polynomial]) -> Floats:
-        found = np.zeros((_TERMS // 2 + 1, _TERMS))
-        for terms in series:
-            for (i, j), a in terms.items():
-                found[j, i] = float(a)
-        return found
-
-    s: list[Polynomial] = [{(0, 0): Fraction(1)}]
-    squares: list[Polynomial] = []
-    for n in range(1, _TERMS + 1):  # s'' = −(x + y) s + 2 x y s³
-        squares.append(convolved(s, s, n - 1))
-        wanted = {(i + 1, j): -a for (i, j), a in s[n - 1].items()}
-        for (i, j), a in (convolved(squares, s, n - 2) if n > 1 else {}).items():
-            wanted[i, j + 1] = wanted.get((i, j + 1), Fraction(0)) + 2 * a
-        s.append({power: a / (2 * n * (2 * n + 1)) for power, a in wanted.items()})
-    integral = [{power: a / (2 * n + 3) for power, a in terms.items()} for n, terms in enumerate(squares)]
-    return table(s[:_TERMS]), table(integral)
+    s = one
+    for _ in range(_TERMS):
+        rate = product(both, product(s, product(s, s))) - product(total, s)
+        s = one + rate / np.maximum(2 * order * (2 * order + 1), 1)
+    return s, product(s, s) / (2 * order + 3)
 
 
 _S, _J = _power_series()
 
 
 @compiled
-def _series(table: Floats, total: float, product: float) -> float:
-    value = 0.0
-    for j in range(table.shape[0] - 1, -1, -1):
-        row = 0.0
-        for i in range(_TERMS - 1 - 2 * j, -1, -1):
-            row = row * total + table[j, i]
-        value = value * product + row
-    return value
-
-
-@compiled
-def _series_and_slopes(table: Floats, total: float, product: float) -> tuple[float, float, float]:
+def _series(table: Floats, total: float, product: float) -> tuple[float, float, float]:
     """Value of a series, and its derivatives by both variables."""
     value, by_total, by_product = 0.0, 0.0, 0.0
     for j in range(table.shape[0] - 1, -1, -1):
@@ -130,33 +101,20 @@ def _halvings(x: float, y: float) -> int:
 @compiled
 def jacobi(x: float, y: float) -> Jacobi:
     """Functions for the parameters x, y ≥ 0, below a thousand."""
-    count = _halvings(x, y)
-    t = 0.5**count
-    square = t * t
-    total, product = (x + y) * square, x * y * square * square
-    s, j = t * _series(_S, total, product), t * square * _series(_J, total, product)
-    c, d = math.sqrt(1.0 - x * s * s), math.sqrt(1.0 - y * s * s)
-    r = s * s / (1.0 + d)
-    for _ in range(count):
-        s2, c2, d2 = s * s, c * c, d * d
-        share = 2.0 / (1.0 - x * y * s2 * s2)
-        s = s * c * d * share
-        c, r, j = 1.0 - x * s2 * d2 * share, s2 * c2 * share, 2.0 * j + s2 * s
-        d = 1.0 - y * r
-    return Jacobi(s, c, d, r, j)
+    return jacobi_and_slopes(x, y)[0]
 
 
-@compiled
+@inlined  # so that its slopes cost nothing where they are not used
 def jacobi_and_slopes(x: float, y: float) -> tuple[Jacobi, Jacobi, Jacobi]:
     """Functions for the parameters x, y ≥ 0, and their derivatives by x and by y."""
     count = _halvings(x, y)
     t = 0.5**count
     square = t * t
     total, product = (x + y) * square, x * y * square * square
-    s, by_total, by_product = _series_and_slopes(_S, total, product)
+    s, by_total, by_product = _series(_S, total, product)
     s, by_total, by_product = t * s, t * square * by_total, t * square * square * by_product
     s_x, s_y = by_total + y * by_product, by_total + x * by_product
-    j, by_total, by_product = _series_and_slopes(_J, total, product)
+    j, by_total, by_product = _series(_J, total, product)
     cube = t * square
     j, by_total, by_product = cube * j, cube * square * by_total, cube * square * square * by_product
     j_x, j_y = by_total + y * by_product, by_total + x * by_product

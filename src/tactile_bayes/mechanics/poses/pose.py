@@ -25,11 +25,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.jacobi import Jacobi, jacobi, jacobi_and_slopes
 
-__all__ = ["Pose", "by_arclength", "pose", "pose_and_slopes", "write_poses"]
+__all__ = ["ACROSS", "Chord", "Pose", "by_arclength", "pose", "pose_and_slopes"]
+
+ACROSS = 1e-6
+"""Cosine of the angle of a chord to the rod that counts as zero: the rod goes no farther from the pivot."""
 
 
 class Pose(NamedTuple):
@@ -41,6 +43,19 @@ class Pose(NamedTuple):
     """Its component against the force."""
     turn: float
     """Slope of the rod at the pivot less the slope at the contact [rad]."""
+
+
+class Chord(NamedTuple):
+    """Line from the pivot to a point of the rod at rest."""
+
+    arclength: float
+    """Arc length of the point [L], < 0 on the stem."""
+    at_base: float
+    """Angle from the rod at the pivot to the chord [rad]."""
+    at_point: float
+    """Angle from the chord to the rod at the point [rad]."""
+    rate: float
+    """Derivative of `at_point` by the length of the chord."""
 
 
 class _Start(NamedTuple):
@@ -109,9 +124,10 @@ def pose_and_slopes(
     parts = _parts(start, at)
     turn = -2.0 * math.atan2(parts.sin_turn, parts.cos_turn)
     here = Pose(arclength * parts.u, arclength * parts.v, turn)
-    by_force = _by_load(start, at, by_x, by_y, parts, arclength)
-    if tip:
-        return here, _by_psi1(start, at, by_x, parts, arclength), by_force
+    by_force = _by(start, at, by_x, by_y, parts, arclength, 0.0, 0.0, arclength * arclength)
+    if tip:  # ψ1 = π/2 − 2 A1
+        sin_by, cos_by = -0.5 * start.cos, 0.5 * start.sin
+        return here, _by(start, at, by_x, by_y, parts, arclength, sin_by, cos_by, 0.0), by_force
     return here, by_arclength(psi1, force, curvature, here), by_force
 
 
@@ -123,69 +139,37 @@ def by_arclength(psi1: float, force: float, curvature: float, here: Pose) -> Pos
 
 
 @compiled
-def _by_load(start: _Start, at: Jacobi, by_x: Jacobi, by_y: Jacobi, parts: _Parts, arclength: float) -> Pose:
-    """Derivative of a pose by the force."""
-    sin, cos, bend, load = start
-    s, c, d, r, j = at
-    s2, sin2, sc = s * s, sin * sin, sin * cos
-    s_by, c_by, d_by = by_x.s * sin2 + by_y.s, by_x.c * sin2 + by_y.c, by_x.d * sin2 + by_y.d
-    r_by, j_by = by_x.r * sin2 + by_y.r, by_x.j * sin2 + by_y.j
-    s2_by = 2.0 * s * s_by
-    shrink = sin2 * (s2 + load * s2_by)  # less the derivative of D
-    u_by = (2.0 * (sc * (s_by * c + s * c_by) + bend * (r_by - sin2 * s2_by)) + parts.u * shrink) * parts.inverse
-    pivot = parts.sin_pivot
-    pivot_by = (sin * (c_by * d + c * d_by) + bend * cos * s_by + pivot * shrink) * parts.inverse
-    v_by = -2.0 * (sin2 * j + (bend * bend + load * sin2) * j_by + sin * (s_by * pivot + s * pivot_by))
-    mixed_by, loaded, loaded_by = sin2 * d_by, load * r, r + load * r_by
-    sin_by = bend * (s_by * parts.mixed + s * mixed_by) - sc * (c_by * loaded + c * loaded_by)
-    cos_by = c_by * parts.mixed + c * mixed_by + sc * bend * (s_by * loaded + s * loaded_by)
-    return _scaled(u_by, v_by, sin_by, cos_by, shrink, parts, arclength, arclength * arclength)
-
-
-@compiled
-def _by_psi1(start: _Start, at: Jacobi, by_x: Jacobi, parts: _Parts, arclength: float) -> Pose:
-    """Derivative of a pose by ψ1 = π/2 − 2 A1."""
-    sin, cos, bend, load = start
-    s, c, d, r, j = at
-    s2, sin2, sc = s * s, sin * sin, sin * cos
-    sin2_by, sc_by = 2.0 * sc, (cos - sin) * (cos + sin)
-    x_by = load * sin2_by
-    s_by, c_by, d_by, r_by, j_by = by_x.s * x_by, by_x.c * x_by, by_x.d * x_by, by_x.r * x_by, by_x.j * x_by
-    s2_by = 2.0 * s * s_by
-    shrink = load * (sin2_by * s2 + sin2 * s2_by)
-    u_by = sc_by * s * c + sc * (s_by * c + s * c_by) + bend * (r_by - sin2_by * s2 - sin2 * s2_by)
-    u_by = (2.0 * u_by + parts.u * shrink) * parts.inverse
-    pivot = parts.sin_pivot
-    pivot_by = cos * c * d + sin * (c_by * d + c * d_by) + bend * (cos * s_by - sin * s) + pivot * shrink
-    pivot_by *= parts.inverse
-    v_by = -2.0 * (x_by * j + (bend * bend + load * sin2) * j_by + (cos * s + sin * s_by) * pivot + sin * s * pivot_by)
-    mixed_by, loaded, loaded_by = sin2_by * (d - 1.0) + sin2 * d_by, load * r, load * r_by
-    sin_by = bend * (s_by * parts.mixed + s * mixed_by) - (sc_by * c + sc * c_by) * loaded - sc * c * loaded_by
-    cos_by = c_by * parts.mixed + c * mixed_by
-    cos_by += bend * ((sc_by * s + sc * s_by) * loaded + sc * s * loaded_by)
-    return _scaled(u_by, v_by, sin_by, cos_by, shrink, parts, arclength, -0.5)
-
-
-@compiled
-def _scaled(
-    u_by: float,
-    v_by: float,
-    sin_by: float,
-    cos_by: float,
-    shrink: float,
+def _by(
+    start: _Start,
+    at: Jacobi,
+    by_x: Jacobi,
+    by_y: Jacobi,
     parts: _Parts,
     arclength: float,
-    scale: float,
+    sin_by: float,
+    cos_by: float,
+    load_by: float,
 ) -> Pose:
-    sin_by = (sin_by + parts.sin_turn * shrink) * parts.inverse
-    cos_by = (cos_by + parts.cos_turn * shrink) * parts.inverse
-    turn_by = -2.0 * (parts.cos_turn * sin_by - parts.sin_turn * cos_by)
-    return Pose(scale * arclength * u_by, scale * arclength * v_by, scale * turn_by)
-
-
-@cached
-def write_poses(columns: Floats, out: Floats) -> None:
-    """Write u and v, shape (2, n), for rows of ψ1, arc length, force and rest curvature, shape (n, 4)."""
-    for i in range(columns.shape[0]):
-        here = pose(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3])
-        out[0, i], out[1, i] = here.u, here.v
+    """Derivative of a pose by a variable, from those of sin A1, cos A1 and the load y."""
+    sin, cos, bend, load = start
+    s, c, d, r, j = at
+    sin2, sc, sin2_by, sc_by = sin * sin, sin * cos, 2.0 * sin * sin_by, sin * cos_by + sin_by * cos
+    x, x_by = bend * bend + load * sin2, load * sin2_by + load_by * sin2
+    s_by, c_by = by_x.s * x_by + by_y.s * load_by, by_x.c * x_by + by_y.c * load_by
+    d_by = by_x.d * x_by + by_y.d * load_by
+    r_by, j_by = by_x.r * x_by + by_y.r * load_by, by_x.j * x_by + by_y.j * load_by
+    lean, lean_by = sin2 * s * s, sin2_by * s * s + 2.0 * sin2 * s * s_by
+    shrink = load * lean_by + load_by * lean  # less the derivative of D
+    u_by = 2.0 * (sc_by * s * c + sc * (s_by * c + s * c_by) + bend * (r_by - lean_by)) + parts.u * shrink
+    pivot = parts.sin_pivot
+    pivot_by = sin_by * c * d + sin * (c_by * d + c * d_by) + bend * (cos_by * s + cos * s_by) + pivot * shrink
+    pivot_by *= parts.inverse
+    v_by = -2.0 * (x_by * j + x * j_by + (sin_by * s + sin * s_by) * pivot + sin * s * pivot_by)
+    mixed_by, loaded, loaded_by = sin2_by * (d - 1.0) + sin2 * d_by, load * r, load_by * r + load * r_by
+    turn_sin_by = bend * (s_by * parts.mixed + s * mixed_by) - (sc_by * c + sc * c_by) * loaded - sc * c * loaded_by
+    turn_cos_by = c_by * parts.mixed + c * mixed_by
+    turn_cos_by += bend * ((sc_by * s + sc * s_by) * loaded + sc * s * loaded_by)
+    turn_sin_by += parts.sin_turn * shrink
+    turn_cos_by += parts.cos_turn * shrink
+    turn_by = -2.0 * (parts.cos_turn * turn_sin_by - parts.sin_turn * turn_cos_by) * parts.inverse
+    return Pose(arclength * u_by * parts.inverse, arclength * v_by, turn_by)

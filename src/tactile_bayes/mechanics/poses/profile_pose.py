@@ -15,18 +15,15 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.pose import Pose
 from tactile_bayes.mechanics.poses.taylor import (
     BACKWARD,
-    MOST_STEPS,
+    EXACT,
     March,
-    One,
     Other,
     Slope,
     State,
     advance,
     begin,
     cell_at,
-    moved,
     rest_curvature_at,
-    slope_series,
     slopes_moved,
 )
 from tactile_bayes.mechanics.rods.profile import Profile
@@ -37,7 +34,7 @@ __all__ = ["at_contact", "part_along", "pose_along", "pose_along_and_slopes", "p
 @compiled
 def pose_along(profile: Profile, psi1: float, arclength: float, force: float, work: Floats) -> Pose:
     """Pose for ψ1, arc length s1 and force f, in rod lengths and EI(0)/L²."""
-    march = part_along(profile, at_contact(profile, psi1, arclength), 0.0, force, work)
+    march = part_along(profile, at_contact(profile, psi1, arclength), 0.0, force, work, EXACT)
     return Pose(march.state.u, march.state.v, march.state.psi - psi1)
 
 
@@ -48,10 +45,10 @@ def at_contact(profile: Profile, psi1: float, arclength: float) -> March:
 
 
 @compiled
-def part_along(profile: Profile, march: March, until: float, force: float, work: Floats) -> March:
+def part_along(profile: Profile, march: March, until: float, force: float, work: Floats, remainder: float) -> March:
     """March on toward the pivot, to an arc length."""
     while march.at > until:
-        _, march = advance(profile, march, BACKWARD, until, force, work)
+        _, march = advance(profile, march, BACKWARD, until, force, work, remainder)
     return march
 
 
@@ -60,9 +57,11 @@ def pose_along_and_slopes(
     profile: Profile, psi1: float, arclength: float, force: float, work: Floats
 ) -> tuple[Pose, Pose, Pose, Pose]:
     """Pose, and its derivatives by ψ1, by the arc length, and by the force."""
-    by_psi1, by_arclength = _begun(psi1), _lengthened(profile, psi1, arclength)
+    by_psi1 = _at_contact_by(profile, psi1, arclength, True)
+    by_arclength = _at_contact_by(profile, psi1, arclength, False)
     here, one, other, last = _marched(profile, psi1, arclength, force, by_psi1, by_arclength, work)
-    return here, _by_psi1(here, one, last, force), _by_arclength(here, psi1, other, last, force), _by_force(last)
+    by_q, by_other = _by(here, one, last, force, psi1, True), _by(here, other, last, force, psi1, False)
+    return here, by_q, by_other, Pose(last.u, last.v, last.psi)
 
 
 @compiled
@@ -70,65 +69,34 @@ def pose_along_in_phase(
     profile: Profile, psi1: float, arclength: float, force: float, tip: bool, work: Floats
 ) -> tuple[Pose, Pose, Pose]:
     """Pose, and its derivatives by ψ1 in tip contact or by the arc length in tangential contact, and by the force."""
+    by_q = _at_contact_by(profile, psi1, arclength, tip)
+    here, one, _, last = _marched(profile, psi1, arclength, force, by_q, None, work)
+    return here, _by(here, one, last, force, psi1, tip), Pose(last.u, last.v, last.psi)
+
+
+@compiled
+def _at_contact_by(profile: Profile, psi1: float, arclength: float, tip: bool) -> Slope:
+    """Derivative of the state at the contact by ψ1, or by the arc length: a longer rod passes it unloaded."""
     if tip:
-        here, one, _, last = _marched(profile, psi1, arclength, force, _begun(psi1), None, work)
-        return here, _by_psi1(here, one, last, force), _by_force(last)
-    by_arclength = _lengthened(profile, psi1, arclength)
-    here, _, other, last = _marched(profile, psi1, arclength, force, None, by_arclength, work)
-    return here, _by_arclength(here, psi1, other, last, force), _by_force(last)
-
-
-@compiled
-def _begun(psi1: float) -> Slope:
-    """Derivative of the state at the contact by ψ1."""
-    return Slope(1.0, 0.0, 0.0)
-
-
-@compiled
-def _lengthened(profile: Profile, psi1: float, arclength: float) -> Slope:
-    """Derivative of the state there by the arc length: a longer rod passes its former contact unloaded."""
+        return Slope(1.0, 0.0, 0.0)
     curvature = rest_curvature_at(profile, cell_at(profile, arclength, BACKWARD), arclength)
     return Slope(-curvature, math.cos(psi1), math.sin(psi1))
 
 
 @compiled
-def _by_psi1(here: Pose, by: Slope, last: Slope, force: float) -> Pose:
-    return Pose(by.u, here.u * by.psi - force * (by.u * last.psi - last.u * by.psi), by.psi - 1.0)
-
-
-@compiled
-def _by_arclength(here: Pose, psi1: float, by: Slope, last: Slope, force: float) -> Pose:
-    return Pose(by.u, math.sin(psi1) + here.u * by.psi - force * (by.u * last.psi - last.u * by.psi), by.psi)
-
-
-@compiled
-def _by_force(last: Slope) -> Pose:
-    return Pose(last.u, last.v, last.psi)
+def _by(here: Pose, by: Slope, last: Slope, force: float, psi1: float, tip: bool) -> Pose:
+    """Derivative of a pose by ψ1 or the arc length, from those of the state and of the state by the force."""
+    v = here.u * by.psi - force * (by.u * last.psi - last.u * by.psi)
+    return Pose(by.u, v, by.psi - 1.0) if tip else Pose(by.u, math.sin(psi1) + v, by.psi)
 
 
 @compiled
 def _marched(
-    profile: Profile,
-    psi1: float,
-    arclength: float,
-    force: float,
-    by_psi1: One,
-    by_arclength: Other,
-    work: Floats,
-) -> tuple[Pose, One, Other, Slope]:
-    """Pose, and derivatives of the state by ψ1, arc length and force; None is left out."""
-    state, at, steps, by_force = State(psi1, 0.0, 0.0, 0.0), arclength, 0, Slope(0.0, 0.0, 0.0)
-    cell = cell_at(profile, at, BACKWARD)
-    while at > 0.0 and steps < MOST_STEPS:
-        length = at - profile.edges[cell]
-        step = slope_series(profile, cell, at, length, force, state, by_psi1, by_arclength, by_force, work)
-        state = moved(state, force, step, step.share, work)
-        by_psi1, by_arclength, by_force = slopes_moved(step, by_psi1, by_arclength, work)
-        at -= step.share * length
-        if step.share == 1.0:
-            at = profile.edges[cell]
-            cell -= 1
-        else:
-            steps += 1
-    u, v = (math.nan, math.nan) if at > 0.0 else (state.u, state.v)
-    return Pose(u, v, state.psi - psi1), by_psi1, by_arclength, by_force
+    profile: Profile, psi1: float, arclength: float, force: float, by_q: Slope, other: Other, work: Floats
+) -> tuple[Pose, Slope, Other, Slope]:
+    """Pose, and derivatives of the state by ψ1 or the arc length, by the other unless it is None, and by the force."""
+    march, by_force = at_contact(profile, psi1, arclength), Slope(0.0, 0.0, 0.0)
+    while march.at > 0.0:
+        step, march = advance(profile, march, BACKWARD, 0.0, force, work, EXACT, by_q, other, by_force)
+        by_q, other, by_force = slopes_moved(step, other, work)
+    return Pose(march.state.u, march.state.v, march.state.psi - psi1), by_q, other, by_force

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.poses.rises import peak, rise
 from tactile_bayes.mechanics.poses.taylor import (
+    EXACT,
     FARTHEST,
     FORWARD,
     ROUGH,
@@ -20,10 +20,12 @@ from tactile_bayes.mechanics.poses.taylor import (
     State,
     advance,
     begin,
-    bending_at,
     cell_at,
     moved,
+    peak,
     rest_curvature_at,
+    rigidity_in,
+    rise,
 )
 from tactile_bayes.mechanics.rods.profile import Profile
 
@@ -55,9 +57,6 @@ class Chord(NamedTuple):
     """Rest curvature there [1/L]."""
 
 
-_AT_REST = State(0.0, 0.0, 0.0, 0.0)
-
-
 @compiled
 def shape_along(
     profile: Profile,
@@ -87,7 +86,7 @@ def shape_along(
             state = before.state
             unloaded = State(state.psi, 0.0, state.u, state.v)
             before, acting, end = March(before.at, before.cell, unloaded, before.steps), 0.0, tip
-        step, march = advance(profile, before, FORWARD, end, acting, work)
+        step, march = advance(profile, before, FORWARD, end, acting, work, EXACT)
         for k in range(arclengths.size):
             if before.at < arclengths[k] <= march.at:
                 share = step.share * (arclengths[k] - before.at) / (march.at - before.at)
@@ -98,32 +97,35 @@ def shape_along(
 @compiled
 def rest_along(profile: Profile, stem: float, arclength: float, work: Floats) -> Chord:
     """Point of the rod at rest at an arc length."""
-    march = begin(profile, 0.0, FORWARD, State(0.0, 0.0, stem, 0.0))
-    while march.at < arclength:
-        _, march = advance(profile, march, FORWARD, arclength, 0.0, work)
+    march = _at_rest(profile, begin(profile, 0.0, FORWARD, State(0.0, 0.0, stem, 0.0)), arclength, work)
     return _chord(profile, march.at, march.state)
 
 
 @compiled
 def beyond_along(profile: Profile, arclength: float, work: Floats) -> tuple[float, float]:
     """Tip of the rod at rest, along the rod at an arc length, and to its left."""
-    march = begin(profile, arclength, FORWARD, _AT_REST)
-    while march.at < 1.0:
-        _, march = advance(profile, march, FORWARD, 1.0, 0.0, work)
-    return march.state.u, march.state.v
+    end = _at_rest(profile, begin(profile, arclength, FORWARD, State(0.0, 0.0, 0.0, 0.0)), 1.0, work).state
+    return end.u, end.v
+
+
+@compiled
+def _at_rest(profile: Profile, march: March, until: float, work: Floats) -> March:
+    while march.at < until:
+        _, march = advance(profile, march, FORWARD, until, 0.0, work, EXACT)
+    return march
 
 
 @compiled
 def chord_along(profile: Profile, stem: float, distance: float, work: Floats) -> Chord:
     """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
 
-    The rod is continued beyond its tip as in `zeros_along`."""
+    The rod is continued beyond its tip as in `contacts.states`."""
     beginning = State(0.0, 0.0, stem, 0.0)
     march = begin(profile, 0.0, FORWARD, beginning)
     found, farthest, at = beginning, 0.0, 0.0
     while march.at < FARTHEST:
         before = march
-        step, march = advance(profile, before, FORWARD, FARTHEST, 0.0, work)
+        step, march = advance(profile, before, FORWARD, FARTHEST, 0.0, work, EXACT)
         x = rise(before.state, 0.0, step, 0.0, distance, work)
         reaches = x >= 0.0
         if not reaches:
@@ -162,6 +164,6 @@ def largest_bending_along(
         count = 2 + int(_SAMPLES * step.share * step.length)
         for k in range(count):
             x = step.share * k / (count - 1)
-            bending, _ = bending_at(step, moved(before.state, force, step, x, work).load, x, work)
+            bending = moved(before.state, force, step, x, work).load / rigidity_in(step, x, work)
             strain = max(strain, abs(bending) * (1.0 - profile.taper * (before.at + x * step.length)))
     return math.nan if math.isnan(march.state.psi) else strain

@@ -13,6 +13,8 @@ A step goes as far as the last coefficients allow, and not beyond a cell of the 
 contact and by the force obey the linearised equations, whose series need no other products than
 
     δψ' = δP/B,    δu' = −sin ψ δψ,    δv' = cos ψ δψ,    δP = f δu + u δf    (from the contact, where P = f u).
+
+On a step the moment, or the distance from the pivot, may rise to a level: `rise`.
 """
 
 from __future__ import annotations
@@ -24,30 +26,29 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.rods.profile import Profile
 
 __all__ = [
     "BACKWARD",
+    "EXACT",
     "FARTHEST",
     "FORWARD",
-    "MOST_STEPS",
     "ROUGH",
     "March",
-    "One",
     "Other",
     "Slope",
     "State",
     "Step",
     "advance",
     "begin",
-    "bending_at",
     "cell_at",
     "most_rest_curvature",
     "moved",
+    "peak",
     "rest_curvature_at",
-    "rigidity_at",
-    "series",
-    "slope_series",
+    "rigidity_in",
+    "rise",
     "slopes_moved",
     "workspace",
 ]
@@ -55,7 +56,7 @@ __all__ = [
 _TERMS = 24
 """Terms of the series."""
 
-_REMAINDER, ROUGH = 1e-15, 1e-6
+EXACT, ROUGH = 1e-15, 1e-6
 """Size of the last terms of a slope [rad], and that with which a rod is followed roughly, to a part in a thousand."""
 
 FORWARD, BACKWARD = 1.0, -1.0
@@ -64,20 +65,29 @@ FORWARD, BACKWARD = 1.0, -1.0
 FARTHEST = 4.0
 """Arc length up to which a rod is continued beyond its tip, as it is at its tip [L]."""
 
-MOST_STEPS = 1000
+_MOST_STEPS = 1000
 """Steps inside cells after which a march ends with NaN: the load is beyond all reason, as in some searches for
 equilibria."""
 
 _INVERSE = 1.0 / np.arange(1.0, _TERMS + 1.0)
 
 _CURVATURE, _RIGIDITY, _QUOTIENT, _RATE, _SIN, _COS, _PSI, _U, _V = range(9)
-_PSI_1, _PSI_S, _PSI_F, _U_1, _U_S, _U_F, _V_F, _QUOTIENT_1, _QUOTIENT_S, _QUOTIENT_F = range(9, 19)
-"""Columns of a workspace: coefficients, and those of derivatives by ψ1, arc length and force."""
+_PSI_Q, _PSI_O, _PSI_F, _U_Q, _U_O, _U_F, _V_F, _QUOTIENT_Q, _QUOTIENT_O, _QUOTIENT_F = range(9, 19)
+"""Columns of a workspace: coefficients, and those of derivatives by ψ1 or arc length, the other, and the force."""
 
 
 def workspace() -> Floats:
     """Return an array to write series to."""
     return np.zeros((_TERMS + 1, 19))
+
+
+_MOST_NEWTON_STEPS = 100
+
+_SETTLED = 1e-15
+"""Last step of Newton's method to a level."""
+
+_FLAT = 1e-9
+"""Distance from a maximum that does not matter to the value there."""
 
 
 class State(NamedTuple):
@@ -114,9 +124,8 @@ class Slope(NamedTuple):
     v: float
 
 
-One = TypeVar("One", Slope, None)
 Other = TypeVar("Other", Slope, None)
-"""Derivatives that are followed, or left out."""
+"""A derivative that is followed, or left out."""
 
 
 class Step(NamedTuple):
@@ -146,16 +155,6 @@ def rest_curvature_at(profile: Profile, cell: int, arclength: float) -> float:
     for k in range(profile.curvature.shape[1] - 1, -1, -1):
         value = value * offset + profile.curvature[cell, k]
     return profile.sign * (value + profile.bend)
-
-
-@compiled
-def rigidity_at(profile: Profile, cell: int, arclength: float) -> float:
-    """EI(s)/EI(0) at a point of a cell."""
-    value, offset = 0.0, arclength - profile.edges[cell]
-    for k in range(profile.rigidity.shape[1] - 1, -1, -1):
-        value = value * offset + profile.rigidity[cell, k]
-    width = 1.0 - profile.taper * min(arclength, 1.0)
-    return value * (width * width) * (width * width)
 
 
 @compiled
@@ -221,59 +220,82 @@ def _divided(work: Floats, rigid: int, inverse: float, n: int, term: float, colu
 
 
 @compiled
-def _size(work: Floats, n: int, length: float) -> float:
+def _size(work: Floats, n: int, length: float, quotient: int) -> float:
     """Size of the terms of an order, of an unloaded rod too: its derivatives by the force are those of a loaded one."""
-    return max(abs(work[n, _RATE]), abs(work[n, _SIN]), abs(work[n, _COS]), abs(length * work[n, _QUOTIENT]))
+    return max(abs(work[n, _RATE]), abs(work[n, _SIN]), abs(work[n, _COS]), abs(length * work[n, quotient]))
 
 
 @compiled
-def _is_last(work: Floats, n: int, least: int, length: float, remainder: float) -> bool:
-    """Return whether the terms have become small."""
-    return n >= least and max(_size(work, n, length), _size(work, n - 1, length)) <= remainder
-
-
-@compiled
-def _share(work: Floats, length: float, remainder: float) -> float:
-    """Share of a step on which the last terms are as small as a remainder; NaN where they are not finite."""
-    size = max(_size(work, _TERMS - 1, length), _size(work, _TERMS - 2, length)) / remainder
-    return min(1.0, size ** (-1.0 / (_TERMS - 1))) if size < math.inf else math.nan
+def _write_start(start: State, by_q: Slope | None, other: Slope | None, by_force: Slope | None, work: Floats) -> None:
+    """Write the first terms of series."""
+    work[0, _SIN], work[0, _COS], work[0, _PSI] = math.sin(start.psi), math.cos(start.psi), start.psi
+    work[0, _U], work[0, _V] = start.u, start.v
+    if by_q is not None:
+        work[0, _PSI_Q], work[0, _U_Q] = by_q.psi, by_q.u
+    if other is not None:
+        work[0, _PSI_O], work[0, _U_O] = other.psi, other.u
+    if by_force is not None:
+        work[0, _PSI_F], work[0, _U_F], work[0, _V_F] = by_force.psi, by_force.u, by_force.v
 
 
 @compiled
 def series(
     profile: Profile,
-    cell: int,
-    arclength: float,
+    march: March,
     direction: float,
     length: float,
     force: float,
-    start: State,
     work: Floats,
     remainder: float,
+    by_q: Slope | None,
+    other: Slope | None,
+    by_force: Slope | None,
 ) -> Step:
-    """Write the series from a point of a cell on, over at most a length."""
-    bent, rigid = _expand(profile, cell, arclength, direction, length, work)
-    inverse, least = 1.0 / work[0, _RIGIDITY], max(bent, rigid, 3)
-    load = start.load
-    work[0, _SIN], work[0, _COS], work[0, _PSI] = math.sin(start.psi), math.cos(start.psi), start.psi
-    work[0, _U], work[0, _V] = start.u, start.v
+    """Write the series of a state from a point of a cell on, over at most a length, and those of its derivatives.
+
+    These begin at the contact, where P = f u; None is left out.
+    """
+    bent, rigid = _expand(profile, march.cell, march.at, direction, length, work)
+    inverse, least, start = 1.0 / work[0, _RIGIDITY], max(bent, rigid, 3), march.state
+    load, quotient, size, before = start.load, _QUOTIENT if by_force is None else _QUOTIENT_F, 0.0, 0.0
+    _write_start(start, by_q, other, by_force, work)
     for n in range(_TERMS):
         rate = _divided(work, rigid, inverse, n, load, _QUOTIENT)
         if n < bent:
             rate += work[n, _CURVATURE]
         work[n, _RATE] = length * rate
-        sin, cos = 0.0, 0.0
+        sin, cos, sin_q, sin_o, sin_f, cos_f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(n + 1):
-            sin += work[k, _RATE] * work[n - k, _SIN]
-            cos += work[k, _RATE] * work[n - k, _COS]
+            j = n - k
+            sin += work[k, _RATE] * work[j, _SIN]
+            cos += work[k, _RATE] * work[j, _COS]
+            if by_q is not None:
+                sin_q += work[k, _SIN] * work[j, _PSI_Q]
+            if other is not None:
+                sin_o += work[k, _SIN] * work[j, _PSI_O]
+            if by_force is not None:
+                sin_f += work[k, _SIN] * work[j, _PSI_F]
+                cos_f += work[k, _COS] * work[j, _PSI_F]
         share = _INVERSE[n]
+        way = share * length
         work[n + 1, _PSI] = share * work[n, _RATE]
-        work[n + 1, _U], work[n + 1, _V] = share * length * work[n, _COS], share * length * work[n, _SIN]
+        work[n + 1, _U], work[n + 1, _V] = way * work[n, _COS], way * work[n, _SIN]
         work[n + 1, _SIN], work[n + 1, _COS] = share * cos, -share * sin
         load = force * work[n + 1, _U]
-        if _is_last(work, n, least, length, remainder):
+        if by_q is not None:
+            rate_q = _divided(work, rigid, inverse, n, force * work[n, _U_Q], _QUOTIENT_Q)
+            work[n + 1, _PSI_Q], work[n + 1, _U_Q] = way * rate_q, -way * sin_q
+        if other is not None:
+            rate_o = _divided(work, rigid, inverse, n, force * work[n, _U_O], _QUOTIENT_O)
+            work[n + 1, _PSI_O], work[n + 1, _U_O] = way * rate_o, -way * sin_o
+        if by_force is not None:
+            rate_f = _divided(work, rigid, inverse, n, force * work[n, _U_F] + work[n, _U], _QUOTIENT_F)
+            work[n + 1, _PSI_F], work[n + 1, _U_F], work[n + 1, _V_F] = way * rate_f, -way * sin_f, way * cos_f
+        before, size = size, _size(work, n, length, quotient)
+        if n >= least and max(size, before) <= remainder:
             return Step(length, 1.0, n + 1, rigid)
-    return Step(length, _share(work, length, remainder), _TERMS, rigid)
+    size = max(size, before) / remainder
+    return Step(length, min(1.0, size ** (-1.0 / (_TERMS - 1))) if size < math.inf else math.nan, _TERMS, rigid)
 
 
 @compiled
@@ -301,19 +323,21 @@ def advance(
     until: float,
     force: float,
     work: Floats,
-    remainder: float = _REMAINDER,
+    remainder: float,
+    by_q: Slope | None = None,
+    other: Slope | None = None,
+    by_force: Slope | None = None,
 ) -> tuple[Step, March]:
     """Write the series of a step toward an arc length, and return the step and its end; NaN after too many steps."""
-    last = profile.edges.size - 1
     beside = march.cell if direction < 0.0 else march.cell + 1
-    edge = math.inf if beside > last else profile.edges[beside]
+    edge = math.inf if beside == profile.edges.size else profile.edges[beside]
     end = max(edge, until) if direction < 0.0 else min(edge, until)
     length = direction * (end - march.at)
-    step = series(profile, march.cell, march.at, direction, length, force, march.state, work, remainder)
+    step = series(profile, march, direction, length, force, work, remainder, by_q, other, by_force)
     state = moved(march.state, force, step, step.share, work)
     if step.share < 1.0:
         steps = march.steps + 1
-        if steps == MOST_STEPS:
+        if steps == _MOST_STEPS:
             return step, March(math.nan, march.cell, _NOWHERE, steps)
         return step, March(march.at + direction * step.share * length, march.cell, state, steps)
     if end != edge:
@@ -322,91 +346,77 @@ def advance(
 
 
 @compiled
-def bending_at(step: Step, load: float, x: float, work: Floats) -> tuple[float, float]:
-    """Curvature less the rest curvature at a point of a step, and the rigidity there."""
+def rigidity_in(step: Step, x: float, work: Floats) -> float:
+    """Rigidity at a point of a step."""
     rigidity = 0.0
     for n in range(step.rigid - 1, -1, -1):
         rigidity = rigidity * x + work[n, _RIGIDITY]
-    return load / rigidity, rigidity
+    return rigidity
 
 
 @compiled
-def slope_series(
-    profile: Profile,
-    cell: int,
-    arclength: float,
-    length: float,
-    force: float,
-    start: State,
-    by_psi1: Slope | None,
-    by_arclength: Slope | None,
-    by_force: Slope,
-    work: Floats,
-) -> Step:
-    """Write the series of a state and its derivatives from the contact's side of a cell on; None is left out."""
-    bent, rigid = _expand(profile, cell, arclength, BACKWARD, length, work)
-    inverse, least = 1.0 / work[0, _RIGIDITY], max(bent, rigid, 3)
-    work[0, _SIN], work[0, _COS], work[0, _PSI] = math.sin(start.psi), math.cos(start.psi), start.psi
-    work[0, _U], work[0, _V] = start.u, start.v
-    if by_psi1 is not None:
-        work[0, _PSI_1], work[0, _U_1] = by_psi1.psi, by_psi1.u
-    if by_arclength is not None:
-        work[0, _PSI_S], work[0, _U_S] = by_arclength.psi, by_arclength.u
-    work[0, _PSI_F], work[0, _U_F], work[0, _V_F] = by_force.psi, by_force.u, by_force.v
-    stiff = force * length
-    for n in range(_TERMS):
-        quotient = _divided(work, rigid, inverse, n, work[n, _U], _QUOTIENT)
-        rate = stiff * quotient
-        if n < bent:
-            rate += length * work[n, _CURVATURE]
-        work[n, _RATE] = rate
-        rate_f = stiff * _divided(work, rigid, inverse, n, work[n, _U_F], _QUOTIENT_F) + length * quotient
-        sin, cos, sin_1, sin_s, sin_f, cos_f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(n + 1):
-            j = n - k
-            sin += work[k, _RATE] * work[j, _SIN]
-            cos += work[k, _RATE] * work[j, _COS]
-            if by_psi1 is not None:
-                sin_1 += work[k, _SIN] * work[j, _PSI_1]
-            if by_arclength is not None:
-                sin_s += work[k, _SIN] * work[j, _PSI_S]
-            sin_f += work[k, _SIN] * work[j, _PSI_F]
-            cos_f += work[k, _COS] * work[j, _PSI_F]
-        share = _INVERSE[n]
-        way = share * length
-        work[n + 1, _PSI] = share * rate
-        work[n + 1, _U], work[n + 1, _V] = way * work[n, _COS], way * work[n, _SIN]
-        work[n + 1, _SIN], work[n + 1, _COS] = share * cos, -share * sin
-        if by_psi1 is not None:
-            rate_1 = stiff * _divided(work, rigid, inverse, n, work[n, _U_1], _QUOTIENT_1)
-            work[n + 1, _PSI_1], work[n + 1, _U_1] = share * rate_1, -way * sin_1
-        if by_arclength is not None:
-            rate_s = stiff * _divided(work, rigid, inverse, n, work[n, _U_S], _QUOTIENT_S)
-            work[n + 1, _PSI_S], work[n + 1, _U_S] = share * rate_s, -way * sin_s
-        work[n + 1, _PSI_F], work[n + 1, _U_F], work[n + 1, _V_F] = share * rate_f, -way * sin_f, way * cos_f
-        if _is_last(work, n, least, length, _REMAINDER):
-            return Step(length, 1.0, n + 1, rigid)
-    return Step(length, _share(work, length, _REMAINDER), _TERMS, rigid)
-
-
-@compiled
-def slopes_moved(step: Step, by_psi1: One, by_arclength: Other, work: Floats) -> tuple[One, Other, Slope]:
-    """Derivatives at the end of a step by ψ1, arc length and force, of v only the last; None is left out."""
-    x, psi_f, u_f, v_f = step.share, 0.0, 0.0, 0.0
+def slopes_moved(step: Step, other: Other, work: Floats) -> tuple[Slope, Other, Slope]:
+    """Derivatives at the end of a step, of v only that by the force; None is left out."""
+    x, psi, u, psi_f, u_f, v_f = step.share, 0.0, 0.0, 0.0, 0.0, 0.0
     for n in range(step.terms, -1, -1):
+        psi, u = psi * x + work[n, _PSI_Q], u * x + work[n, _U_Q]
         psi_f, u_f, v_f = psi_f * x + work[n, _PSI_F], u_f * x + work[n, _U_F], v_f * x + work[n, _V_F]
-    return (
-        _slope_moved(step, by_psi1, _PSI_1, _U_1, work),
-        _slope_moved(step, by_arclength, _PSI_S, _U_S, work),
-        Slope(psi_f, u_f, v_f),
-    )
+    return Slope(psi, u, 0.0), _other_moved(step, other, work), Slope(psi_f, u_f, v_f)
 
 
 @compiled
-def _slope_moved(step: Step, by: One, psi_column: int, u_column: int, work: Floats) -> One:
-    if by is None:
+def _other_moved(step: Step, other: Other, work: Floats) -> Other:
+    if other is None:
         return None
     psi, u = 0.0, 0.0
     for n in range(step.terms, -1, -1):
-        psi, u = psi * step.share + work[n, psi_column], u * step.share + work[n, u_column]
+        psi, u = psi * step.share + work[n, _PSI_O], u * step.share + work[n, _U_O]
     return Slope(psi, u, 0.0)
+
+
+@compiled
+def _value_and_slope(
+    start: State, force: float, step: Step, sense: float, level: float, x: float, work: Floats
+) -> tuple[float, float]:
+    """The moment times its sense, 1 or −1, less the level; with a sense of 0 that of the squared distance."""
+    at = moved(start, force, step, x, work)
+    cos, sin = math.cos(at.psi), math.sin(at.psi)
+    if sense != 0.0:
+        return sense * at.load - level, sense * force * step.length * cos
+    return at.u * at.u + at.v * at.v - level * level, 2.0 * step.length * (at.u * cos + at.v * sin)
+
+
+@compiled
+def peak(start: State, force: float, step: Step, sense: float, work: Floats) -> float:
+    """Point of a step at which the moment times its sense, or the distance, is largest: its end, or a maximum."""
+    low, high = 0.0, step.share
+    if not (
+        _value_and_slope(start, force, step, sense, 0.0, low, work)[1] > 0.0
+        and _value_and_slope(start, force, step, sense, 0.0, high, work)[1] < 0.0
+    ):
+        return high
+    while high - low > _FLAT:
+        middle = 0.5 * (low + high)
+        if _value_and_slope(start, force, step, sense, 0.0, middle, work)[1] > 0.0:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def rise(start: State, force: float, step: Step, sense: float, level: float, work: Floats) -> float:
+    """Point x of a step at which the moment times its sense, or the distance, rises to a level; NaN without one."""
+    top = peak(start, force, step, sense, work)
+    if not _value_and_slope(start, force, step, sense, level, top, work)[0] >= 0.0:
+        return math.nan
+    # Newton's method for a function that falls through zero.
+    x, below, above, before = 0.5 * top, 0.0, top, top
+    for _ in range(_MOST_NEWTON_STEPS):
+        value, slope = _value_and_slope(start, force, step, sense, level, x, work)
+        new, below, above, before = newton_step(x, -value, -slope, below, above, before)
+        moved_by = abs(new - x)
+        x = new
+        if not moved_by > _SETTLED or value == 0.0:
+            break
+    return x

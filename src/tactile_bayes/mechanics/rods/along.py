@@ -44,12 +44,8 @@ _LARGEST = 1e100
 class Along:
     """A property along a rod, as polynomials on cells.
 
-    Parameters
-    ----------
-    edges : tuple of float
-        Where cells begin, from 0, the base, and the end of the last, the rod's length [length].
-    coefficients : tuple of tuple of float
-        For each cell, coefficients by powers of the arc length from its beginning.
+    They begin at the edges, from 0, the base; the last edge is the rod's length. Each has coefficients by powers of the
+    arc length from its beginning.
     """
 
     edges: tuple[float, ...]
@@ -96,32 +92,12 @@ GivenAlong: TypeAlias = float | Along | Callable[[Floats], ArrayLike] | tuple[Ar
 
 
 def along(name: str, given: Any, length: float, positive: bool = False, miss: float = MISS) -> float | Along:
-    """Return a property of a rod as a number or as polynomials.
+    """Return a property of a rod of a length as a number or as polynomials; its name is for messages.
 
     Tables are interpolated by monotone cubic polynomials (PCHIP): values stay between those of neighbours, so that a
-    rigidity stays positive, and steps do not ring. Functions are interpolated.
+    rigidity stays positive, and steps do not ring. Functions are interpolated with an error `miss` over their largest
+    value. A text is that of `Along.text`.
 
-    Parameters
-    ----------
-    name : str
-        Name of the property, for messages.
-    given : float, callable, (s, values), Along or str
-        As users give it, or the `text` of polynomials.
-    length : float
-        Length of the rod.
-    positive : bool
-        Whether values have to be positive.
-    miss : float
-        Error with which a function is interpolated, over its largest value.
-
-    Raises
-    ------
-    ParameterError
-        If a table is not ordered from base to tip, a function is not smooth or does not work on arrays, or a value is
-        not finite or not positive.
-
-    Examples
-    --------
     >>> bend = along("rest_curvature", ([0.0, 0.1, 0.2], [0.0, 1.0, 3.0]), 0.2)
     >>> bend([0.0, 0.1, 0.2]), round(bend.mean, 6)
     (array([0., 1., 3.]), 1.166667)

@@ -66,28 +66,8 @@ def rods_of(rods: Rods | ArrayLike, count: int) -> Rods:
 
 
 def profile_of(rest_curvature: GivenAlong = 0.0, rigidity_profile: GivenAlong = 1.0, taper: float = 0.0) -> Profile:
-    """Return the profile of a rod.
+    """Return the profile of a rod from its rest curvature [1/L], EI/EI0 and taper, as users give them (`Rod`).
 
-    Parameters
-    ----------
-    rest_curvature : float, callable, (s, curvature) or Along
-        Curvature of the unloaded rod [1/L], > 0 where it bends counter-clockwise.
-    rigidity_profile : float, callable, (s, EI/EI0) or Along
-        Flexural rigidity over that at the base, where it is 1.
-    taper : float
-        The diameter falls linearly to (1 − taper) of that at the base: a factor (1 − taper·s)⁴ on the rigidity.
-
-    Returns
-    -------
-    Profile
-
-    Raises
-    ------
-    ParameterError
-        As in `along`; or if the rigidity is not 1 at the base, or the taper not in its range.
-
-    Examples
-    --------
     >>> profile = profile_of(rest_curvature=lambda s: 0.3 * s, rigidity_profile=([0.0, 0.5, 1.0], [1.0, 0.5, 0.4]))
     >>> profile.edges
     array([0. , 0.5, 1. ])

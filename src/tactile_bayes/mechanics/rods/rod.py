@@ -153,17 +153,12 @@ class Rod:
             )
 
     def __repr__(self) -> str:
-        more = "" if self.elastic_strain is None else f", elastic_strain={self.elastic_strain!r}"
-        more += "" if self.rest_curvature == 0.0 else f", rest_curvature={self.rest_curvature!r}"
-        more += "" if self.taper == 0.0 else f", taper={self.taper!r}"
-        deviation = self.rest_curvature_deviation
-        more += "" if deviation == 0.0 else f", rest_curvature_deviation={deviation!r}"
-        more += "" if self.rigidity_profile is None else f", rigidity_profile={self.rigidity_profile!r}"
-        more += "" if self.stem == 0.0 else f", stem={self.stem!r}"
-        return (
-            f"Rod(length={self.length!r}, flexural_rigidity={self.flexural_rigidity!r}, "
-            f"diameter={self.diameter!r}{more})"
-        )
+        optional = ("elastic_strain", None), ("rest_curvature", 0.0), ("taper", 0.0), ("rest_curvature_deviation", 0.0)
+        shown = [(name, getattr(self, name)) for name in ("length", "flexural_rigidity", "diameter")]
+        for name, default in (*optional, ("rigidity_profile", None), ("stem", 0.0)):
+            if getattr(self, name) != default:
+                shown.append((name, getattr(self, name)))
+        return f"Rod({', '.join(f'{name}={value!r}' for name, value in shown)})"
 
     @classmethod
     def circular(

@@ -39,13 +39,7 @@ class Surface(NamedTuple):
         return math.cos(self.half_angle) * self.radius - math.sin(self.half_angle) * arclength
 
     def on_object(self, place: Floats) -> Floats:
-        """Return places on the object, in the sweep frame.
-
-        Parameters
-        ----------
-        place : ndarray, shape (4, ...)
-            x, y, slope angle and arc length of contacts of the centreline.
-        """
+        """Return places on the object, shape (4, ...), from those of contacts of the centreline."""
         x, y, beside, arclength = place
         alpha, d = beside - self.half_angle, self.standoff(arclength)
         return np.stack([x - d * np.sin(alpha), y + d * np.cos(alpha), alpha, arclength])

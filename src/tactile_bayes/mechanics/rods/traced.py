@@ -103,34 +103,9 @@ class TracedRod:
 
 
 def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None, length: float | None = None) -> TracedRod:
-    """Return the rest curvature of a rod from points traced along it, base first.
+    """Return the rest curvature of a rod from points traced along it, base first; see `Rod.from_shape`.
 
-    Parameters
-    ----------
-    x, y : array_like, shape (n,)
-        Points of the unloaded rod in order, from the base to the tip, at least 8 [any unit of length].
-    scatter : float, optional
-        Standard deviation of each coordinate, in that unit; estimated from the points by default.
-    length : float, optional
-        Length of the rod from the first point on, in that unit, if it continues beyond the last one. The curvature
-        there follows from the prior: it continues with its trend, and with a deviation that grows.
-
-    Returns
-    -------
-    TracedRod
-
-    Raises
-    ------
-    ParameterError
-        If the points are too few, not ordered, fold back, or scatter by more than a twentieth of the length; if the
-        length is shorter than the points are far along the rod, or longer by more than a half.
-
-    Examples
-    --------
-    >>> angle = np.linspace(0.0, 0.6, 30)
-    >>> rod = traced_rod(50.0 * np.sin(angle), 50.0 * (1.0 - np.cos(angle)))
-    >>> round(rod.length, 6), rod.rest_curvature(0.5).round(6)
-    (30.0, np.float64(0.6))
+    Beyond the last point, up to a given length, the curvature continues with its trend and a deviation that grows.
     """
     columns = [check_numbers(name, values, shape=(None,)) for name, values in (("x", x), ("y", y))]
     if columns[0].size != columns[1].size or columns[0].size < _FEWEST:
