@@ -124,7 +124,7 @@ def _called(
     Arrays that are read only, or lie otherwise in memory, would each be another type, for which all is compiled anew.
     """
     residual, white, weight, rate, wandering = (
-        np.require(values, requirements="CW") for values in (*readings, rate, wandering)
+        np.require(values, requirements=["C", "W"]) for values in (*readings, rate, wandering)
     )
     found = np.empty(residual.shape), np.empty(residual.shape)
     gains = np.empty((order.size if smooths else 0, _STATES))
