@@ -117,7 +117,7 @@ def sample(
     distinguish a part of it from the whole.
 
     A KeyboardInterrupt after the first step ends the run with the draws so far. A run with a checkpoint may be killed
-    at any moment: called again it resumes after the last finished block, and its draws are, bit by bit, those of an
+    at any moment: called again it resumes from the stored state, and its draws are, bit by bit, those of an
     uninterrupted run; one that has ended is not made again. `identity` states what determines the log-probability. Of
     the settings, `max_steps`, `max_seconds`, `min_ess` and `max_r_hat` may change from call to call.
     """
@@ -133,8 +133,8 @@ def sample(
     with ExitStack() as stack:
         stored = None
         if checkpoint is not None:
-            about = identity_of_run(identity, points, names, seed, settings, coordinates)
-            stored = stack.enter_context(open_checkpoint(checkpoint, about, points.shape))
+            about = identity_of_run(identity, points, names, seed, settings)
+            stored = stack.enter_context(open_checkpoint(checkpoint, about))
         run = _Run(CheckedTarget(log_probability, names), coordinates, settings, stored, progress, began)
         run.begin(points, seed)
         while not run.has_ended:
@@ -184,19 +184,20 @@ class _Run:
         return bool(self.ending) and self.diagnosis is not None
 
     def begin(self, points: Floats, seed: Seed) -> None:
-        """Begin at starting points, or where the stored blocks end."""
-        due = 0
-        if self.stored is not None and self.stored.steps:
-            self.state = _resumed(self.stored, self.coordinates, points)
-            self.began -= self.stored.seconds
+        """Begin at starting points, or at the stored state."""
+        stored, ended_at = self.stored, 0
+        if stored is not None and stored.exists:
+            self.state = stored.read(self.coordinates, points.shape)
+            self.began -= stored.seconds
             self.target.evaluations = points[..., 0].size * (1 + self.steps)
-            due = self.steps if self.stored.ended_at == self.steps else 0
+            ended_at = self.steps if stored.is_end else 0
         else:
             self.state = RunState.begin(self.coordinates, _first_block(points, self.density, seed))
-        self.due = due or next_diagnosis(self.steps - 1, self.settings.block_steps)  # also if killed before a diagnosis
+        # A run that was killed before a diagnosis is diagnosed where it is.
+        self.due = ended_at or next_diagnosis(self.steps - 1, self.settings.block_steps)
 
     def advance(self) -> None:
-        """Make the steps up to the next diagnosis, block by block, each of which is stored."""
+        """Make the steps up to the next diagnosis, block by block."""
         self.due = min(self.due, self.settings.max_steps)
         while self.steps < self.due and not (self.is_late or self.ending):
             steps = min(self.settings.block_steps, self.due - self.steps)
@@ -206,20 +207,20 @@ class _Run:
             if not block.whole:
                 raise KeyboardInterrupt
             if self.stored is not None:
-                self.stored.write(block, self.seconds)
+                self.stored.write(self.state, self.seconds)
             self.is_late = self.deadline.has_passed
 
     def diagnose(self) -> None:
         """Diagnose the second half of the steps, and say whether the run ends, or when it is diagnosed next."""
         settings = self.settings
-        self.state, found = self.state.diagnose()
-        self.diagnosis = found
+        self.state = self.state.halved()
+        self.diagnosis = found = Diagnosis(self.state.half.samples)
         if not self.ending:
             enough = found.satisfies(settings.max_r_hat, settings.min_ess)
             spent = _OUT_OF_TIME if self.is_late else _OUT_OF_STEPS if self.steps >= settings.max_steps else ""
             self.ending = _CONVERGED if enough and not np.any(self.state.lost()) else spent
         if self.stored is not None and self.ending not in ("", _INTERRUPTED):
-            self.stored.note_end()
+            self.stored.write(self.state, self.seconds, is_end=True)
         if self.progress is not None:
             worst = float(found.r_hat[found.worst_r_hat]), float(found.ess[found.worst_ess])
             self.progress(Progress(self.steps, settings.max_steps, *worst, self.seconds))
@@ -281,12 +282,3 @@ def _first_block(points: Floats, density: LogProbability, seed: Seed) -> Block:
         )
     randoms = tuple(first_random_state(own) for own in spawn(seed, len(points)))
     return Block(points[:, None], values[:, None], randoms)
-
-
-def _resumed(stored: Checkpoint, coordinates: Coordinates, points: Floats) -> RunState:
-    """Return the state after the last stored block; the steps before its second half are not read."""
-    unknown = Block(points[:, None], np.full(points.shape[:2], np.nan)[:, None], ())
-    state = RunState.begin(coordinates, unknown, stored.steps // 2, stored.steps)
-    for block in stored.read(since=stored.steps // 2):
-        state = state.append(block)
-    return state

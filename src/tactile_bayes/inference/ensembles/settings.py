@@ -28,8 +28,7 @@ class SamplerSettings:
         faster with more of them, but each of them has to forget its start.
     block_steps : int
         Number of steps before the first diagnosis, and the smallest number between later ones, which come when the
-        steps have grown by a quarter. Also the number of steps in a file of a checkpoint, which a killed run may have
-        to make again.
+        steps have grown by a quarter.
     max_r_hat : float
         Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
     min_ess : float

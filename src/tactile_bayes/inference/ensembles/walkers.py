@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any
 
 import emcee
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
@@ -15,31 +15,33 @@ from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 
-__all__ = ["CheckedTarget", "RandomState", "checked_start", "first_random_state", "scatter_walkers"]
+__all__ = [
+    "CheckedTarget",
+    "RandomState",
+    "checked_start",
+    "first_random_state",
+    "generator_at",
+    "scatter_walkers",
+    "state_of",
+]
 
 
-class RandomState(NamedTuple):
-    """State of NumPy's Mersenne Twister, which emcee's moves use."""
-
-    algorithm: str
-    key: NDArray[np.uint32]  # shape (624,)
-    position: int
-    has_gauss: int
-    gauss: float
-
-    @classmethod
-    def of(cls, random: np.random.RandomState) -> RandomState:
-        return cls(*random.get_state(legacy=True))
-
-    def generator(self) -> np.random.RandomState:
-        """Return a generator that continues from this state."""
-        random = np.random.RandomState()
-        random.set_state(self)
-        return random
+RandomState = tuple[Any, ...]  # of NumPy's Mersenne Twister, which emcee's moves use, as from `get_state`
 
 
 def first_random_state(seed: np.random.SeedSequence) -> RandomState:
-    return RandomState.of(np.random.RandomState(np.random.MT19937(seed)))
+    return state_of(np.random.RandomState(np.random.MT19937(seed)))
+
+
+def state_of(random: np.random.RandomState) -> RandomState:
+    return tuple(random.get_state(legacy=True))
+
+
+def generator_at(state: RandomState) -> np.random.RandomState:
+    """Return a generator that continues from a state."""
+    random = np.random.RandomState()
+    random.set_state(state)
+    return random
 
 
 class CheckedTarget:
