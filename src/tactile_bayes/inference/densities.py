@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -156,11 +155,6 @@ class Proposal(_Density):
         return cls(mean, WIDENING * deviation[:, None] * np.linalg.cholesky(correlation), ends=ends)
 
     @property
-    def digest(self) -> str:
-        """Identity of the proposal, as text."""
-        return hashlib.sha256(self.mean.tobytes() + self.root.tobytes() + repr(self.efficiency).encode()).hexdigest()
-
-    @property
     def constant(self) -> float:
         """What `log_density` lacks."""
         size, nu = self.mean.size, self.freedom
@@ -245,11 +239,6 @@ class Mixture(_Density):
     def with_efficiency(self, efficiency: float) -> Mixture:
         """Return the mixture with another efficiency for all parts."""
         return Mixture(tuple(replace(part, efficiency=efficiency) for part in self.parts))
-
-    @property
-    def digest(self) -> str:
-        """Identity of the mixture, as text."""
-        return hashlib.sha256("".join(part.digest for part in self.parts).encode()).hexdigest()
 
     def draw_unbounded(self, random: Random, count: int) -> Floats:
         counts = random.multinomial(count, self.shares)

@@ -112,13 +112,6 @@ def test_volumes_grow_as_is_said(found):
     np.testing.assert_allclose(np.diff(logs), np.diff(said), atol=1e-6)
 
 
-def test_what_tells_coordinates_apart_is_what_they_follow_from(found):
-    _, one = found
-    other = Straightened(one.base, one.mean, one.root, one.bends + 1e-9, one.proposal)
-    assert one.digest != other.digest
-    assert one.digest == Straightened(one.base, one.mean, one.root, one.bends, one.proposal).digest
-
-
 def normal(points):
     return -0.5 * np.sum(points**2, axis=1)
 

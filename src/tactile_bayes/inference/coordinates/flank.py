@@ -121,10 +121,6 @@ class FlankCoordinates(Coordinates):
         own = [*(f"{prefix}{name}" for name in FLANKS[sides[prefix]].table), *VERTEX]
         return cls(sides[prefix], base, x, side, tuple(map(names.index, own)))
 
-    @property
-    def digest(self) -> str:
-        return self._and_proposal(f"flank of a {self.flank}, side {self.side:g} at {self.x!r}, {self.base.digest}")
-
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         log_slope, log_shape, height, log_ratio = coordinates[:, self.columns].T
         based = coordinates.copy()

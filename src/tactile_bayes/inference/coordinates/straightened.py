@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,12 +57,6 @@ class Straightened(Coordinates):
             bends[k, one, other] = np.where(certain, solved, 0.0)[1 + k :]
             straight[:, k] -= products @ bends[k, one, other]
         return cls(base, mean, root, bends)
-
-    @property
-    def digest(self) -> str:
-        arrays = (self.mean, self.root, self.bends)
-        content = b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in arrays)
-        return self._and_proposal(f"straightened {hashlib.sha256(content).hexdigest()}, {self.base.digest}")
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         products = coordinates[:, :, None] * coordinates[:, None, :]

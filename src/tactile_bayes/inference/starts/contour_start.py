@@ -157,7 +157,7 @@ class _Start(NamedTuple):
         """Return walkers scattered twice as widely as normal approximations of the modes, which serve as proposals."""
         model, rng, deadline = self.model, self.rng, self.deadline
         modes = _Modes(model, rng, deadline).found_by_search()
-        if len({mode.coordinates.digest for mode in modes}) > 1:
+        if any(mode.coordinates is not modes[0].coordinates for mode in modes):
             modes = [mode.usual or mode for mode in modes]
         common = modes[0].coordinates
         proposal = Mixture(tuple(mode.proposal for mode in modes))
@@ -223,6 +223,7 @@ class _Modes:
     def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
         self.model, self.rng, self.deadline = model, rng, deadline
         self.found: list[_Mode] = []
+        self._own = model.coordinates
 
     def found_by_search(self) -> list[_Mode]:
         """Return modes of the posterior, that with the most mass first.
@@ -278,7 +279,7 @@ class _Modes:
         Modes on the same flank share the coordinates of the first.
         """
         model, point = self.model, optimum.point
-        usual = self._in(model.coordinates, optimum, optimum.covariance, model.walked_ends)
+        usual = self._in(self._own, optimum, optimum.covariance, model.walked_ends)
         if usual.proposal.efficiency > _EFFICIENT or self.deadline.has_passed:
             return usual
         flanks = dict.fromkeys([*(mode.coordinates for mode in self.found), flank_at_contacts(model, point)])
