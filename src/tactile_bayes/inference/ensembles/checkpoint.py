@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.ensembles.run_state import Block, RunState, StoredSteps
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
@@ -36,8 +36,8 @@ def identity_of_run(
 ) -> dict[str, str]:
     """Return all that determines the draws: the caller's identity of the log-probability, and the sampler's entries."""
     chains, walkers, _ = start.shape
-    entries = {} if identity is None else dict(identity)
-    rest = {
+    return {
+        **(identity or {}),
         "names of parameters": ", ".join(names),
         "number of ensembles": str(chains),
         "walkers of an ensemble": str(walkers),
@@ -46,12 +46,6 @@ def identity_of_run(
         _START: hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
         "version of emcee": version("emcee"),
     }
-    for name, value in entries.items():
-        if not (isinstance(name, str) and isinstance(value, str)):
-            raise ParameterError(f"the identity has {name!r}: {value!r}: give strings, they are compared as they are")
-        if name in rest:
-            raise ParameterError(f"the identity has {name!r}, which the sampler adds itself: leave it out")
-    return {**entries, **rest}
 
 
 def changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:

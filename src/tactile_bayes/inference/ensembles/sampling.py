@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability
@@ -29,7 +28,7 @@ from tactile_bayes.inference.ensembles.diagnosis import (
 from tactile_bayes.inference.ensembles.moves import moves_in
 from tactile_bayes.inference.ensembles.run_state import Block, RunState, make_block, next_diagnosis
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
-from tactile_bayes.inference.ensembles.walkers import CheckedTarget, checked_start, first_random_state
+from tactile_bayes.inference.ensembles.walkers import CheckedTarget, first_random_state
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 from tactile_bayes.numerics.selection import evenly_spread
 
@@ -123,10 +122,7 @@ def sample(
     """
     began = time.monotonic()
     settings = SamplerSettings() if settings is None else settings
-    names = tuple(names)
-    if not names or len(set(names)) != len(names):
-        raise ParameterError(f"names are {names!r}: give each parameter a name of its own")
-    points = checked_start(start, names, settings)
+    names, points = tuple(names), np.array(start, dtype=float)
     chains, walkers, _ = points.shape
     settings = replace(settings, min_ess=max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers))
     coordinates = coordinates or Coordinates()
@@ -274,11 +270,5 @@ class _Run:
 def _first_block(points: Floats, density: LogProbability, seed: Seed) -> Block:
     """Return the starting points as a block of one step."""
     values = np.array([density(ensemble) for ensemble in points])
-    outside = int(np.count_nonzero(np.isneginf(values)))
-    if outside:
-        raise InferenceError(
-            f"{outside} of {values.size} walkers start where the log-probability is −inf: "
-            "start them inside the support, for instance with scatter_walkers"
-        )
     randoms = tuple(first_random_state(own) for own in spawn(seed, len(points)))
     return Block(points[:, None], values[:, None], randoms)
