@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -235,10 +235,6 @@ class Mixture(_Density):
         """Efficiency of the mixture, as if each part covered its own mode alone."""
         each = np.array([part.efficiency for part in self.parts])
         return float(1.0 / np.sum(self.shares / each)) if np.all(each > 0.0) else 0.0
-
-    def with_efficiency(self, efficiency: float) -> Mixture:
-        """Return the mixture with another efficiency for all parts."""
-        return Mixture(tuple(replace(part, efficiency=efficiency) for part in self.parts))
 
     def draw_unbounded(self, random: Random, count: int) -> Floats:
         counts = random.multinomial(count, self.shares)

@@ -1,5 +1,6 @@
 """The moves against targets whose moments are known exactly."""
 
+from dataclasses import replace
 from functools import partial
 
 import emcee
@@ -126,7 +127,7 @@ def test_proposals_from_elsewhere_leave_a_target_invariant(parameters, wall):
     proposal = Proposal(target.mean + 0.5 * target.deviation, np.diag(1.2 * target.deviation))
     error, standard = moments(target, lambda: [(FittedMove(fit=lambda _: proposal), 1.0)], ensembles=64, steps=60)
     assert np.all(np.abs(error) < 4.0 * standard)
-    moves = standard_moves(Mixture((proposal,)).with_efficiency(0.2))
+    moves = standard_moves(Mixture((replace(proposal, efficiency=0.2),)))
     assert sum(share for _, share in moves) == pytest.approx(1.0)
     error, standard = moments(target, lambda: moves, ensembles=64, steps=60)
     assert np.all(np.abs(error) < 4.0 * standard)
