@@ -6,10 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import gammaln, ndtr
 
@@ -29,6 +27,7 @@ __all__ = [
 ]
 
 LogProbability = Callable[[Floats], Floats]
+Random = np.random.Generator | np.random.RandomState  # emcee's moves have legacy generators
 WIDENING = 1.1  # scale over that of the fitted points: too wide a proposal costs less than too narrow a one
 _FREEDOM = 10.0  # degrees of freedom: tails are heavier than normal ones, at little cost
 _MAX_REDRAWS = 40  # times that points out of bounds are drawn again
@@ -38,18 +37,6 @@ _CUTS = np.linspace(-4.0, 1.0, 101)
 _ROUNDS = 10  # of expectation and maximisation
 # Points that the prior of a part's covariance weighs, and its width over that of all.
 _PRIOR_POINTS, _PRIOR_WIDTH = 5.0, 0.3
-
-
-class Random(Protocol):
-    """Common methods of NumPy's generators, new and legacy."""
-
-    def standard_normal(self, size: tuple[int, int], /) -> Floats: ...
-
-    def chisquare(self, df: float, size: int, /) -> Floats: ...
-
-    def multinomial(self, n: int, pvals: Floats, /) -> NDArray[np.int_]: ...
-
-    def permutation(self, x: int, /) -> NDArray[np.int_]: ...
 
 
 # ---- weights
