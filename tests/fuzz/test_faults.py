@@ -24,9 +24,10 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.datasets import shard
 from tactile_bayes.diagnostics.inspection import inspect_record
 from tactile_bayes.errors import InferenceError, TactileBayesError
+from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.ensembles.checkpoint import open_checkpoint
-from tactile_bayes.inference.ensembles.run_state import Block
-from tactile_bayes.inference.ensembles.walkers import RandomState
+from tactile_bayes.inference.ensembles.run_state import Block, RunState
+from tactile_bayes.inference.ensembles.walkers import first_random_state
 from tactile_bayes.inference.result import write_result
 from tactile_bayes.inference.streams.stream import Stream
 from tactile_bayes.record import write_record
@@ -144,7 +145,7 @@ def contacts(k):
 
 
 STORED = Kind("numbers", InferenceError, lambda value: {"value": value}, lambda row: row["value"])
-STATE = RandomState.of(np.random.RandomState(1))
+STATE = first_random_state(np.random.SeedSequence(1))
 SPEC = {
     "records": 4,
     "seed": 1,
@@ -153,12 +154,14 @@ SPEC = {
 }
 
 
-def write_blocks(folder, k):
-    """One block of a run, and in the next generation a second one."""
-    with open_checkpoint(folder, {"a": "b"}, (1, 2, 3)) as checkpoint:
-        while checkpoint.steps < 4 * (k + 1):
-            checkpoint.write(Block(np.full((1, 4, 2, 3), checkpoint.steps), np.zeros((1, 4, 2)), (STATE,)), 1.0)
-        checkpoint.note_end()
+def write_states(folder, k):
+    """The state of a run after four steps, and in the next generation after eight."""
+    start = Block(np.zeros((1, 1, 2, 3)), np.zeros((1, 1, 2)), (STATE,))
+    with open_checkpoint(folder, {"a": "b"}) as checkpoint:
+        state = checkpoint.read(Coordinates(), (1, 2, 3)) if checkpoint.exists else RunState.begin(Coordinates(), start)
+        while state.steps < 4 * (k + 1):
+            state = state.append(Block(np.full((1, 4, 2, 3), state.steps), np.zeros((1, 4, 2)), (STATE,)))
+            checkpoint.write(state, 1.0, is_end=True)
 
 
 def write_outcomes(folder, k):
@@ -189,7 +192,7 @@ WRITERS = {
     "stream": lambda folder, k: Stream.save(types.SimpleNamespace(as_tree=lambda: tree(k)), folder / "stream.nc"),
     "report": write_report,
     "outcomes": write_outcomes,
-    "checkpoint": write_blocks,
+    "checkpoint": write_states,
     "data set": lambda folder, k: datasets.generate(SPEC, folder, workers=1) if k else None,
     "infer": lambda folder, k: contour.complete(tree(k), record(k), folder),
     "inspect": lambda folder, k: inspection.write_inspection(INSPECTIONS[k], folder),
@@ -330,7 +333,6 @@ def is_progress(name, path):
     """Files that grow, and of which a later step is the next state."""
     return (name, path) in {
         ("outcomes", "numbers.json"),
-        ("checkpoint", "checkpoint.json"),
         ("data set", "manifest.json"),
     }
 

@@ -310,7 +310,7 @@ def test_draws_of_the_sampler_in_30_dimensions():
 
 
 def test_evaluations_and_scale():
-    """As many points as asked for and two a chain; the evidence of f(x/s)/sᵈ times a constant is that of f times it."""
+    """As many points as asked for; the evidence of f(x/s)/sᵈ times a constant is that of f times it."""
     target, points = Normal(3), []
     draws = target.transform(standard_draws((4, 200, 3), np.random.default_rng(1)))
     values = target.log_density(draws.reshape(-1, 3)).reshape(4, 200)
@@ -320,7 +320,7 @@ def test_evaluations_and_scale():
         return target.log_density(x)
 
     first = bridge_evidence(counted, draws, values, np.random.default_rng(2), proposals=1000)
-    assert sum(points) == 1000 + 2 * 4
+    assert points == [1000]
     scale = np.array([1e-6, 1.0, 1e6])
     scaled = bridge_evidence(
         lambda x: target.log_density(x / scale) + 1e3,
@@ -358,42 +358,22 @@ def plain(x):
 DRAWS = np.random.default_rng(1).normal(size=(4, 50, 2))
 
 
-def not_bridged(*named, log_density=plain, draws=DRAWS, log_densities=None, proposals=None):
+def not_bridged(*named, log_density=plain, draws=DRAWS, log_densities=None):
     values = plain(draws) if log_densities is None else log_densities
     with refused(InferenceError, *named):
-        bridge_evidence(log_density, draws, values, np.random.default_rng(1), proposals=proposals)
-
-
-def test_shapes_that_do_not_agree_are_refused():
-    not_bridged("draws", "shape", draws=DRAWS[0])
-    not_bridged("draws", "shape", draws=DRAWS[:, :, :0])
-    not_bridged("draws", "shape", log_densities=plain(DRAWS)[:, 1:])
-    not_bridged("(4008,)", log_density=lambda x: plain(x)[:, None])
+        bridge_evidence(log_density, draws, values, np.random.default_rng(1))
 
 
 def test_too_little_is_refused():
     not_bridged("1 chains", "50 draws", draws=DRAWS[:1])
     not_bridged("8 draws", draws=DRAWS[:, :7])
     not_bridged("50 draws", draws=np.random.default_rng(1).normal(size=(4, 49, 20)))
-    not_bridged(20, proposals=18)
 
 
 def test_draws_that_cannot_be_are_refused():
-    not_bridged("finite", draws=np.where(DRAWS > 1.0, np.nan, DRAWS), log_densities=plain(DRAWS))
-    not_bridged("finite", log_densities=np.where(DRAWS[..., 0] > 1.0, -np.inf, plain(DRAWS)))
     not_bridged("parameter 1", draws=np.where([True, False], DRAWS, 3.0))
     not_bridged("too few different points", draws=np.sign(DRAWS))
     not_bridged("plane", draws=DRAWS[..., :1] * [1.0, 2.0])
-
-
-def test_a_density_that_is_no_number_is_refused():
-    not_bridged("log_density is nan at [", log_density=lambda x: np.where(x[:, 0] > 1.0, np.nan, plain(x)))
-    not_bridged("log_density is inf at [", log_density=lambda x: np.where(x[:, 0] > 1.0, np.inf, plain(x)))
-
-
-def test_another_density_is_refused():
-    not_bridged("differ by 1", log_density=lambda x: plain(x) + 1.0)
-    not_bridged("differ by inf", log_density=lambda x: np.where(np.isin(x[:, 0], DRAWS), -np.inf, plain(x)))
 
 
 def test_chains_of_different_places_are_refused():

@@ -65,7 +65,7 @@ def infer(
     checkpoint: Annotated[
         Path | None,
         typer.Option(
-            help="Folder in which every block of steps is kept: the same command resumes a stopped run.",
+            help="Folder in which the state of the run is kept: the same command resumes a stopped run.",
             file_okay=False,
         ),
         Writes(CHECKPOINT),

@@ -74,7 +74,7 @@ def infer_contour(
     settings : SamplerSettings, optional
         Criteria of convergence, and limits of steps and time.
     checkpoint : path-like, optional
-        Folder for this run alone, created if it does not exist, in which every finished block of steps is stored. A run
+        Folder for this run alone, created if it does not exist, in which the state is stored every few seconds. A run
         that was interrupted in any way resumes from it when it is called again, with the same draws as without the
         interruption. A checkpoint of another record, model, seed or settings is refused with the difference, except
         for max_steps, max_seconds, min_ess and max_r_hat of the settings.

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import gammaln, ndtr
 
@@ -30,6 +27,7 @@ __all__ = [
 ]
 
 LogProbability = Callable[[Floats], Floats]
+Random = np.random.Generator | np.random.RandomState  # emcee's moves have legacy generators
 WIDENING = 1.1  # scale over that of the fitted points: too wide a proposal costs less than too narrow a one
 _FREEDOM = 10.0  # degrees of freedom: tails are heavier than normal ones, at little cost
 _MAX_REDRAWS = 40  # times that points out of bounds are drawn again
@@ -39,18 +37,6 @@ _CUTS = np.linspace(-4.0, 1.0, 101)
 _ROUNDS = 10  # of expectation and maximisation
 # Points that the prior of a part's covariance weighs, and its width over that of all.
 _PRIOR_POINTS, _PRIOR_WIDTH = 5.0, 0.3
-
-
-class Random(Protocol):
-    """Common methods of NumPy's generators, new and legacy."""
-
-    def standard_normal(self, size: tuple[int, int], /) -> Floats: ...
-
-    def chisquare(self, df: float, size: int, /) -> Floats: ...
-
-    def multinomial(self, n: int, pvals: Floats, /) -> NDArray[np.int_]: ...
-
-    def permutation(self, x: int, /) -> NDArray[np.int_]: ...
 
 
 # ---- weights
@@ -156,11 +142,6 @@ class Proposal(_Density):
         return cls(mean, WIDENING * deviation[:, None] * np.linalg.cholesky(correlation), ends=ends)
 
     @property
-    def digest(self) -> str:
-        """Identity of the proposal, as text."""
-        return hashlib.sha256(self.mean.tobytes() + self.root.tobytes() + repr(self.efficiency).encode()).hexdigest()
-
-    @property
     def constant(self) -> float:
         """What `log_density` lacks."""
         size, nu = self.mean.size, self.freedom
@@ -241,15 +222,6 @@ class Mixture(_Density):
         """Efficiency of the mixture, as if each part covered its own mode alone."""
         each = np.array([part.efficiency for part in self.parts])
         return float(1.0 / np.sum(self.shares / each)) if np.all(each > 0.0) else 0.0
-
-    def with_efficiency(self, efficiency: float) -> Mixture:
-        """Return the mixture with another efficiency for all parts."""
-        return Mixture(tuple(replace(part, efficiency=efficiency) for part in self.parts))
-
-    @property
-    def digest(self) -> str:
-        """Identity of the mixture, as text."""
-        return hashlib.sha256("".join(part.digest for part in self.parts).encode()).hexdigest()
 
     def draw_unbounded(self, random: Random, count: int) -> Floats:
         counts = random.multinomial(count, self.shares)

@@ -63,6 +63,6 @@ SENSITIVITY = (
     "required_rod.png",
     *(f"study/{name}" for name in STUDY),
 )
-CHECKPOINT = ("checkpoint.json", "block-*.npz")
+CHECKPOINT = ("checkpoint.npz",)
 DATASET = ("manifest.json", "README.md", "shard-*.nc")
 FIGURES = ("figure_*.pdf", "figure_*.svg", "figure_*.png")

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from tactile_bayes.inference.coordinates.base import Logarithms
-from tactile_bayes.inference.densities import Proposal
 from tactile_bayes.inference.ensembles import SamplerSettings, sample
 
 
@@ -43,10 +42,3 @@ def test_coordinates_of_points_lead_back_to_them():
     there, growth = coordinates.parameters(coordinates.of(points))
     np.testing.assert_allclose(there, points, rtol=1e-14)
     np.testing.assert_allclose(growth, np.log(points[:, 0] * points[:, 2]), rtol=1e-12)
-
-
-def test_a_checkpoint_tells_coordinates_apart():
-    assert Logarithms(np.array([True, False])).digest != Logarithms(np.array([False, True])).digest
-    proposals = [Proposal(np.zeros(2), width * np.eye(2)) for width in (1.0, 2.0)]
-    digests = {Logarithms(np.array([True, False]), proposal).digest for proposal in [None, *proposals]}
-    assert len(digests) == 3

@@ -8,7 +8,6 @@ from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Ellipse, PowerLaw
 from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.coordinates.flank import FlankCoordinates
-from tactile_bayes.inference.densities import Mixture, Proposal
 from tactile_bayes.inference.starts.contour_start import flank_at_contacts
 
 PLACE = 0.1
@@ -74,13 +73,6 @@ def test_volumes_grow_as_the_determinant_of_the_jacobian_says(family, side):
 def test_vertices_on_the_other_side_have_none(family, side):
     found = flank(family, side).of(points_of(family, -side))
     assert np.isnan(found[:, [0, 3]]).any(axis=1).all()
-
-
-def test_a_checkpoint_distinguishes_them():
-    proposal = Mixture((Proposal(np.zeros(5), np.eye(5)),))
-    several = [flank("power-law", *where) for where in ((1.0, 0.1), (-1.0, 0.1), (1.0, 0.2))]
-    several += [flank("ellipse", 1.0, 0.1), several[0].with_proposal(proposal)]
-    assert len({one.digest for one in several} | {BASES["power-law"].digest}) == 6
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])

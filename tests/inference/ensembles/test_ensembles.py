@@ -303,47 +303,10 @@ def test_a_log_probability_that_is_no_number_is_refused_with_the_point(bad, caps
     assert printed.out == printed.err == ""
 
 
-def test_a_log_probability_of_the_wrong_shape_is_refused():
-    with refused(InferenceError, "shape"):
-        draw_from(lambda x: standard(x)[:, None], 2, settings=SMALL)
-
-
-def test_bad_starts_are_refused():
-    settings = SamplerSettings(ensembles=2, walkers=8)
-    names = ["a", "b"]
-    start = normal_start(2, settings)
-
-    def half(x):
-        return np.where(x[:, 0] > 0.0, standard(x), -np.inf)
-
-    outside = int(np.count_nonzero(start[..., 0] <= 0.0))
-    with refused(InferenceError, f"{outside} of 16 walkers", "scatter_walkers"):
-        sample(half, start, names=names, seed=1, settings=settings)
-    with refused(InferenceError, "finite"):
-        sample(standard, np.where(start > 0.0, start, np.nan), names=names, seed=1, settings=settings)
-    plane = start.copy()
-    plane[1, :, 1] = 2.0 * plane[1, :, 0]
-    with refused(InferenceError, "ensemble 1"):
-        sample(standard, plane, names=names, seed=1, settings=settings)
-    for shape in [(2, 8, 3), (3, 8, 2), (2, 6, 2), (16, 2)]:
-        with refused(ParameterError, "start"):
-            sample(standard, np.zeros(shape), names=names, seed=1, settings=settings)
-    free = SamplerSettings(ensembles=2)
-    with refused(ParameterError, "even"):
-        sample(standard, normal_start(2, free)[:, :7], names=names, seed=1, settings=free)
-    with refused(ParameterError, 6):
-        sample(standard, np.zeros((2, 4, 3)), names=["a", "b", "c"], seed=1, settings=free)
-
-
 @pytest.mark.parametrize("seed", [-1, 1.5, None, True])
 def test_bad_seeds_are_refused(seed):
     with refused(ParameterError, rng=seed):
         draw_from(standard, 2, settings=SMALL, seed=seed)
-
-
-def test_names_have_to_differ():
-    with refused(ParameterError, "name"):
-        sample(standard, normal_start(2, SMALL), names=["a", "a"], seed=1, settings=SMALL)
 
 
 def test_walkers_of_a_target():

@@ -21,7 +21,7 @@ def as_block(samples):
 
 def second_half(state):
     """Samples and log-probability at a diagnosis, whether walkers moved, and the thinning."""
-    state, _ = state.diagnose()
+    state = state.halved()
     return state.half.samples, state.half.values, state.moved, state.every
 
 
@@ -68,10 +68,11 @@ def test_blocks_and_looks_make_no_difference():
     steps, positive = 90, Logarithms(np.array([True, False, True]))
     samples = 0.01 * walked(steps)
     whole = appended(samples, [steps], positive)
-    parts, _ = appended(samples, [3, 10, 11, 40], positive).diagnose()
+    parts = appended(samples, [3, 10, 11, 40], positive).halved()
     for begin, end in ((40, 47), (47, 80), (80, 90)):
         parts = parts.append(as_block(samples[:, begin + 1 : end + 1]))
-    resumed = RunState.begin(positive, as_block(samples[:, :1]), 45, 90).append(as_block(samples[:, 46:]))
+    resumed = RunState(positive, as_block(samples[:, :41]), 40, appended(samples, [40], positive).halved().parts)
+    resumed = resumed.append(as_block(samples[:, 41:]))
     for other in (parts, resumed):
         for one, another in zip(second_half(whole), second_half(other), strict=True):
             np.testing.assert_array_equal(one, another)
@@ -111,7 +112,7 @@ def test_few_lost_walkers_are_taken_back_and_many_stay(count, stay):
     samples[0, :, :count] += 1000.0
     values = np.where(samples[..., 0] > 500.0, -50.0, -0.5 * samples[..., 0] ** 2)
     start = Block(samples[:, :1], values[:, :1], ())
-    state, _ = RunState.begin(Coordinates(), start).append(Block(samples, values, ())).diagnose()
+    state = RunState.begin(Coordinates(), start).append(Block(samples, values, ())).halved()
     last = state.recovered().last
     assert np.count_nonzero(last.samples[:, -1] > 500.0) == stay
     np.testing.assert_array_equal(last.samples[:, -1, count:], samples[:, -1, count:])

@@ -16,7 +16,6 @@ class _Shifted:
 
     mean: np.ndarray = field(default_factory=lambda: np.zeros(_SIZE))
     root: np.ndarray = field(default_factory=lambda: np.eye(_SIZE))
-    digest = "shifted"
     bent = _BENT
 
     def parameters(self, coordinates):

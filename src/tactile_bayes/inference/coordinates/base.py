@@ -23,11 +23,6 @@ class Coordinates:
         """Number of the first coordinates, if all others are nearly standard normal."""
         return None
 
-    @property
-    def digest(self) -> str:
-        """Identity of the coordinates, as text."""
-        return "the parameters"
-
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Return parameters, (n, parameters), and the log of the Jacobian determinant of the map to them, (n,)."""
         return coordinates, np.zeros(len(coordinates))
@@ -40,9 +35,6 @@ class Coordinates:
         """Return the same coordinates with another proposal."""
         return replace(self, proposal=proposal)  # type: ignore[type-var]
 
-    def _and_proposal(self, digest: str) -> str:
-        return digest if self.proposal is None else f"{digest}, proposal {self.proposal.digest}"
-
 
 @dataclass(frozen=True, eq=False)
 class Logarithms(Coordinates):
@@ -53,10 +45,6 @@ class Logarithms(Coordinates):
 
     positive: Flags
     proposal: Mixture | None = None
-
-    @property
-    def digest(self) -> str:
-        return self._and_proposal(f"logarithms of parameters {', '.join(map(str, np.flatnonzero(self.positive)))}")
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         points = coordinates.copy()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,62 +22,40 @@ _MAX_SHARE, _NEAR = 0.01, 0.1
 _STEP = 1e-6  # of central differences in the base's coordinates
 
 
-class _AtFlank(NamedTuple):
-    """A contour at the horizontal distance u from its vertex, each of shape (n,)."""
-
-    log_slope: Floats  # logarithm of the slope t
-    log_shape: Floats  # logarithm of what slope and curvature leave free
-    log_ratio: Floats  # logarithm of t/t′ [length]
-    rise: Floats  # height above the vertex [length]
+# A flank is two functions of arrays (n,). The first takes the family's two sizes and the horizontal distance u of the
+# vertex, and returns log t, the logarithm of the shape, log(t/t′), and the height above the vertex. The second takes
+# the former three, and returns the two sizes in the base's coordinates, u, that height, and the log-Jacobian.
 
 
-class _FromVertex(NamedTuple):
-    """A contour as its family describes it, each of shape (n,)."""
-
-    first: Floats  # parameter, in the base's coordinates
-    second: Floats
-    u: Floats  # horizontal distance of the vertex [length]
-    rise: Floats
-    log_jacobian: Floats  # of the base's coordinates by those of the flank
+def _power_law_at(w: Floats, n: Floats, u: Floats) -> tuple[Floats, ...]:
+    slope = n * (u / w) ** (n - 1.0)
+    return np.log(slope), np.log(n - 1.0), np.log(u / (n - 1.0)), slope * u / n
 
 
-class _PowerLawFlank:
-    """Width w and exponent n; the shape is n − 1, t = n (u/w)^(n − 1) and t/t′ = u/(n − 1)."""
-
-    @staticmethod
-    def at(w: Floats, n: Floats, u: Floats) -> _AtFlank:
-        slope = n * (u / w) ** (n - 1.0)
-        return _AtFlank(np.log(slope), np.log(n - 1.0), np.log(u / (n - 1.0)), slope * u / n)
-
-    @staticmethod
-    def vertex(log_slope: Floats, log_shape: Floats, log_ratio: Floats) -> _FromVertex:
-        shape, log_u = np.exp(log_shape), log_shape + log_ratio
-        n, u = 1.0 + shape, np.exp(log_u)
-        return _FromVertex(log_u - (log_slope - np.log(n)) / shape, n, u, np.exp(log_slope) * u / n, log_u)
+def _power_law_of(log_slope: Floats, log_shape: Floats, log_ratio: Floats) -> tuple[Floats, ...]:
+    shape, log_u = np.exp(log_shape), log_shape + log_ratio
+    n, u = 1.0 + shape, np.exp(log_u)
+    return log_u - (log_slope - np.log(n)) / shape, n, u, np.exp(log_slope) * u / n, log_u
 
 
-class _EllipseFlank:
-    """Half-axes a and b; with u = a sin τ the shape is tan τ, t = (b/a) tan τ and t/t′ = u cos² τ."""
-
-    @staticmethod
-    def at(a: Floats, b: Floats, u: Floats) -> _AtFlank:
-        sin = u / a
-        squared_cos = (1.0 - sin) * (1.0 + sin)
-        tan = sin / np.sqrt(squared_cos)
-        rise = b * sin**2 / (1.0 + np.sqrt(squared_cos))
-        return _AtFlank(np.log(b / a * tan), np.log(tan), np.log(u * squared_cos), rise)
-
-    @staticmethod
-    def vertex(log_slope: Floats, log_shape: Floats, log_ratio: Floats) -> _FromVertex:
-        tan = np.exp(log_shape)
-        sec = np.hypot(1.0, tan)
-        log_a = log_ratio + 3.0 * np.log(sec) - log_shape
-        log_b = log_slope + log_a - log_shape
-        rise = np.exp(log_b) * (tan / sec) ** 2 / (1.0 + 1.0 / sec)
-        return _FromVertex(log_a, log_b, np.exp(log_ratio) * sec**2, rise, log_ratio)
+def _ellipse_at(a: Floats, b: Floats, u: Floats) -> tuple[Floats, ...]:
+    sin = u / a
+    squared_cos = (1.0 - sin) * (1.0 + sin)
+    tan = sin / np.sqrt(squared_cos)
+    rise = b * sin**2 / (1.0 + np.sqrt(squared_cos))
+    return np.log(b / a * tan), np.log(tan), np.log(u * squared_cos), rise
 
 
-_FLANKS: dict[str, type[_PowerLawFlank] | type[_EllipseFlank]] = {"power-law": _PowerLawFlank, "ellipse": _EllipseFlank}
+def _ellipse_of(log_slope: Floats, log_shape: Floats, log_ratio: Floats) -> tuple[Floats, ...]:
+    tan = np.exp(log_shape)
+    sec = np.hypot(1.0, tan)
+    log_a = log_ratio + 3.0 * np.log(sec) - log_shape
+    log_b = log_slope + log_a - log_shape
+    rise = np.exp(log_b) * (tan / sec) ** 2 / (1.0 + 1.0 / sec)
+    return log_a, log_b, np.exp(log_ratio) * sec**2, rise, log_ratio
+
+
+_FLANKS = {"power-law": (_power_law_at, _power_law_of), "ellipse": (_ellipse_at, _ellipse_of)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,28 +98,22 @@ class FlankCoordinates(Coordinates):
         own = [*(f"{prefix}{name}" for name in FLANKS[sides[prefix]].table), *VERTEX]
         return cls(sides[prefix], base, x, side, tuple(map(names.index, own)))
 
-    @property
-    def digest(self) -> str:
-        return self._and_proposal(f"flank of a {self.flank}, side {self.side:g} at {self.x!r}, {self.base.digest}")
-
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         log_slope, log_shape, height, log_ratio = coordinates[:, self.columns].T
         based = coordinates.copy()
         with np.errstate(over="ignore", invalid="ignore"):  # infinite parameters are impossible
-            found = _FLANKS[self.flank].vertex(log_slope, log_shape, log_ratio)
-            contour = found.first, found.second, height - found.rise, self.x - self.side * found.u
-        based[:, self.columns] = np.stack(contour, axis=1)
+            first, second, u, rise, own = _FLANKS[self.flank][1](log_slope, log_shape, log_ratio)
+            based[:, self.columns] = np.stack([first, second, height - rise, self.x - self.side * u], axis=1)
         points, log_jacobian = self.base.parameters(based)
-        return points, log_jacobian + found.log_jacobian
+        return points, log_jacobian + own
 
     def of(self, points: Floats) -> Floats:
         """Return coordinates of points, shape (..., parameters); NaN if the vertex is on the other side."""
         coordinates = self.base.of(points)
         first, second, q, x_c = np.moveaxis(points[..., self.columns], -1, 0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            found = _FLANKS[self.flank].at(first, second, self.side * (self.x - x_c))
-        flank = found.log_slope, found.log_shape, q + found.rise, found.log_ratio
-        coordinates[..., self.columns] = np.stack(flank, axis=-1)
+            log_slope, log_shape, log_ratio, rise = _FLANKS[self.flank][0](first, second, self.side * (self.x - x_c))
+        coordinates[..., self.columns] = np.stack([log_slope, log_shape, q + rise, log_ratio], axis=-1)
         return coordinates
 
     def covariance(self, point: Floats, covariance: Floats) -> Floats:

@@ -10,7 +10,7 @@ meanwhile (after Boehl 2022, doi 10.2139/ssrn.4250395), which gives three to fou
 evaluation if a posterior is nearly normal. The others are differential evolution (ter Braak 2006, doi
 10.1007/s11222-006-8769-1; Nelson et al. 2014, doi 10.1088/0067-0049/210/1/11). Parameters may be sampled in other
 coordinates, in which a proposal may be known, from which most steps are then taken; diagnoses and results are always of
-the parameters. With a checkpoint, every block of steps is on disk before the next begins.
+the parameters. With a checkpoint, the state of the run is on disk every few seconds.
 """
 
 from tactile_bayes.inference.ensembles.sampling import Draws, Progress, sample

@@ -14,7 +14,6 @@ from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
 
 __all__ = [
     "FittedMove",
-    "FixedMove",
     "Moves",
     "NormalMove",
     "moves_in",
@@ -60,27 +59,12 @@ def step_ensembles(
     return points, values
 
 
-class FixedMove(emcee.moves.RedBlueMove):
-    """Proposals from a fixed distribution, independent of the walkers: an accepted one is independent of their past."""
-
-    def __init__(self, proposal: Mixture) -> None:
-        super().__init__()
-        self._proposal = proposal
-
-    def get_proposal(
-        self, sample: Floats, complement: Sequence[Floats], random: np.random.RandomState
-    ) -> tuple[Floats, Floats]:
-        """Return proposals, (n, parameters), and the log of the backward over the forward proposal density, (n,)."""
-        there, density = self._proposal.draw(random, len(sample))
-        return there, self._proposal.log_density(sample) - density
-
-
 class FittedMove(emcee.moves.RedBlueMove):
     """Proposals from a distribution that is fitted to the half of the ensemble that does not move meanwhile.
 
     By default it is Student's t. The proposal does not depend on the moving half, so that the target stays invariant
-    however bad the fit is. If the other half lies in a plane, no walker moves. Boehl (2022), doi 10.2139/ssrn.4250395,
-    adapts such proposals to the whole run instead.
+    however bad the fit is; a `fit` may also return a given distribution. If the other half lies in a plane, no walker
+    moves. Boehl (2022), doi 10.2139/ssrn.4250395, adapts such proposals to the whole run instead.
     """
 
     def __init__(
@@ -147,7 +131,7 @@ def standard_moves(proposal: Mixture | None = None) -> Moves:
     fixed = _MAX_FIXED_SHARE * np.sqrt(min(1.0, proposal.efficiency / _EFFICIENT))
     usual = 2.38 / np.sqrt(2.0 * proposal.size)
     moves = [
-        (FixedMove(proposal), fixed),
+        (FittedMove(fit=lambda _: proposal), fixed),
         (FittedMove(), 0.2 * (1.0 - fixed)),
         (emcee.moves.DEMove(gamma0=usual), 0.4 * (1.0 - fixed)),
         (emcee.moves.DEMove(gamma0=_SHORT_SCALE * usual), 0.37 * (1.0 - fixed)),

@@ -12,9 +12,9 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability
-from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, lost_walkers
+from tactile_bayes.inference.ensembles.diagnosis import lost_walkers
 from tactile_bayes.inference.ensembles.moves import Moves, step_ensembles
-from tactile_bayes.inference.ensembles.walkers import RandomState
+from tactile_bayes.inference.ensembles.walkers import RandomState, generator_at, state_of
 
 __all__ = ["Block", "RunState", "StoredSteps", "make_block", "next_diagnosis"]
 
@@ -25,7 +25,7 @@ _GROWTH = 1.25  # ratio of the steps at two successive diagnoses: all diagnoses 
 class Block:
     """Consecutive steps of all ensembles, and the random states with which they continue."""
 
-    samples: Floats  # shape (chain, step, walker, parameter)
+    samples: Floats  # shape (chain, step, walker, coordinate)
     log_probability: Floats  # shape (chain, step, walker)
     random_states: tuple[RandomState, ...]  # after the last step, with whose samples they determine the next step
     whole: bool = True  # false if an interrupt ended the block; the ensembles then do not continue
@@ -41,7 +41,7 @@ def make_block(target: LogProbability, moves: Moves, last: Block, steps: int, de
     The block has at least one step, but fewer than asked for after the deadline or an interrupt.
     """
     points, values = last.samples[:, -1], last.log_probability[:, -1]
-    randoms = [state.generator() for state in last.random_states]
+    randoms = [generator_at(state) for state in last.random_states]
     states = last.random_states
     samples, log_probability = (np.empty((len(a), steps, *a.shape[1:])) for a in (points, values))
     made, whole = 0, True
@@ -49,7 +49,7 @@ def make_block(target: LogProbability, moves: Moves, last: Block, steps: int, de
         while made < steps and not (made and deadline.has_passed):
             points, values = step_ensembles(target, moves, randoms, points, values)
             samples[:, made], log_probability[:, made] = points, values
-            states = tuple(RandomState.of(random) for random in randoms)
+            states = tuple(state_of(random) for random in randoms)
             made += 1
     except KeyboardInterrupt:
         whole = False
@@ -71,65 +71,65 @@ _MAX_LOST = 0.1  # largest share of the walkers of an ensemble that are taken ba
 class StoredSteps(NamedTuple):
     """Consecutive steps, some of them stored."""
 
-    first: int  # number of the first step, counted from 1
-    numbers: Index  # numbers of the stored steps
-    samples: Floats  # samples of the stored steps, shape (chain, step, walker, parameter)
+    numbers: Index  # numbers of the stored steps, counted from 1
+    samples: Floats  # parameters after the stored steps, shape (chain, step, walker, parameter)
     values: Floats  # their log-probability, shape (chain, step, walker)
     moved: Flags  # True if a walker moved in a step, for all steps, shape (chain, step, walker)
-
-    def since(self, steps: int, every: int) -> StoredSteps:
-        """Return the part after so many steps of the run, with every `every`-th step."""
-        first = max(self.first, steps + 1)
-        stored = (self.numbers >= first) & (self.numbers % every == 0)
-        moved = self.moved[:, first - self.first :]
-        return StoredSteps(first, self.numbers[stored], self.samples[:, stored], self.values[:, stored], moved)
 
 
 @dataclass(frozen=True, eq=False)
 class RunState:
     """State of a run: its last step, from which it continues, and the second half of its steps."""
 
-    coordinates: Coordinates  # coordinates in which the parameters are sampled
+    coordinates: Coordinates  # in which the parameters are sampled
     last: Block  # last block, whose last step determines the next one
     steps: int  # number of steps of each ensemble
-    # Thinning: a power of two that follows from the number of steps and the shape alone, so that a resumed run stores
-    # the same steps as an uninterrupted one.
-    every: int
-    half: StoredSteps  # second half of the steps at the last diagnosis, as parameters
-    recent: tuple[StoredSteps, ...] = ()  # blocks since then, in the coordinates
+    parts: tuple[StoredSteps, ...]  # the second half of the steps at least, in order
 
     @classmethod
-    def begin(cls, coordinates: Coordinates, start: Block, steps: int = 0, planned: int = 0) -> RunState:
-        """Return the state of a run without stored steps."""
+    def begin(cls, coordinates: Coordinates, start: Block) -> RunState:
+        """Return the state of a run before its first step."""
         samples, values = start.samples[:, :0], start.log_probability[:, :0]
-        empty = StoredSteps(steps + 1, np.empty(0, dtype=np.intp), samples, values, np.empty(values.shape, dtype=bool))
-        return cls(coordinates, start, steps, _thinning(max(steps, planned), start), empty)
+        empty = StoredSteps(np.empty(0, dtype=np.intp), samples, values, np.empty(values.shape, dtype=bool))
+        return cls(coordinates, start, 0, (empty,))
+
+    @property
+    def every(self) -> int:
+        """Thinning: a power of two that follows from the number of steps and the shape alone."""
+        every, half = 1, self.steps - self.steps // 2
+        while half // every * self.last.samples[:, 0].size > _MAX_STORED:
+            every *= 2
+        return every
 
     def append(self, block: Block) -> RunState:
         """Return the state after another block."""
         if not block.steps:
             return self
-        numbers = self.steps + 1 + np.arange(block.steps)
-        stored = numbers % self.every == 0
+        after = replace(self, last=block, steps=self.steps + block.steps)
+        numbers = np.arange(self.steps, after.steps) + 1
+        stored = numbers % after.every == 0
         before = np.concatenate([self.last.samples[:, -1:], block.samples[:, :-1]], axis=1)
-        part = StoredSteps(
-            self.steps + 1,
-            numbers[stored],
-            block.samples[:, stored],
-            block.log_probability[:, stored],
-            np.any(block.samples != before, axis=-1),
-        )
-        recent = (*self.recent, part)
-        return replace(self, last=block, steps=self.steps + block.steps, recent=recent)
+        moved = np.any(block.samples != before, axis=-1)
+        samples = block.samples[:, stored]
+        points, log_jacobian = self.coordinates.parameters(samples.reshape(-1, samples.shape[-1]))
+        values = block.log_probability[:, stored] - log_jacobian.reshape(samples.shape[:-1])
+        part = StoredSteps(numbers[stored], points.reshape(samples.shape), values, moved)
+        return replace(after, parts=(*self.parts, part))
 
-    def diagnose(self) -> tuple[RunState, Diagnosis]:
-        """Return the state with earlier steps dropped, and the diagnosis of its second half."""
-        every = _thinning(self.steps, self.last)
-        parts = [part.since(self.steps // 2, every) for part in (self.half, *map(self._as_parameters, self.recent))]
-        _, numbers, *columns = zip(*parts, strict=True)
-        joined = (np.concatenate(column, axis=1) for column in columns)
-        half = StoredSteps(parts[0].first, np.concatenate(numbers), *joined)
-        return replace(self, every=every, half=half, recent=()), Diagnosis(half.samples)
+    def halved(self) -> RunState:
+        """Return the state with the second half of its steps as the only part."""
+        numbers, *columns = zip(*self.parts, strict=True)
+        number = np.concatenate(numbers)
+        samples, values, moved = (np.concatenate(column, axis=1) for column in columns)
+        kept = (number > self.steps // 2) & (number % self.every == 0)
+        moved = moved[:, moved.shape[1] - (self.steps - self.steps // 2) :]
+        return replace(self, parts=(StoredSteps(number[kept], samples[:, kept], values[:, kept], moved),))
+
+    @property
+    def half(self) -> StoredSteps:
+        """The second half of the steps, of a state from `halved`."""
+        (half,) = self.parts
+        return half
 
     def lost(self) -> tuple[Flags, Flags]:
         """Return True for walkers lost in the earlier and in the later half of the steps kept, (chain, walker) each."""
@@ -158,15 +158,3 @@ class RunState:
     def moved(self) -> Flags:
         """True if a walker moved in a step, for all of the second half except the first; (chain, step, walker)."""
         return self.half.moved[:, 1:]
-
-    def _as_parameters(self, part: StoredSteps) -> StoredSteps:
-        shape = part.samples.shape
-        points, log_jacobian = self.coordinates.parameters(part.samples.reshape(-1, shape[-1]))
-        return part._replace(samples=points.reshape(shape), values=part.values - log_jacobian.reshape(shape[:-1]))
-
-
-def _thinning(steps: int, block: Block) -> int:
-    every, half = 1, steps - steps // 2
-    while half // every * block.samples[:, 0].size > _MAX_STORED:
-        every *= 2
-    return every

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import LogProbability
@@ -29,7 +28,7 @@ from tactile_bayes.inference.ensembles.diagnosis import (
 from tactile_bayes.inference.ensembles.moves import moves_in
 from tactile_bayes.inference.ensembles.run_state import Block, RunState, make_block, next_diagnosis
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
-from tactile_bayes.inference.ensembles.walkers import CheckedTarget, checked_start, first_random_state
+from tactile_bayes.inference.ensembles.walkers import CheckedTarget, first_random_state
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 from tactile_bayes.numerics.selection import evenly_spread
 
@@ -117,24 +116,21 @@ def sample(
     distinguish a part of it from the whole.
 
     A KeyboardInterrupt after the first step ends the run with the draws so far. A run with a checkpoint may be killed
-    at any moment: called again it resumes after the last finished block, and its draws are, bit by bit, those of an
+    at any moment: called again it resumes from the stored state, and its draws are, bit by bit, those of an
     uninterrupted run; one that has ended is not made again. `identity` states what determines the log-probability. Of
     the settings, `max_steps`, `max_seconds`, `min_ess` and `max_r_hat` may change from call to call.
     """
     began = time.monotonic()
     settings = SamplerSettings() if settings is None else settings
-    names = tuple(names)
-    if not names or len(set(names)) != len(names):
-        raise ParameterError(f"names are {names!r}: give each parameter a name of its own")
-    points = checked_start(start, names, settings)
+    names, points = tuple(names), np.array(start, dtype=float)
     chains, walkers, _ = points.shape
     settings = replace(settings, min_ess=max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers))
     coordinates = coordinates or Coordinates()
     with ExitStack() as stack:
         stored = None
         if checkpoint is not None:
-            about = identity_of_run(identity, points, names, seed, settings, coordinates)
-            stored = stack.enter_context(open_checkpoint(checkpoint, about, points.shape))
+            about = identity_of_run(identity, points, names, seed, settings)
+            stored = stack.enter_context(open_checkpoint(checkpoint, about))
         run = _Run(CheckedTarget(log_probability, names), coordinates, settings, stored, progress, began)
         run.begin(points, seed)
         while not run.has_ended:
@@ -184,19 +180,20 @@ class _Run:
         return bool(self.ending) and self.diagnosis is not None
 
     def begin(self, points: Floats, seed: Seed) -> None:
-        """Begin at starting points, or where the stored blocks end."""
-        due = 0
-        if self.stored is not None and self.stored.steps:
-            self.state = _resumed(self.stored, self.coordinates, points)
-            self.began -= self.stored.seconds
+        """Begin at starting points, or at the stored state."""
+        stored, ended_at = self.stored, 0
+        if stored is not None and stored.exists:
+            self.state = stored.read(self.coordinates, points.shape)
+            self.began -= stored.seconds
             self.target.evaluations = points[..., 0].size * (1 + self.steps)
-            due = self.steps if self.stored.ended_at == self.steps else 0
+            ended_at = self.steps if stored.is_end else 0
         else:
             self.state = RunState.begin(self.coordinates, _first_block(points, self.density, seed))
-        self.due = due or next_diagnosis(self.steps - 1, self.settings.block_steps)  # also if killed before a diagnosis
+        # A run that was killed before a diagnosis is diagnosed where it is.
+        self.due = ended_at or next_diagnosis(self.steps - 1, self.settings.block_steps)
 
     def advance(self) -> None:
-        """Make the steps up to the next diagnosis, block by block, each of which is stored."""
+        """Make the steps up to the next diagnosis, block by block."""
         self.due = min(self.due, self.settings.max_steps)
         while self.steps < self.due and not (self.is_late or self.ending):
             steps = min(self.settings.block_steps, self.due - self.steps)
@@ -206,20 +203,20 @@ class _Run:
             if not block.whole:
                 raise KeyboardInterrupt
             if self.stored is not None:
-                self.stored.write(block, self.seconds)
+                self.stored.write(self.state, self.seconds)
             self.is_late = self.deadline.has_passed
 
     def diagnose(self) -> None:
         """Diagnose the second half of the steps, and say whether the run ends, or when it is diagnosed next."""
         settings = self.settings
-        self.state, found = self.state.diagnose()
-        self.diagnosis = found
+        self.state = self.state.halved()
+        self.diagnosis = found = Diagnosis(self.state.half.samples)
         if not self.ending:
             enough = found.satisfies(settings.max_r_hat, settings.min_ess)
             spent = _OUT_OF_TIME if self.is_late else _OUT_OF_STEPS if self.steps >= settings.max_steps else ""
             self.ending = _CONVERGED if enough and not np.any(self.state.lost()) else spent
         if self.stored is not None and self.ending not in ("", _INTERRUPTED):
-            self.stored.note_end()
+            self.stored.write(self.state, self.seconds, is_end=True)
         if self.progress is not None:
             worst = float(found.r_hat[found.worst_r_hat]), float(found.ess[found.worst_ess])
             self.progress(Progress(self.steps, settings.max_steps, *worst, self.seconds))
@@ -273,20 +270,5 @@ class _Run:
 def _first_block(points: Floats, density: LogProbability, seed: Seed) -> Block:
     """Return the starting points as a block of one step."""
     values = np.array([density(ensemble) for ensemble in points])
-    outside = int(np.count_nonzero(np.isneginf(values)))
-    if outside:
-        raise InferenceError(
-            f"{outside} of {values.size} walkers start where the log-probability is −inf: "
-            "start them inside the support, for instance with scatter_walkers"
-        )
     randoms = tuple(first_random_state(own) for own in spawn(seed, len(points)))
     return Block(points[:, None], values[:, None], randoms)
-
-
-def _resumed(stored: Checkpoint, coordinates: Coordinates, points: Floats) -> RunState:
-    """Return the state after the last stored block; the steps before its second half are not read."""
-    unknown = Block(points[:, None], np.full(points.shape[:2], np.nan)[:, None], ())
-    state = RunState.begin(coordinates, unknown, stored.steps // 2, stored.steps)
-    for block in stored.read(since=stored.steps // 2):
-        state = state.append(block)
-    return state

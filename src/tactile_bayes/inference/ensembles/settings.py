@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tactile_bayes.checks import check_number, check_optional, check_positive, check_switch, check_whole_number, refused
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["SamplerSettings", "refuse_few_walkers", "settings_of"]
+__all__ = ["SamplerSettings", "settings_of"]
 
 _MOST = 10**9  # largest number of ensembles, walkers and steps
 
@@ -28,8 +28,7 @@ class SamplerSettings:
         faster with more of them, but each of them has to forget its start.
     block_steps : int
         Number of steps before the first diagnosis, and the smallest number between later ones, which come when the
-        steps have grown by a quarter. Also the number of steps in a file of a checkpoint, which a killed run may have
-        to make again.
+        steps have grown by a quarter.
     max_r_hat : float
         Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
     min_ess : float
@@ -95,7 +94,11 @@ class SamplerSettings:
         check_whole_number("parameters", parameters, 1)
         if self.walkers is None:
             return max(48, 6 * parameters)
-        refuse_few_walkers(self.walkers, parameters)
+        if self.walkers < 2 * parameters:
+            raise ParameterError(
+                f"{self.walkers} walkers for {parameters} parameters: give at least {2 * parameters}, or the proposals "
+                "of half an ensemble do not span the space"
+            )
         return self.walkers
 
 
@@ -103,12 +106,3 @@ def settings_of(settings: SamplerSettings | None) -> SamplerSettings:
     """Return the given settings, or the default ones; refuse other objects."""
     check_optional("settings", settings, SamplerSettings, "give SamplerSettings(min_ess=400) and the like")
     return SamplerSettings() if settings is None else settings
-
-
-def refuse_few_walkers(walkers: int, parameters: int) -> None:
-    """Refuse fewer than two walkers per parameter."""
-    if walkers < 2 * parameters:
-        raise ParameterError(
-            f"{walkers} walkers for {parameters} parameters: give at least {2 * parameters}, or the proposals of half "
-            "an ensemble do not span the space"
-        )

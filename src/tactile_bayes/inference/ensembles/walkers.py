@@ -3,43 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any
 
-import emcee
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.densities import LogProbability
-from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
+from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 
-__all__ = ["CheckedTarget", "RandomState", "checked_start", "first_random_state", "scatter_walkers"]
+__all__ = [
+    "CheckedTarget",
+    "RandomState",
+    "first_random_state",
+    "generator_at",
+    "scatter_walkers",
+    "state_of",
+]
 
 
-class RandomState(NamedTuple):
-    """State of NumPy's Mersenne Twister, which emcee's moves use."""
-
-    algorithm: str
-    key: NDArray[np.uint32]  # shape (624,)
-    position: int
-    has_gauss: int
-    gauss: float
-
-    @classmethod
-    def of(cls, random: np.random.RandomState) -> RandomState:
-        return cls(*random.get_state(legacy=True))
-
-    def generator(self) -> np.random.RandomState:
-        """Return a generator that continues from this state."""
-        random = np.random.RandomState()
-        random.set_state(self)
-        return random
+RandomState = tuple[Any, ...]  # of NumPy's Mersenne Twister, which emcee's moves use, as from `get_state`
 
 
 def first_random_state(seed: np.random.SeedSequence) -> RandomState:
-    return RandomState.of(np.random.RandomState(np.random.MT19937(seed)))
+    return state_of(np.random.RandomState(np.random.MT19937(seed)))
+
+
+def state_of(random: np.random.RandomState) -> RandomState:
+    return tuple(random.get_state(legacy=True))
+
+
+def generator_at(state: RandomState) -> np.random.RandomState:
+    """Return a generator that continues from a state."""
+    random = np.random.RandomState()
+    random.set_state(state)
+    return random
 
 
 class CheckedTarget:
@@ -52,11 +51,6 @@ class CheckedTarget:
 
     def __call__(self, points: Floats) -> Floats:
         values = np.asarray(self.log_probability(points), dtype=float)
-        if values.shape != points.shape[:1]:
-            raise InferenceError(
-                f"the log-probability of {points.shape[0]} points came back with shape {values.shape}: it has to take "
-                f"an array (n, {len(self.names)}) and return one of shape (n,)"
-            )
         self.evaluations += values.size
         wrong = np.isnan(values) | (values == np.inf)
         if np.any(wrong):
@@ -67,31 +61,6 @@ class CheckedTarget:
                 "impossible"
             )
         return values
-
-
-def checked_start(start: ArrayLike, names: Sequence[str], settings: SamplerSettings) -> Floats:
-    """Return starting points, shape (ensembles, walkers, parameters), and refuse unsuitable ones."""
-    points = np.array(start, dtype=float)
-    if points.ndim != 3 or points.shape[0] != settings.ensembles or points.shape[2] != len(names):
-        raise ParameterError(
-            f"start has shape {points.shape}: it has to be (ensembles, walkers, parameters) = "
-            f"({settings.ensembles}, walkers, {len(names)})"
-        )
-    walkers = points.shape[1]
-    if settings.walkers is not None and walkers != settings.walkers:
-        raise ParameterError(f"start has {walkers} walkers in an ensemble, but the settings ask for {settings.walkers}")
-    if walkers % 2:
-        raise ParameterError(f"start has {walkers} walkers in an ensemble: give an even number, it moves by halves")
-    refuse_few_walkers(walkers, len(names))
-    if not np.all(np.isfinite(points)):
-        raise InferenceError(f"{np.count_nonzero(~np.isfinite(points))} numbers of start are not finite")
-    for k, ensemble in enumerate(points):
-        if not emcee.ensemble.walkers_independent(ensemble):
-            raise InferenceError(
-                f"the walkers of ensemble {k} start in a plane (or all at one point), which they could never leave: "
-                "scatter them in every direction of parameter space"
-            )
-    return points
 
 
 def scatter_walkers(

@@ -103,31 +103,27 @@ class RecordLikelihood:
 
         Shapes: drive_angles (segments · n, k).
         """
-        rig = self._rig_of(rig, contours.shape[0])
-        segments, lines = len(self.segments), None
+        rig, lines = self._rig_of(rig, contours.shape[0]), None
+        sweeps = self._sweeps(rig)
         if self.segments.lines is not None:
             lines = np.repeat(self.segments.lines[:, None], contours.shape[0], axis=1)
             lines[..., 2] -= (self.segments.signs * self._misread(rig)).T[..., None]
             lines[..., _LENGTHS_OF_LINE] /= rig.length[:, None, None]
             lines = lines.reshape(-1, *lines.shape[2:])
         return trace(
-            self._in_sweep_frame(contours, rig),
-            friction_angle=np.tile(np.arctan(rig.friction), segments),
-            suspension_compliance=np.tile(self._compliance(rig), segments),
+            self._in_sweep_frame(contours, sweeps),
+            friction_angle=sweeps.friction_angle,
+            suspension_compliance=sweeps.compliance,
             profile=self._profile(rig),
             tolerance=None if exact else self._tolerance,
             drive_angles=drive_angles,
             lines=lines,
         )
 
-    def _in_sweep_frame(self, contours: Contour, rig: RigValues) -> SweepFrame:
-        (count,), segments = contours.shape, len(self.segments)
-        base_x, base_y = self._bases(rig).reshape(-1, 2).T
-        backward = np.repeat(self.segments.signs < 0.0, count)
-        every = contours.take(np.tile(np.arange(count), segments))
-        length = np.tile(self.rod.length * rig.length, segments)
-        of_rod = (np.tile(values, segments) for values in (*self._shape_of_rod(rig), self._stem(rig)))
-        return SweepFrame(every, base_x, base_y, length, 0.5 * self.rod.diameter, backward, *of_rod)
+    def _in_sweep_frame(self, contours: Contour, sweeps: Sweeps) -> SweepFrame:
+        every, standoff = contours.take(sweeps.contour), 0.5 * self.rod.diameter
+        of_rod = sweeps.rest_curvature, sweeps.taper, sweeps.stem
+        return SweepFrame(every, sweeps.base_x, sweeps.base_y, sweeps.length, standoff, sweeps.backward, *of_rod)
 
     def _profile(self, rig: RigValues) -> Profile | None:
         """Return the profile of the rod, without what the rig adds to it; None for arcs."""
@@ -136,19 +132,6 @@ class RecordLikelihood:
     @cached_property
     def _as_profile(self) -> Profile:
         return self.rod.as_profile()
-
-    def _shape_of_rod(self, rig: RigValues) -> tuple[Floats, Floats]:
-        """Return rest curvature and taper of each contour, as in `Sweeps`."""
-        known = self.rod.rest_curvature / self.rod.curvature_unit if self._profile(rig) is None else 0.0
-        return known + rig.rest_curvature, self.rod.taper + rig.taper
-
-    def _stem(self, rig: RigValues) -> Floats:
-        """Return the stem of each contour, in lengths of its rod."""
-        return np.asarray((self.rod.stem / self.rod.length + rig.stem) / rig.length)
-
-    def _compliance(self, rig: RigValues) -> Floats:
-        """Return the compliance of the suspension of each contour, in rad per EI/L of its rod."""
-        return np.asarray(rig.suspension_compliance * rig.rigidity_scale / rig.length)
 
     def _known(self, rig: RigValues) -> Tables:
         """Return tables for the rod, as far as the noise allows their errors."""
@@ -223,9 +206,10 @@ class RecordLikelihood:
     def _solutions(self, contours: Contour, rig: RigValues, errors: Floats | None = None) -> Solutions:
         """Solve the forward model; batch index k·n + i is contour i in segment k; without errors, for no samples."""
         errors = np.empty(0) if errors is None else errors
+        sweeps = self._sweeps(rig)
         return solve_sweeps(
-            self._shapes(contours, rig),
-            self._sweeps(rig),
+            self._shapes(contours, sweeps),
+            sweeps,
             self.segments.samples_with(errors),
             (contours.shape[0], errors.size * len(self.measured)),
             profile=self._profile(rig),
@@ -246,28 +230,28 @@ class RecordLikelihood:
         misread = 0.0 if self.segments.is_carried else (self.segments.signs * self._misread(rig))[..., None]
         return np.asarray(events.swapaxes(0, 1) + misread)
 
-    def _shapes(self, contours: Contour, rig: RigValues) -> Shapes:
+    def _shapes(self, contours: Contour, sweeps: Sweeps) -> Shapes:
         if contours.halves is not None:
             return shapes_of(contours)
-        low, high = (end.reshape(len(self.segments), -1) for end in self._in_sweep_frame(contours, rig).own_domain())
+        low, high = (end.reshape(len(self.segments), -1) for end in self._in_sweep_frame(contours, sweeps).own_domain())
         return shapes_of(contours, low.min(axis=0), high.max(axis=0))
 
     def _sweeps(self, rig: RigValues) -> Sweeps:
-        count, segments = rig.friction.size, len(self.segments)
-        bases, (curvature, taper) = self._bases(rig), self._shape_of_rod(rig)
+        count, segments, bases, rod = rig.friction.size, len(self.segments), self._bases(rig), self.rod
+        curvature = rod.rest_curvature / rod.curvature_unit if self._profile(rig) is None else 0.0
         return Sweeps(
             contour=np.tile(np.arange(count), segments),
             segment=np.repeat(np.arange(segments), count),
             base_x=bases[..., 0].ravel(),
             base_y=bases[..., 1].ravel(),
-            length=np.tile(self.rod.length * rig.length, segments),
-            standoff=np.full(segments * count, 0.5 * self.rod.diameter),
+            length=np.tile(rod.length * rig.length, segments),
+            standoff=np.full(segments * count, 0.5 * rod.diameter),
             backward=np.repeat(self.segments.signs < 0.0, count),
             friction_angle=np.tile(np.arctan(rig.friction), segments),
-            compliance=np.tile(self._compliance(rig), segments),
-            rest_curvature=np.tile(curvature, segments),
-            taper=np.tile(taper, segments),
-            stem=np.tile(self._stem(rig), segments),
+            compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale / rig.length, segments),
+            rest_curvature=np.tile(curvature + rig.rest_curvature, segments),
+            taper=np.tile(rod.taper + rig.taper, segments),
+            stem=np.tile((rod.stem / rod.length + rig.stem) / rig.length, segments),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
             rigidity=np.tile(rig.rigidity_scale, segments),
             relative_length=np.tile(rig.length, segments),

@@ -16,7 +16,6 @@ from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.least_squares import Optimum, descend, optima
 from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.parameters.nuisances import BIASES
-from tactile_bayes.inference.starts.axial_rig import axial_rig
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 from tactile_bayes.reconstruction import contacts_of
@@ -129,7 +128,6 @@ class _Search:
         self.deviation = model.deviations[:, model.present]
         self.measured = model.likelihood.measured[:, model.present] / self.deviation
         self.brackets = event_brackets(model)
-        self.axial_rig_is_due = True
         self.candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
         for name, zero in _zeros(model).items():
             self.candidates[:, model.names.index(name)] = zero
@@ -189,14 +187,8 @@ class _Search:
     def refine(self, found: Optimum) -> Optimum:
         """Return an optimum, refined by searches from Step 2's contacts while it does not explain the record.
 
-        The rig often converges long before a distant contour; with that rig, Step 2 locates the contour. Where loads
-        are large, the record shows the rig without a contour.
+        The rig often converges long before a distant contour; with that rig, Step 2 locates the contour.
         """
-        if self.axial_rig_is_due and not found.fits and not self.deadline.has_passed:
-            self.axial_rig_is_due = False
-            again = self.by_axial_rig()
-            if again is not None and again.cost < _MAX_COST_RATIO * found.cost:
-                found = again
         while not found.fits and not self.deadline.has_passed:
             point = self.points(found.point[None])[0]
             point = np.where(self.model.may_vanish[: point.size], np.maximum(point, 0.0), point)
@@ -209,15 +201,6 @@ class _Search:
                 break
             found = again
         return found
-
-    def by_axial_rig(self) -> Optimum | None:
-        """Optimum of the search from Step 2's contacts with the rig that axial forces show; None without."""
-        rig = axial_rig(self.model, self.model.certainly_loaded)
-        fitted = None if rig is None else contact_fit(self.model, rig)
-        if rig is None or fitted is None:
-            return None
-        place = self.coordinates.of(np.append(fitted, list(rig.values())))
-        return next(optima(self.residuals, [place], *self.limits))
 
     def complete(self, found: Optimum) -> ContourOptimum:
         """Return the optimum with the noise parameters and the covariance of all parameters."""

@@ -32,7 +32,7 @@ from tactile_bayes.inference.starts.contour_optimum import (
     optima_of,
     optimum_of,
 )
-from tactile_bayes.inference.starts.pilot import learn_coordinates, standardise
+from tactile_bayes.inference.starts.pilot import standardise
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
 __all__ = ["Walk", "flank_at_contacts", "walk_of"]
@@ -49,8 +49,7 @@ _EFFICIENT = 0.35  # efficiency of a proposal above which the posterior is nearl
 # Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred: a
 # ridge that bends beyond the draws of the importance sampling looks straight.
 _FLANK_EFFICIENCY = 0.4
-_PILOT_WALKERS = 6  # per parameter in the pilot run that learns coordinates, at most
-_SCALE_DRAWS = 500  # from which the prior scale of a coordinate, or the extent of a proposal, is estimated
+_SCALE_DRAWS = 500  # from which the extent of a proposal is estimated, or the prior searched
 _MAX_EXCESS_COST = 100.0  # above the smallest cost, from which an optimum is disregarded
 _MODE_RADIUS = 3.0  # distance from a mode, over that of typical points of its proposal, within which an optimum is its
 _MAX_LOG_MASS_RATIO = 9.0  # from which the smaller mode is left out: one draw in ten thousand
@@ -157,7 +156,7 @@ class _Start(NamedTuple):
         """Return walkers scattered twice as widely as normal approximations of the modes, which serve as proposals."""
         model, rng, deadline = self.model, self.rng, self.deadline
         modes = _Modes(model, rng, deadline).found_by_search()
-        if len({mode.coordinates.digest for mode in modes}) > 1:
+        if any(mode.coordinates is not modes[0].coordinates for mode in modes):
             modes = [mode.usual or mode for mode in modes]
         common = modes[0].coordinates
         proposal = Mixture(tuple(mode.proposal for mode in modes))
@@ -183,11 +182,6 @@ class _Start(NamedTuple):
             best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
             raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
         coordinates = common.with_proposal(proposal)
-        # Beside a discrepancy the posterior is a funnel, which no linear change of coordinates straightens.
-        if proposal.efficiency < _EFFICIENT and not model.noise.of_discrepancy and not deadline.has_passed:
-            size = len(model.names)
-            pilot, scale = start.reshape(-1, size)[: _PILOT_WALKERS * size], _prior_scale(model, common, rng)
-            coordinates = learn_coordinates(model.log_probability, coordinates, pilot, scale, rng, deadline)
         log_evidence = float(logsumexp([mode.proposal.log_mass for mode in modes]))
         return Walk(coordinates.of(start), coordinates, log_evidence, modes[0].optimum.beyond)
 
@@ -223,6 +217,7 @@ class _Modes:
     def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
         self.model, self.rng, self.deadline = model, rng, deadline
         self.found: list[_Mode] = []
+        self._own = model.coordinates
 
     def found_by_search(self) -> list[_Mode]:
         """Return modes of the posterior, that with the most mass first.
@@ -278,7 +273,7 @@ class _Modes:
         Modes on the same flank share the coordinates of the first.
         """
         model, point = self.model, optimum.point
-        usual = self._in(model.coordinates, optimum, optimum.covariance, model.walked_ends)
+        usual = self._in(self._own, optimum, optimum.covariance, model.walked_ends)
         if usual.proposal.efficiency > _EFFICIENT or self.deadline.has_passed:
             return usual
         flanks = dict.fromkeys([*(mode.coordinates for mode in self.found), flank_at_contacts(model, point)])
@@ -301,13 +296,6 @@ class _Modes:
         cloud = gather(target, centre, covariance, self.rng, self.deadline, ends)
         proposal = approximate(target, cloud.centre, cloud.narrow_covariance, self.rng, self.deadline, ends)
         return _Mode(optimum, cloud, proposal, coordinates)
-
-
-def _prior_scale(model: ContourModel, coordinates: Coordinates, rng: np.random.Generator) -> Floats:
-    """Return half the width of the central two thirds of each coordinate's prior."""
-    draws = np.stack([model.priors[name].rvs(_SCALE_DRAWS, random_state=rng) for name in model.names], axis=1)
-    low, high = np.nanquantile(coordinates.of(draws), [0.16, 0.84], axis=0)
-    return np.asarray(0.5 * (high - low))
 
 
 def flank_at_contacts(model: ContourModel, point: Floats) -> FlankCoordinates | None:

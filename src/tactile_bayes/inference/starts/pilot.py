@@ -1,78 +1,27 @@
-"""Short pilot runs, which learn coordinates in which a posterior is nearly normal."""
+"""Short pilot runs, which make nearly standard normal coordinates of a posterior more so."""
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
-from tactile_bayes.inference.coordinates.straightened import Straightened
+from tactile_bayes.inference.coordinates.base import in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
-from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time
+from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.moves import Moves, moves_in
 from tactile_bayes.inference.ensembles.run_state import Block, make_block
 from tactile_bayes.inference.ensembles.walkers import RandomState, first_random_state
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
-__all__ = ["learn_coordinates", "standardise"]
+__all__ = ["standardise"]
 
-_STEPS = (60, 120, 240, 480, 960)  # of each stage, which samples in the best coordinates so far
-_STEPS_OF_NORMAL = (40, 80, 160, 320)  # of each pilot run in coordinates that are nearly standard normal
+_STEPS = (40, 80, 160, 320)  # of each pilot run
 # Gain of mean log-density by a further change of these coordinates, and share of the steps that move a walker, below
 # and above which no further run is made.
 _GOOD_GAIN, _GOOD_MOVING = 0.3, 0.55
 _MIN_VARIANCE = 1e-3  # of these coordinates that is believed
-_MAX_DRAWS = 3000  # from each half of the walkers to which the coordinates of a stage are fitted
-_GOOD_QUALITY = 0.25  # of a proposal from which no further stage is made; it is 0.4 for a normal posterior
-_QUALITY_DRAWS = 400  # from the posterior, and from the proposal, by which the quality is estimated
-_MIN_ACCEPTANCE = 0.02  # probability at any point, since there are other moves
-
-
-def learn_coordinates(
-    log_probability: LogProbability,
-    base: Coordinates,
-    start: Floats,
-    scale: Floats,
-    rng: np.random.Generator,
-    deadline: Deadline = NEVER,
-) -> Coordinates:
-    """Return coordinates with a proposal in them, learned in stages that sample in the best coordinates so far.
-
-    The quality of a proposal is estimated at positions of the walkers: its own draws would miss the same parts of the
-    target, and a narrow one would look good. Shapes: start (walkers, d), scale (d,).
-    """
-    best: Coordinates = base
-    points = start
-    random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
-    for steps in _STEPS:
-        density = in_coordinates(log_probability, best)
-        coordinates = best.of(points)
-        block = _pilot(density, moves_in(best), coordinates, steps, random, deadline)
-        (random,) = block.random_states
-        late = block.samples[:, block.steps // 2 :]
-        points = best.parameters(late[0, -1])[0]
-        every = [best.parameters(walker)[0] for walker in np.swapaxes(late[0], 0, 1)]
-        share = 1.0 / max(1.0, float(np.median(autocorrelation_time(late))))
-        half = len(every) // 2
-        some, others = (rng.permutation(np.concatenate(part))[:_MAX_DRAWS] for part in (every[:half], every[half:]))
-        quality = 0.0
-        if best.proposal is not None:
-            quality = _quality(log_probability, best, np.concatenate([some, others]), rng)
-            best = best.with_proposal(best.proposal.with_efficiency(quality))
-        if quality < _GOOD_QUALITY and not deadline.has_passed:
-            with suppress(np.linalg.LinAlgError):  # too few walkers have moved for a fit
-                found = _quality(log_probability, _straightened(base, some, scale, share), others, rng)
-                if found > quality:
-                    quality = found
-                    best = _straightened(base, np.concatenate([some, others]), scale, share, found)
-        if quality >= _GOOD_QUALITY or deadline.has_passed:
-            break
-    return best
 
 
 def standardise(
@@ -89,7 +38,7 @@ def standardise(
     """
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
     best, start, points = base, start.copy(), start[0]
-    for steps in _STEPS_OF_NORMAL:
+    for steps in _STEPS:
         if deadline.has_passed:
             break
         density = in_coordinates(log_probability, best)
@@ -164,26 +113,3 @@ def _pilot(
     if not block.whole:
         raise KeyboardInterrupt
     return block
-
-
-def _straightened(
-    base: Coordinates, draws: Floats, scale: Floats, share: float, efficiency: float = 0.0
-) -> Straightened:
-    """Return coordinates fitted to draws, with a proposal; a share of the draws counts as independent."""
-    found = Straightened.fitted(base, draws, scale, share * len(draws))
-    return replace(found, proposal=Mixture((replace(Proposal.fitted(found.of(draws)), efficiency=efficiency),)))
-
-
-def _quality(
-    log_probability: LogProbability, coordinates: Coordinates, draws: Floats, rng: np.random.Generator
-) -> float:
-    """Return one over the mean number of proposals until acceptance, averaged over draws from the posterior."""
-    target, proposal = in_coordinates(log_probability, coordinates), coordinates.proposal
-    assert proposal is not None
-    proposed, density = proposal.draw(rng, _QUALITY_DRAWS)
-    there = target(proposed) - density
-    chosen = coordinates.of(draws[rng.permutation(len(draws))[:_QUALITY_DRAWS]])
-    here = target(chosen) - proposal.log_density(chosen)
-    here = here[np.isfinite(here)]  # rounding in the coordinates may put a draw beyond the edge of the possible
-    accepted = np.exp(np.minimum(0.0, there - here[:, None])).mean(axis=1)
-    return float(1.0 / np.mean(1.0 / np.maximum(accepted, _MIN_ACCEPTANCE)))
