@@ -223,9 +223,7 @@ def test_the_truth_is_within_reach_of_the_implied_contacts():
 
 
 def test_moments_are_those_of_the_draws():
-    single = infer_contacts(
-        measured().isel(sample=[50, 60]), rig=Rig(load_cell=CELL), rng=1, draws=400, method="importance"
-    )
+    single = infer_contacts(measured().isel(sample=[50, 60]), rig=Rig(load_cell=CELL), rng=1, draws=400)
     moments, draws = contact_moments(single), single["posterior"].to_dataset().isel(sample=1)
     x, y = draws.contact_x.values.ravel(), draws.contact_y.values.ravel()
     slope = draws.slope_angle.values.mean()
@@ -242,7 +240,7 @@ def test_moments_are_those_of_the_draws():
 
 def test_the_layout_is_that_of_infer_contacts():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    single = infer_contacts(measured().isel(sample=[50]), rig=Rig(load_cell=cell), rng=1, draws=4, method="importance")
+    single = infer_contacts(measured().isel(sample=[50]), rig=Rig(load_cell=cell), rng=1, draws=4)
     tree = implied()
     assert set(tree.children) == set(single.children)
     assert list(tree["posterior"].data_vars) == list(single["posterior"].data_vars)
@@ -311,7 +309,7 @@ def test_the_figure_shows_both_and_their_ratio():
 
 
 def test_the_figure_takes_posteriors_of_single_contacts_and_chosen_samples():
-    posteriors = infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40, method="importance")
+    posteriors = infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40)
     axes = plotting.tightening(implied(), posteriors, samples=[40, 60, 120], axes=own_axes(5))
     x = contact_moments(implied()).contact_x.values[[40, 60, 120]]
     assert [text.xy[0] for text in axes[0].texts] == x.tolist()
