@@ -18,7 +18,6 @@ from tactile_bayes.errors import DriftWarning, ParameterError, ReachError
 from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import Ends
-from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.parameters.noise import Noise
 from tactile_bayes.inference.parameters.nuisances import Nuisances
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
@@ -207,7 +206,7 @@ class ContourModel:
             return None
         scale, length = points[:, [self.names.index(name) for name in self.noise.of_discrepancy]].T
         course = self.likelihood.segments.course
-        read = load_in_contact(loads, course) * self.likelihood.load_cell.own_gains
+        read = course.load_in_contact(loads) * self.likelihood.load_cell.own_gains
         return Discrepancy(course, scale[:, None, None] * read, length)
 
     def discrepancy_at(self, point: Floats) -> Discrepancy | None:

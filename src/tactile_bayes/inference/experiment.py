@@ -14,7 +14,6 @@ from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.distributions import Distribution, all_in_words, in_words
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.family import Family, Gauge, family_of
-from tactile_bayes.inference.parameters.discrepancy import discrepancy_priors
 from tactile_bayes.inference.parameters.noise import Noise, noise_of
 from tactile_bayes.inference.parameters.nuisances import Nuisances, nuisances_of
 from tactile_bayes.inference.parameters.priors import default_priors as contour_priors
@@ -65,7 +64,7 @@ class Experiment:
     @cached_property
     def noise(self) -> Noise:
         """Parameters of the noise, and of a discrepancy if it is unknown."""
-        return noise_of(self.record, self.rig, discrepancy_priors(self.rig))
+        return noise_of(self.record, self.rig)
 
     @cached_property
     def nuisances(self) -> Nuisances:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.parameters.discrepancy import is_discrepancy
-from tactile_bayes.inference.parameters.nuisances import Nuisances
+from tactile_bayes.inference.parameters.nuisances import Nuisances, belongs
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import known_of, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
@@ -85,7 +84,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     contour = contours_of(draw, posterior.attrs["family"])
     cell = LoadCell.from_record(record) or LoadCell()
     names = tuple(read_json(posterior.attrs["nuisances"], "nuisances"))
-    names = tuple(name for name in names if not is_discrepancy(name))
+    names = tuple(name for name in names if not belongs(name, "discrepancy"))
     nuisances = Nuisances(names, {}, rod_of(record), known_of(posterior.attrs), pivots=len(bases_of(record)))
     rig = nuisances.rig({name: np.atleast_1d(draw[name].values) for name in nuisances.names})
     likelihood = RecordLikelihood(record, cell, nuisances.friction)

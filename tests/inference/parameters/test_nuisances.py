@@ -17,7 +17,6 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.parameters.nuisances import LEVERS
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
@@ -26,6 +25,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.record.attributes import same_rod
 from tactile_bayes.rig import NOTHING, Rig, make_record
+from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import rod_with
 from tactile_bayes.sweep import Translation, scan
 
@@ -604,8 +604,8 @@ def test_a_missing_channel_has_no_bias():
 @pytest.mark.parametrize("name", ["lever", "lever_y"])
 def test_a_lever_takes_a_moment_that_was_measured(name):
     measured = coarse().assign(holding_moment=np.nan * coarse().holding_moment)
-    assert not set(LEVERS) & set(priors_of(measured, name))
-    assert not set(LEVERS) & set(Experiment(measured, Rig(unknown={"lever_y": stats.norm(0.0, 0.01)})).priors)
+    assert not set(GROUPS["lever"]) & set(priors_of(measured, name))
+    assert not set(GROUPS["lever"]) & set(Experiment(measured, Rig(unknown={"lever_y": stats.norm(0.0, 0.01)})).priors)
 
 
 @pytest.mark.parametrize("direction", ["forward", "backward"])

@@ -14,7 +14,6 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.reconstruction import loaded_samples
@@ -91,7 +90,7 @@ class _SmoothNoise(NamedTuple):
             return nothing
         loads, _ = model.likelihood.predict(model.contours(point), model.rig(point))
         course = model.likelihood.segments.course
-        largest = load_in_contact(loads[0], course) / observer.noise
+        largest = course.load_in_contact(loads[0]) / observer.noise
         in_contact = largest.any(axis=1)
         if not in_contact.any():
             return nothing
