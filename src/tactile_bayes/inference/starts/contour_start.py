@@ -21,7 +21,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
 from tactile_bayes.inference.importance import approximate
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
-from tactile_bayes.inference.shape_free_posterior.normal_approximation import Observer
+from tactile_bayes.inference.shape_free_posterior.observer import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 from tactile_bayes.inference.starts.cloud import Cloud, gather
