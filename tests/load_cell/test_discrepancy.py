@@ -11,7 +11,9 @@ from scipy import stats
 
 from helpers.load_cells import CELL, SHARED, UNKNOWN, WALK, WANDER, cell, moments
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import kalman
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
+from tactile_bayes.load_cell.drift import Zero
 from tactile_bayes.load_cell.kalman import innovations
 
 N = 40
@@ -205,3 +207,10 @@ def test_a_drift_in_another_order_is_refused():
     discrepancy, _, _, measured, loads, _ = drawn(10, repeated=True)
     with pytest.raises(ParameterError, match="repeated sweeps"):
         cell(drift=WALK).log_likelihood(measured, loads, discrepancy=discrepancy)
+
+
+def test_it_is_compiled_once_whatever_arrays_come():
+    for residual in (np.zeros((4, 3)), np.broadcast_to(0.0, (2, 4, 3)), np.zeros((2, 3, 4)).swapaxes(1, 2)):
+        residual.flags.writeable = False
+        kalman.given_others(residual, np.ones((4, 3)), Zero(np.ones(3), np.full(3, 0.1), np.zeros(3), 1.0))
+    assert len(kalman._filter_all.signatures) == 1

@@ -101,9 +101,7 @@ def _run(
     shapes = residual.shape, noise.shape, of_zero[0].shape, weight.shape, (*rate.shape, 1, 1)
     shape = np.broadcast_shapes(*shapes)
     size = -1, *shape[-2:]
-    residual, noise, weight = (
-        np.ascontiguousarray(np.broadcast_to(v, shape)).reshape(size) for v in (residual, noise, weight)
-    )
+    residual, noise, weight = (np.broadcast_to(v, shape).reshape(size) for v in (residual, noise, weight))
     order = np.arange(shape[-2]) if discrepancy is None else discrepancy.course.order
     step = np.ones(shape[-2]) if discrepancy is None else discrepancy.course.step
     wandering = np.stack([np.broadcast_to(v, (*shape[:-2], 1, shape[-1])).reshape(-1, shape[-1]) for v in of_zero])
@@ -121,11 +119,17 @@ def _called(
     wandering: Floats,
     decay: float,
 ) -> tuple[Floats, Floats]:
-    """Call the compiled function with room for results, and for mean, covariance, a vector, and gains of states."""
-    found = np.empty(readings[0].shape), np.empty(readings[0].shape)
+    """Call the compiled function with room for results, and for mean, covariance, a vector, and gains of states.
+
+    Arrays that are read only, or lie otherwise in memory, would each be another type, for which all is compiled anew.
+    """
+    residual, white, weight, rate, wandering = (
+        np.require(values, requirements="CW") for values in (*readings, rate, wandering)
+    )
+    found = np.empty(residual.shape), np.empty(residual.shape)
     gains = np.empty((order.size if smooths else 0, _STATES))
     state = np.empty(_STATES), np.empty((_STATES, _STATES)), np.empty(_STATES), gains
-    _filter_all(readings, rate, order, step, wandering, decay, smooths, found, state)
+    _filter_all((residual, white, weight), rate, order, step, wandering, decay, smooths, found, state)
     return found
 
 
