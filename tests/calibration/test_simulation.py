@@ -166,7 +166,7 @@ def test_friction(told):
 def test_a_truth_of_which_nothing_is_said_is_a_real_rig():
     """All that is unknown of one is drawn; the load cell is that which inference assumes."""
     asked = experiment(truth=Rig())
-    assert asked.simulated.nuisances.names == Experiment(asked.assumed.record, Rig(load_cell=QUIET)).nuisances.names
+    assert asked.simulated.unknowns.names == Experiment(asked.assumed.record, Rig(load_cell=QUIET)).unknowns.names
     made = simulate(asked, np.random.default_rng(1))
     assert asked.problem_of(made.measured).model.names == ("a", "q", "x_c", "noise_scale")
     assert abs(made.truth["lever_x"]) > 1e-6

@@ -31,7 +31,7 @@ STEP = float(np.radians(6.0))
 THICK = Rod(length=0.1, flexural_rigidity=1.2e-5, diameter=0.003)
 
 
-def tree_of(record, family, *, friction=0.0, nuisances=(), **draws) -> xr.DataTree:
+def tree_of(record, family, *, friction=0.0, unknowns=(), **draws) -> xr.DataTree:
     """What `infer_contour` would have returned of these draws."""
     values = {name: (("chain", "draw"), np.atleast_2d(np.asarray(v, dtype=float))) for name, v in draws.items()}
     loads = ["holding_moment", "force_x", "force_y"]
@@ -46,7 +46,7 @@ def tree_of(record, family, *, friction=0.0, nuisances=(), **draws) -> xr.DataTr
     tree.attrs = {name: record.attrs[name] for name in attrs if name in record.attrs} | {
         "family": family,
         "known": json.dumps({"friction": friction} if friction else {}),
-        "nuisances": json.dumps(nuisances),
+        "nuisances": json.dumps(unknowns),
         "data_sha256": record_hash(record),
         "message": "made up",
     }
@@ -114,7 +114,7 @@ def test_the_frame_of_the_load_cell_does_not_matter():
 def test_an_inferred_offset_is_taken_off_the_drive_angle_draw_by_draw(name):
     contour, offsets = Parabola(0.5, 0.5), np.array([0.0, 0.02, -0.03])
     record = swept(contour, step=STEP)
-    tree = tree_of(record, "parabola", nuisances=[name], **parameters(contour), **{name: offsets})
+    tree = tree_of(record, "parabola", unknowns=[name], **parameters(contour), **{name: offsets})
     found = implied_contacts(tree)["posterior"].to_dataset().isel(chain=0)
     for k, offset in enumerate(offsets):
         for direction in ("forward", "backward"):
@@ -135,7 +135,7 @@ def test_inferred_friction_and_compliance_go_into_the_paths_draw_by_draw():
     record = swept(contour, step=STEP)
     names = ["friction", "suspension_compliance"]
     further = {"friction": friction, "suspension_compliance": compliance}
-    tree = tree_of(record, "parabola", nuisances=names, **parameters(contour))
+    tree = tree_of(record, "parabola", unknowns=names, **parameters(contour))
     further = {name: (("chain", "draw"), [values]) for name, values in further.items()}
     tree["posterior"] = tree["posterior"].to_dataset().assign(further)
     tree = implied_contacts(tree)

@@ -23,7 +23,7 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
     What has no true value is left out: the noise scale if channels differ, the noise of a load cell that states none,
     the length of a discrepancy that the simulated rig does not have, and parameters of another family.
     """
-    known = {**simulated.own_family.known, **simulated.nuisances.known, **drawn}
+    known = {**simulated.own_family.known, **simulated.unknowns.known, **drawn}
     rod, stated = rod_of(simulated.record), rod_of(assumed.record)
     cell, stated_cell = simulated.noise.cell, assumed.noise.cell
     length = known.get("length", rod.length)

@@ -176,7 +176,7 @@ def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
 
 
 def _inferred(posterior: xr.DataTree) -> list[str]:
-    """Return the nuisance parameters of a run."""
+    """Return the unknowns of the rig of a run."""
     names: list[str] = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
     return names
 

@@ -45,8 +45,8 @@ def disturbed(size, seed=1, cell=CELL):
     return cell.measure(ideal, rng=seed)
 
 
-def model_of(record, nuisances=SMOOTH, cell=CELL, family="parabola"):
-    return Experiment(record, Rig(load_cell=cell, unknown=only(*nuisances)), family).model
+def model_of(record, unknowns=SMOOTH, cell=CELL, family="parabola"):
+    return Experiment(record, Rig(load_cell=cell, unknown=only(*unknowns)), family).model
 
 
 def points_of(model, **values):

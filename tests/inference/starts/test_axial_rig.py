@@ -41,7 +41,7 @@ def test_stiffness_encoder_lever_and_friction_are_found_without_the_contour(cont
 
 
 def test_it_is_not_asked_where_it_does_not_follow():
-    """Of a rod that may be curved, without nuisance parameters, or from a few samples."""
+    """Of a rod that may be curved, without unknowns of the rig, or from a few samples."""
     contour = Parabola(0.9, 0.12)
     model, loaded = model_of(contour)
     assert axial_rig(model, loaded) is not None

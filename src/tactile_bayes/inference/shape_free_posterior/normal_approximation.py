@@ -48,7 +48,7 @@ def linear_names(model: ContourModel) -> tuple[str, ...]:
     Those that may vanish come last.
     """
     rough = [name for name in model.family.parameters if name not in _OF_ROUGHNESS]
-    return (*rough, *sorted(model.nuisances.names, key=MAY_VANISH.__contains__))
+    return (*rough, *sorted(model.unknowns.names, key=MAY_VANISH.__contains__))
 
 
 def _white_scales(model: ContourModel) -> slice:
@@ -297,7 +297,7 @@ def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: 
     a standard deviation give better ones.
     """
     model = observer.model
-    rig = linear_names(model)[prior.mean.size - len(model.nuisances.names) :]
+    rig = linear_names(model)[prior.mean.size - len(model.unknowns.names) :]
     nodes = centre.size - 2 - len(rig)
     units = np.append(np.ones(nodes), prior.precision[-2 - len(rig) :] ** -0.5)
     noises = scales[_white_scales(model)]

@@ -37,11 +37,11 @@ class Observer:
         Residuals are expected less measured values, those of snap-offs in standard deviations. Shapes are
         (n, samples, 3), (n, samples) and (n, sweep segments that end).
         """
-        model, rig = self.model, self.model.nuisances.rig(values)
+        model, rig = self.model, self.model.unknowns.rig(values)
         loads, _ = model.likelihood.predict(contours, rig)
         agree = (loads != 0.0).any(axis=2) == self.loaded
         cell = model.likelihood.load_cell
-        beyond = cell.expected(model.nuisances.sensed(loads, values, cell)) - model.likelihood.measured
+        beyond = cell.expected(model.unknowns.sensed(loads, values, cell)) - model.likelihood.measured
         late = (model.likelihood.snap_offs(contours, rig) - self._end) / self._width
         beyond /= self.noise
         return beyond, agree, late[:, self.ends]

@@ -30,7 +30,7 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
     """
     if not _is_determined(model, loaded):
         return None
-    names, likelihood = model.nuisances.names, model.likelihood
+    names, likelihood = model.unknowns.names, model.likelihood
     middle = np.array([float(model.priors[name].median()) for name in names])  # type: ignore[attr-defined]
     spread = np.array([float(model.priors[name].std()) for name in names])
     readings, deviation = likelihood.measured[loaded], model.deviation
@@ -41,10 +41,10 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
     def residuals(steps: Floats) -> Floats:
         """Return axial forces less those that follow from the moments, in standard deviations, (n, samples)."""
         values = dict(zip(names, (middle + spread * steps).T, strict=True))
-        rig = model.nuisances.rig(values)
+        rig = model.unknowns.rig(values)
         # Readings are affine functions of loads, known by their values at no load and at unit loads.
         none_and_units = np.tile(np.vstack([np.zeros(3), np.eye(3)]), (len(steps), 1, 1))
-        read = likelihood.load_cell.expected(model.nuisances.sensed(none_and_units, values, likelihood.load_cell))
+        read = likelihood.load_cell.expected(model.unknowns.sensed(none_and_units, values, likelihood.load_cell))
         slopes, left = read[:, 1:] - read[:, :1], readings - read[:, :1]
         loads = np.linalg.solve(np.swapaxes(slopes, 1, 2), np.swapaxes(left, 1, 2))
         moment, force_x, force_y = np.moveaxis(loads, 1, 0)
@@ -68,7 +68,7 @@ def axial_rig(model: ContourModel, loaded: Flags) -> dict[str, float] | None:
 
 def _is_determined(model: ContourModel, loaded: Flags) -> bool:
     """Return True if the rod and what is unknown of the rig have that redundancy, with enough loaded samples."""
-    names, rod = model.nuisances.names, model.likelihood.rod
+    names, rod = model.unknowns.names, model.likelihood.rod
     return (
         bool(names)
         and bool(np.count_nonzero(loaded) >= _SAMPLES_PER_PARAMETER * len(names))

@@ -305,7 +305,7 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
     moment, *forces = model.deviation * rod.load_units
     cell = replace(model.noise.cell, moment_noise=float(moment), force_noise=float(max(forces)))
     try:
-        rig = {**model.nuisances.known, **(_zeros(model) if found is None else found)}
+        rig = {**model.unknowns.known, **(_zeros(model) if found is None else found)}
         contacts = contacts_of(corrected(model.measured, cell, rig), "constrained" if cell.has_variances else "raw")
     except (ParameterError, RecordError):
         return None
@@ -324,7 +324,7 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
 
 def _zeros(model: ContourModel) -> dict[str, float]:
     """Return inferred biases as estimated from the unloaded samples, by name."""
-    names, stated = model.nuisances.names, model.noise.cell.bias
-    units = [model.nuisances.units.get(name, np.nan) for name in GROUPS["bias"]]
+    names, stated = model.unknowns.names, model.noise.cell.bias
+    units = [model.unknowns.units.get(name, np.nan) for name in GROUPS["bias"]]
     shown = zip(GROUPS["bias"], model.zero * np.array(units) - np.array(stated), strict=True)
     return {name: float(zero) for name, zero in shown if name in names and np.isfinite(zero)}

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
     from tactile_bayes.rig.rig_prior import RigPrior
 
-__all__ = ["Nuisances", "belongs", "nuisances_of"]
+__all__ = ["Unknowns", "belongs", "unknowns_of"]
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _SAME_DIRECTION = 1e-3  # range of drive angles [rad] within which a rod keeps its direction
@@ -41,7 +41,7 @@ _SENSED = ("bias", "drift", "gain", "lever", "moment_curve")
 
 
 @dataclass(frozen=True)
-class Nuisances:
+class Unknowns:
     """Parameters of a rig that are inferred beside those of a contour."""
 
     names: tuple[str, ...]
@@ -173,7 +173,7 @@ def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
             loads[..., 0] += _by_point(arm, loads) * loads[..., channel]
 
 
-def nuisances_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool = False) -> Nuisances:
+def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool = False) -> Unknowns:
     """Return the parameters of a rig that are unknown and that the record shows, with their priors.
 
     A bias with a bias_uncertainty of the load cell is not among them: the likelihood integrates it out already. The
@@ -192,7 +192,7 @@ def nuisances_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool 
     known = {n: v for n, v in said.items() if isinstance(v, float) and (gauge or n not in GROUPS["gauge"])}
     stated = Stated.of(rod, cell)
     priors = {n: stated.default(n) if isinstance(v := said[n], str | float) else v for n in names if n not in of_joint}
-    return Nuisances(
+    return Unknowns(
         names,
         priors | of_joint,
         rod,
