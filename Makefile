@@ -13,7 +13,7 @@ export MPLBACKEND ?= Agg
 # Bytecode halves the time that a process takes to start, and tests and notebooks start many.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test notebooks test-lowest test-slow bench coverage calibration shapes recognition misspecification streams trust designs efficiency nuisances samplers images docs dist lint clean
+.PHONY: demo test notebooks test-lowest test-slow bench coverage calibration shapes recognition misspecification streams trust designs efficiency unknowns samplers images docs dist lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -68,8 +68,8 @@ designs: $(READY)
 efficiency: $(READY)
 	$(BIN)/python -m benchmarks.efficiency
 
-nuisances: $(READY)
-	$(BIN)/python -m benchmarks.nuisances
+unknowns: $(READY)
+	$(BIN)/python -m benchmarks.unknowns
 
 samplers: $(READY)
 	$(BIN)/python -m pip install --quiet --target $(PEERS) --upgrade --no-deps \

@@ -34,7 +34,7 @@ from scipy import stats
 import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.parameters.nuisances import Nuisances
+from tactile_bayes.inference.parameters.unknowns import Unknowns
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood, events_of
 from tactile_bayes.inference.result import known_of
 from tactile_bayes.rig import NOTHING
@@ -246,8 +246,8 @@ def releases(found: xr.DataTree, name: str, rod: tb.Rod) -> list[str]:
     draws = found["posterior"].dataset.stack(every=("chain", "draw"))
     draws = draws.isel(every=slice(None, None, max(1, draws.sizes["every"] // 200)))
     inferred = [one for one in json.loads(found.attrs["nuisances"]) if not one.startswith("discrepancy")]
-    nuisances = Nuisances(tuple(inferred), {}, rod, known_of(found.attrs))
-    rig = nuisances.rig({one: draws[one].values for one in inferred})
+    unknowns = Unknowns(tuple(inferred), {}, rod, known_of(found.attrs))
+    rig = unknowns.rig({one: draws[one].values for one in inferred})
     record = record_of(name, rod, whole=True)
     contours = contours_of(draws, found.attrs["family"])
     ways = 1e3 * events_of(RecordLikelihood(record, SENSOR), contours, rig)["snap_off_travel"]

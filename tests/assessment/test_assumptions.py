@@ -28,13 +28,13 @@ def names_of(rig, bases=((0.0, 0.0),), **options):
 
 
 def unknown_of(alternative):
-    return alternative.experiment.nuisances.names
+    return alternative.experiment.unknowns.names
 
 
-def test_each_nuisance_is_added_or_fixed_and_each_other_family_tried():
+def test_each_unknown_is_added_or_fixed_and_each_other_family_tried():
     found = names_of(only("bias", "friction"))
     assert unknown_of(found["bias as stated"]) == ("friction",)
-    assert found["friction as stated"].experiment.nuisances.friction == 0.0
+    assert found["friction as stated"].experiment.unknowns.friction == 0.0
     assert found["lever inferred"].kind == "added"
     assert found["family circle"].experiment.own_family == Family("circle")
     assert "family parabola" not in found
@@ -48,11 +48,11 @@ def test_what_is_fixed_has_the_value_that_rod_and_load_cell_state():
     found = names_of(rig, bases=((0.0, 0.0), (0.2, 0.0)))
     for group in ("rest_curvature", "stem", "base"):
         fixed = found[f"{group} as stated"].experiment
-        assert set(names_of_group(group)).isdisjoint(fixed.nuisances.names)
-        assert len(fixed.nuisances.names) == len(Experiment(fixed.record, rig).nuisances.names) - len(
+        assert set(names_of_group(group)).isdisjoint(fixed.unknowns.names)
+        assert len(fixed.unknowns.names) == len(Experiment(fixed.record, rig).unknowns.names) - len(
             names_of_group(group)
         )
-        assert fixed.nuisances.known == {}  # none deviates from what is stated
+        assert fixed.unknowns.known == {}  # none deviates from what is stated
 
 
 def names_of_group(group):
@@ -77,7 +77,7 @@ def test_a_calibrated_rig_does_not_add_what_is_fixed():
     found = names_of(Rig(unknown=known, calibration=joint))
     assert unknown_of(found["rigidity_scale as stated"]) == ("lever_x",)
     assert unknown_of(found["lever as stated"]) == ("rigidity_scale",)
-    added = found["backlash inferred"].experiment.nuisances
+    added = found["backlash inferred"].experiment.unknowns
     assert set(added.names) == {"rigidity_scale", "lever_x", "backlash"}
     assert added.joint is not None
     assert set(unknown_of(found["family circle"])) == set(priors)

@@ -16,11 +16,11 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.parameters.nuisances import BIASES, DRIFTS
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig_prior import RigPrior
 
 QUIET = LoadCell(force_noise=1e-12, moment_noise=1e-12)
@@ -142,7 +142,7 @@ def test_the_truth_has_what_is_known_of_it():
     """The truth of what is inferred is drawn no more."""
     biases, drifts = (0.1, 0.2, 0.3), (-0.1, 0.0, 0.4)
     known = {"rigidity_scale": 1.1, "drive_angle_offset": 0.05}
-    for names, values in ((BIASES, biases), (DRIFTS, drifts)):
+    for names, values in ((GROUPS["bias"], biases), (GROUPS["drift"], drifts)):
         known |= dict(zip(names, values, strict=True))
     made = simulated(
         unknown=among("rigidity_scale", "bias", "drift", "taper"),
@@ -166,7 +166,7 @@ def test_friction(told):
 def test_a_truth_of_which_nothing_is_said_is_a_real_rig():
     """All that is unknown of one is drawn; the load cell is that which inference assumes."""
     asked = experiment(truth=Rig())
-    assert asked.simulated.nuisances.names == Experiment(asked.assumed.record, Rig(load_cell=QUIET)).nuisances.names
+    assert asked.simulated.unknowns.names == Experiment(asked.assumed.record, Rig(load_cell=QUIET)).unknowns.names
     made = simulate(asked, np.random.default_rng(1))
     assert asked.problem_of(made.measured).model.names == ("a", "q", "x_c", "noise_scale")
     assert abs(made.truth["lever_x"]) > 1e-6

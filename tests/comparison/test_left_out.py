@@ -18,7 +18,7 @@ SETTINGS = SamplerSettings(ensembles=2, walkers=20, min_ess=250, max_r_hat=1.05)
 
 def problem_of(cell=CELL):
     measured = cell.measure(swept(Parabola(0.5, 0.5), step=0.12), rng=4)
-    return contour_problem(Experiment(measured, "parabola", cell, friction=0.0, nuisances=()))
+    return contour_problem(Experiment(measured, "parabola", cell, friction=0.0, unknowns=()))
 
 
 @pytest.fixture(scope="module")

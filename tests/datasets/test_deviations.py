@@ -73,7 +73,7 @@ def test_readings_are_those_that_inference_expects_at_the_truth(said, frame):
         loads, reached = model.likelihood.predict(model.contours(point), model.rig(point))
         own = model.likelihood.load_cell
         expected = (
-            own.expected(model.nuisances.sensed(loads, model.values(point), own))[0] * model.likelihood.rod.load_units
+            own.expected(model.unknowns.sensed(loads, model.values(point), own))[0] * model.likelihood.rod.load_units
         )
         assert reached.all()
         readings = np.stack([one[name].values for name in CHANNELS], axis=1)

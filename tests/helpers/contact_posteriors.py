@@ -15,7 +15,7 @@ from scipy import stats
 
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
-from tactile_bayes.inference.contact_posterior.importance import weigh_contacts
+from tactile_bayes.inference.contact_posterior.draws import weigh_contacts
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
@@ -296,8 +296,8 @@ def density_of(record: xr.Dataset, cell: LoadCell, which, *, prior="flat", frict
 def weighed_moments(density: ContactDensity, draws=16000, seed=1):
     """The ten numbers of each sample from weighted proposals, and the number of draws that these are worth."""
     weights = weigh_contacts(density, draws, np.random.SeedSequence(seed))
-    places = density.to_lab_frame(weights.contact)[:3]
-    tangential = weights.points[..., 0] < 0.0
+    coordinates, _ = density.unfold(weights.points.swapaxes(1, 2))
+    places, tangential = density.contacts(coordinates)[:3], weights.points[:, 0] < 0.0
     each = []
     for i, log_weight in enumerate(weights.log_weight.T):
         used = log_weight > -60.0

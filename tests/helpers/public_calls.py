@@ -90,7 +90,7 @@ def posterior() -> xr.DataTree:
 
 @functools.cache
 def contacts_drawn() -> xr.DataTree:
-    return tb.infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40, method="importance")
+    return tb.infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40)
 
 
 @functools.cache
@@ -501,14 +501,12 @@ def _inference_calls(folder: Path) -> dict[str, Call]:
         "infer_contacts": Call(
             tb.infer_contacts,
             {
-                "settings": None,
                 "progress": None,
                 "measured": measured(),
                 "rig": STATED,
                 "prior": "flat",
                 "rng": 1,
                 "draws": 40,
-                "method": "importance",
             },
         ),
         "infer_point_load": Call(

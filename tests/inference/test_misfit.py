@@ -12,8 +12,8 @@ OF_ROD = ["rest_curvature", "taper", "stem", "length"]
 EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance", *OF_ROD]
 
 
-def suggested(nuisances, **stated):
-    found = re.search(r"under \[unknown\] of rig\.toml: ([^)]*)\)", what_to_try(["parabola"], nuisances, **stated))
+def suggested(unknowns, **stated):
+    found = re.search(r"under \[unknown\] of rig\.toml: ([^)]*)\)", what_to_try(["parabola"], unknowns, **stated))
     return found[1].split(", ") if found else []
 
 

@@ -23,7 +23,7 @@ def test_the_model_has_the_density_that_was_sampled():
 
 
 @pytest.mark.slow
-def test_also_with_nuisances_a_rod_in_metres_and_unknown_noise():
+def test_also_with_unknowns_a_rod_in_metres_and_unknown_noise():
     from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
     from tactile_bayes.sweep import scan
 

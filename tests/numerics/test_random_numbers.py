@@ -24,7 +24,7 @@ def of_contour(rng):
 
 def of_contacts(rng):
     record = measured().isel(sample=slice(60, 62))
-    return tb.infer_contacts(record, STATED, rng=rng, draws=4, method="importance")["posterior"]["contact_x"].values
+    return tb.infer_contacts(record, STATED, rng=rng, draws=4)["posterior"]["contact_x"].values
 
 
 @pytest.mark.parametrize("draw", [of_measure, of_contour, of_contacts])

@@ -224,7 +224,7 @@ def test_what_a_posterior_knows_of_rig_and_contour_is_known(measured):
     told = known_from_posterior(posterior, draws=5, rng=np.random.default_rng(1))
     assert told.experiment.model.names == ("a", "x_c", "moment_bias")
     assert dict(told.experiment.own_family.known) == {"q": 0.5}
-    assert dict(told.experiment.nuisances.known) == {"friction": 0.1}
+    assert dict(told.experiment.unknowns.known) == {"friction": 0.1}
     assert np.isfinite(designed(posterior).width).all()
 
 

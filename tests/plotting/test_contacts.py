@@ -23,7 +23,7 @@ SOME = np.array([2, 22, 24, 30, 45, 61, 120])
 
 @pytest.fixture(scope="module")
 def posterior():
-    return infer_contacts(measured().isel(sample=SOME), rig=Rig(load_cell=CELL), rng=1, draws=400, method="importance")
+    return infer_contacts(measured().isel(sample=SOME), rig=Rig(load_cell=CELL), rng=1, draws=400)
 
 
 @pytest.fixture(scope="module")

@@ -72,7 +72,7 @@ def test_two_points_that_are_nearly_as_good_are_both_returned():
 
 def test_it_is_a_branch_of_the_posterior():
     record, rod, place = touching("arc")
-    tree = tb.infer_contacts(record, rig=Rig(rod=rod, load_cell=CELL), rng=1, method="importance")
+    tree = tb.infer_contacts(record, rig=Rig(rod=rod, load_cell=CELL), rng=1)
     assert tree["sample_stats"]["converged"].values.all()
     np.testing.assert_array_less(tree["sample_stats"]["tangential_probability"].values, 0.01)
     draws = tree["posterior"].to_dataset().stack(all=("chain", "draw"))

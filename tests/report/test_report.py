@@ -41,7 +41,7 @@ from helpers.report_pages import (
 )
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.parameters.nuisances import nuisances_of
+from tactile_bayes.inference.parameters.unknowns import unknowns_of
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import posterior_draws, read_result, record_of, write_result
 from tactile_bayes.load_cell import LoadCell
@@ -434,10 +434,10 @@ def predicted(tree, rig):
     record = record_of(tree)
     best = posterior_draws(tree).isel(tree["sample_stats"]["lp"].argmax(("chain", "draw")))
     cell, rod = LoadCell.from_record(record), rod_of(record)
-    nuisances = nuisances_of(record, tb.Rig(unknown=only(*rig)), cell)
+    unknowns = unknowns_of(record, tb.Rig(unknown=only(*rig)), cell)
     values = {name: np.array([value]) for name, value in rig.items()}
     likelihood = RecordLikelihood(record, cell, exact=True)
-    loads, _ = likelihood.predict(contours_of(best, "parabola"), nuisances.rig(values))
+    loads, _ = likelihood.predict(contours_of(best, "parabola"), unknowns.rig(values))
     return loads[0] * rod.load_units
 
 

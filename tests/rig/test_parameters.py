@@ -57,9 +57,9 @@ def test_default_priors_are_those_of_the_table(name):
 def test_bounds_and_units_are_those_of_the_table(name):
     row, experiment = parameter_named(name), experiment_of(name)
     low, high = experiment.priors[name].support()
-    if name in experiment.nuisances.names:
-        assert experiment.nuisances.bounds(name) == (row.low, row.high)
-        assert row.name in (*GROUPS["gauge"], "base_2_x", "base_2_y") or experiment.nuisances.units[
+    if name in experiment.unknowns.names:
+        assert experiment.unknowns.bounds(name) == (row.low, row.high)
+        assert row.name in (*GROUPS["gauge"], "base_2_x", "base_2_y") or experiment.unknowns.units[
             name
         ] == pytest.approx(unit_of(row))
     if row.default != "normal" or name in ("taper", "stem"):  # the bounds cut off the others
@@ -75,7 +75,7 @@ def test_a_neutral_number_is_a_rig_as_stated(name):
         return
     gauge = Gauge(PIN) if name in GROUPS["gauge"] else None
     rig = Rig(load_cell=CELL, unknown={**NOTHING, name: row.neutral})
-    assert Experiment(RECORD, rig, "circle", gauge=gauge).nuisances.known == {}
+    assert Experiment(RECORD, rig, "circle", gauge=gauge).unknowns.known == {}
     assert row.low <= row.neutral <= row.high
 
 

@@ -29,7 +29,7 @@ ALL = tuple(name for group in STANDARD for name in members(group))
 
 def unknown_of(said, record=RECORD, **rig):
     """Unknown parameters of the rig, without those of the noise."""
-    return Experiment(record, Rig(load_cell=CELL, unknown=said, **rig)).nuisances.names
+    return Experiment(record, Rig(load_cell=CELL, unknown=said, **rig)).unknowns.names
 
 
 # --- The rule -------------------------------------------------------------------------------------------------------
@@ -46,8 +46,8 @@ def test_a_number_is_known_and_a_distribution_unknown():
     assert rig.known == {"friction": 0.2}
     assert rig.distributions == {"moment_bias": wide}
     experiment = Experiment(RECORD, rig)
-    assert "friction" not in experiment.nuisances.names
-    assert experiment.nuisances.known == {"friction": 0.2}
+    assert "friction" not in experiment.unknowns.names
+    assert experiment.unknowns.known == {"friction": 0.2}
     assert experiment.priors["moment_bias"] is wide
     assert "suspension_compliance" in experiment.priors
 
@@ -57,7 +57,7 @@ def test_nothing_is_unknown_of_a_rig_that_is_as_stated():
     assert unknown_of("nothing") == ()
     assert unknown_of({**NOTHING, "friction": "default"}) == ("friction",)
     assert set(NOTHING) == set(STANDARD)
-    assert Experiment(RECORD, Rig(load_cell=CELL, unknown="nothing")).nuisances.known == {}
+    assert Experiment(RECORD, Rig(load_cell=CELL, unknown="nothing")).unknowns.known == {}
 
 
 def test_a_group_stands_for_its_members_with_exceptions():
@@ -77,7 +77,7 @@ def test_the_shifts_of_all_pivots_are_a_group():
     assert unknown_of({**NOTHING, "base": "default"}, record) == every
     assert unknown_of({**NOTHING, "base": "default", "base_2_x": 0.01}, record) == every[1:]
     assert unknown_of({**NOTHING, "base": "default"}) == ()
-    known = Experiment(record, Rig(load_cell=CELL, unknown={**NOTHING, "base_x": 0.01})).nuisances.known
+    known = Experiment(record, Rig(load_cell=CELL, unknown={**NOTHING, "base_x": 0.01})).unknowns.known
     assert known == {"base_2_x": 0.01, "base_3_x": 0.01}
 
 
@@ -199,7 +199,7 @@ def test_a_rig_travels(travel):
 
 
 def names_there(rig):
-    return Experiment(RECORD, Rig(load_cell=rig.load_cell, unknown=rig.unknown)).nuisances.names, rig.text
+    return Experiment(RECORD, Rig(load_cell=rig.load_cell, unknown=rig.unknown)).unknowns.names, rig.text
 
 
 @pytest.mark.slow

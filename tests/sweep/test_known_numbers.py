@@ -83,7 +83,7 @@ def expected(record, rig, contour):
     loads, reached = model.likelihood.predict(model.contours(point), model.rig(point))
     assert reached.all()
     own = model.likelihood.load_cell
-    sensed = model.nuisances.sensed(loads, model.values(point), own)
+    sensed = model.unknowns.sensed(loads, model.values(point), own)
     return own.expected(sensed)[0] * model.likelihood.rod.load_units
 
 

@@ -31,7 +31,7 @@ STEP = float(np.radians(6.0))
 THICK = Rod(length=0.1, flexural_rigidity=1.2e-5, diameter=0.003)
 
 
-def tree_of(record, family, *, friction=0.0, nuisances=(), **draws) -> xr.DataTree:
+def tree_of(record, family, *, friction=0.0, unknowns=(), **draws) -> xr.DataTree:
     """What `infer_contour` would have returned of these draws."""
     values = {name: (("chain", "draw"), np.atleast_2d(np.asarray(v, dtype=float))) for name, v in draws.items()}
     loads = ["holding_moment", "force_x", "force_y"]
@@ -46,7 +46,7 @@ def tree_of(record, family, *, friction=0.0, nuisances=(), **draws) -> xr.DataTr
     tree.attrs = {name: record.attrs[name] for name in attrs if name in record.attrs} | {
         "family": family,
         "known": json.dumps({"friction": friction} if friction else {}),
-        "nuisances": json.dumps(nuisances),
+        "nuisances": json.dumps(unknowns),
         "data_sha256": record_hash(record),
         "message": "made up",
     }
@@ -114,7 +114,7 @@ def test_the_frame_of_the_load_cell_does_not_matter():
 def test_an_inferred_offset_is_taken_off_the_drive_angle_draw_by_draw(name):
     contour, offsets = Parabola(0.5, 0.5), np.array([0.0, 0.02, -0.03])
     record = swept(contour, step=STEP)
-    tree = tree_of(record, "parabola", nuisances=[name], **parameters(contour), **{name: offsets})
+    tree = tree_of(record, "parabola", unknowns=[name], **parameters(contour), **{name: offsets})
     found = implied_contacts(tree)["posterior"].to_dataset().isel(chain=0)
     for k, offset in enumerate(offsets):
         for direction in ("forward", "backward"):
@@ -135,7 +135,7 @@ def test_inferred_friction_and_compliance_go_into_the_paths_draw_by_draw():
     record = swept(contour, step=STEP)
     names = ["friction", "suspension_compliance"]
     further = {"friction": friction, "suspension_compliance": compliance}
-    tree = tree_of(record, "parabola", nuisances=names, **parameters(contour))
+    tree = tree_of(record, "parabola", unknowns=names, **parameters(contour))
     further = {name: (("chain", "draw"), [values]) for name, values in further.items()}
     tree["posterior"] = tree["posterior"].to_dataset().assign(further)
     tree = implied_contacts(tree)
@@ -223,9 +223,7 @@ def test_the_truth_is_within_reach_of_the_implied_contacts():
 
 
 def test_moments_are_those_of_the_draws():
-    single = infer_contacts(
-        measured().isel(sample=[50, 60]), rig=Rig(load_cell=CELL), rng=1, draws=400, method="importance"
-    )
+    single = infer_contacts(measured().isel(sample=[50, 60]), rig=Rig(load_cell=CELL), rng=1, draws=400)
     moments, draws = contact_moments(single), single["posterior"].to_dataset().isel(sample=1)
     x, y = draws.contact_x.values.ravel(), draws.contact_y.values.ravel()
     slope = draws.slope_angle.values.mean()
@@ -242,7 +240,7 @@ def test_moments_are_those_of_the_draws():
 
 def test_the_layout_is_that_of_infer_contacts():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    single = infer_contacts(measured().isel(sample=[50]), rig=Rig(load_cell=cell), rng=1, draws=4, method="importance")
+    single = infer_contacts(measured().isel(sample=[50]), rig=Rig(load_cell=cell), rng=1, draws=4)
     tree = implied()
     assert set(tree.children) == set(single.children)
     assert list(tree["posterior"].data_vars) == list(single["posterior"].data_vars)
@@ -311,7 +309,7 @@ def test_the_figure_shows_both_and_their_ratio():
 
 
 def test_the_figure_takes_posteriors_of_single_contacts_and_chosen_samples():
-    posteriors = infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40, method="importance")
+    posteriors = infer_contacts(measured(), rig=Rig(load_cell=CELL), rng=1, draws=40)
     axes = plotting.tightening(implied(), posteriors, samples=[40, 60, 120], axes=own_axes(5))
     x = contact_moments(implied()).contact_x.values[[40, 60, 120]]
     assert [text.xy[0] for text in axes[0].texts] == x.tolist()

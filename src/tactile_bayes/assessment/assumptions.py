@@ -1,4 +1,4 @@
-"""Effect of assumptions: the band again with each nuisance added or fixed, and with each other family."""
+"""Effect of assumptions: the band again with each unknown added or fixed, and with each other family."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.parameters.nuisances import belongs
+from tactile_bayes.inference.parameters.unknowns import belongs
 from tactile_bayes.numerics.random_numbers import Seed, child, seed_words
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import STANDARD
@@ -30,8 +30,8 @@ from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 __all__ = ["Alternative", "alternatives_of", "band_by_assumption"]
 
-_NUISANCES = (*STANDARD, "base", "drift", "gain", "suspension_compliance", "rest_curvature", "taper", "stem", "length")
-"""Nuisance parameters, or groups of them, each of which is added or fixed."""
+_UNKNOWNS = (*STANDARD, "base", "drift", "gain", "suspension_compliance", "rest_curvature", "taper", "stem", "length")
+"""Unknowns of the rig, or groups of them, each of which is added or fixed."""
 
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 
@@ -123,12 +123,12 @@ def band_by_assumption(
 
 def alternatives_of(experiment: Experiment) -> list[Alternative]:
     """Return the experiments that differ in one assumption, except those that the record cannot identify."""
-    names, found = set(experiment.nuisances.names), []
-    for group in _NUISANCES:
+    names, found = set(experiment.unknowns.names), []
+    for group in _UNKNOWNS:
         members = {name for name in names if belongs(name, group)}
         if members:
             found.append(Alternative(f"{group} as stated", "fixed", _as_stated(experiment, members)))
-        elif not any(belongs(name, group) for name in experiment.nuisances.known):
+        elif not any(belongs(name, group) for name in experiment.unknowns.known):
             found += _added(experiment, group)
     families = [name for name in SHAPES if name != experiment.own_family.name]
     return [*found, *(Alternative(f"family {name}", "family", replace(experiment, family=name)) for name in families)]
@@ -145,13 +145,13 @@ def _as_stated(experiment: Experiment, names: Collection[str]) -> Experiment:
 
 def _added(experiment: Experiment, group: str) -> list[Alternative]:
     """Return the alternative in which a parameter of the rig, or a group, is unknown; none if no record shows it."""
-    names, label, other = experiment.nuisances.names, f"{group} inferred", experiment
+    names, label, other = experiment.unknowns.names, f"{group} inferred", experiment
     if group == "gain" and "rigidity_scale" in names:  # which has the same effect as all gains
         label += " for rigidity_scale"
         other = _as_stated(other, ["rigidity_scale"])
     other = replace(other, rig=other.rig.with_unknown(**{group: DEFAULT}))
     try:
-        is_shown = bool(set(other.nuisances.names) - set(names))
+        is_shown = bool(set(other.unknowns.names) - set(names))
     except ParameterError:  # it has the same effect as another unknown
         return []
     return [Alternative(label, "added", other)] if is_shown else []

@@ -250,5 +250,5 @@ class Linearisation:
         rig = model.rig(points)
         rig = rig._replace(drive_angle_offset=np.asarray(rig.drive_angle_offset) - turns)
         loads, usable = model.likelihood.predict(model.contours(points), rig)
-        loads = model.nuisances.sensed(loads, model.values(points), model.likelihood.load_cell)
+        loads = model.unknowns.sensed(loads, model.values(points), model.likelihood.load_cell)
         return model.likelihood.load_cell.expected(loads), usable

@@ -41,7 +41,7 @@ def prior_sensitivity(posterior: xr.DataTree, model: ContourModel, regions: Mapp
     own = model.family.parameters
     of_contour = sum((by_name[name] for name in own), np.zeros(every.shape))
     of_rig = sum((value for name, value in by_name.items() if name not in own), np.zeros(every.shape))
-    if (joint := model.nuisances.joint) is not None:
+    if (joint := model.unknowns.joint) is not None:
         together = points[..., [model.names.index(name) for name in joint.priors]]
         of_rig = of_rig + joint.log_dependence(together.reshape(-1, together.shape[-1])).reshape(every.shape)
     parts = {"contour": of_contour, "rig": of_rig, "likelihood": every - of_contour - of_rig}

@@ -60,7 +60,7 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     values = model.values(point)
     cell = likelihood.load_cell
     discrepancy = model.discrepancy(point, loads)
-    sensed = model.nuisances.sensed(loads, values, cell)
+    sensed = model.unknowns.sensed(loads, values, cell)
     scale = model.noise_scale(point)
     readings = cell.simulate(sensed, rng=rng, noise_scale=scale, discrepancy=discrepancy)[0]
     readings = readings * likelihood.rod.load_units

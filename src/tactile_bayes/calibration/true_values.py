@@ -8,10 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.parameters.nuisances import BIASES, CURVE, GAINS, LEVERS
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import rod_of
-from tactile_bayes.rig.parameters import parameter_named
+from tactile_bayes.rig.parameters import GROUPS, parameter_named
 
 __all__ = ["true_values"]
 
@@ -24,7 +23,7 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
     What has no true value is left out: the noise scale if channels differ, the noise of a load cell that states none,
     the length of a discrepancy that the simulated rig does not have, and parameters of another family.
     """
-    known = {**simulated.own_family.known, **simulated.nuisances.known, **drawn}
+    known = {**simulated.own_family.known, **simulated.unknowns.known, **drawn}
     rod, stated = rod_of(simulated.record), rod_of(assumed.record)
     cell, stated_cell = simulated.noise.cell, assumed.noise.cell
     length = known.get("length", rod.length)
@@ -33,7 +32,7 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
         "taper": rod.taper,
         "stem": rod.stem,
         "length": length,
-        **dict(zip(CURVE, cell.moment_curve, strict=True)),
+        **dict(zip(GROUPS["moment_curve"], cell.moment_curve, strict=True)),
         **known,
     }
     more = _differences(cell, stated_cell)
@@ -59,8 +58,8 @@ def _differences(cell: LoadCell, stated: LoadCell) -> dict[str, float]:
     return {
         "drive_angle_offset": cell.drive_angle_offset - stated.drive_angle_offset,
         "backlash": cell.drive_angle_backlash - stated.drive_angle_backlash,
-        **dict(zip(BIASES, np.subtract(cell.bias, stated.bias).tolist(), strict=True)),
-        **dict(zip(LEVERS, np.subtract(cell.lever, stated.lever).tolist(), strict=True)),
+        **dict(zip(GROUPS["bias"], np.subtract(cell.bias, stated.bias).tolist(), strict=True)),
+        **dict(zip(GROUPS["lever"], np.subtract(cell.lever, stated.lever).tolist(), strict=True)),
     }
 
 
@@ -69,4 +68,7 @@ def _ratios(cell: LoadCell, stated: LoadCell) -> dict[str, float]:
     noises = ((getattr(each, name) for each in (cell, stated)) for name in _NOISES)
     louder = [own / other if other else math.inf for own, other in noises if own or other]
     ratio = louder[0] if np.allclose(louder, louder[0], rtol=1e-9) else math.nan
-    return {"noise_scale": ratio, **dict(zip(GAINS, (cell.own_gains / stated.own_gains).tolist(), strict=True))}
+    return {
+        "noise_scale": ratio,
+        **dict(zip(GROUPS["gain"], (cell.own_gains / stated.own_gains).tolist(), strict=True)),
+    }

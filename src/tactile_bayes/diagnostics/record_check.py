@@ -11,7 +11,6 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import FEWEST_PREDICTIONS
-from tactile_bayes.inference.parameters.discrepancy import PARAMETERS
 from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
 from tactile_bayes.inference.result import posterior_draws, record_of, refuse_no_contour, refuse_not_finite
 from tactile_bayes.load_cell import LoadCell
@@ -19,6 +18,7 @@ from tactile_bayes.load_cell.blocks import are_blocks
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
 from tactile_bayes.record.rig_entry import rig_entry
+from tactile_bayes.rig.parameters import GROUPS
 
 __all__ = ["DISCREPANCIES", "LOST_BELOW", "Residuals", "check_record", "residuals_of"]
 
@@ -168,7 +168,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     failed = overall <= false_alarm
     not_checked = "" if failed else _not_checked(residuals, p_values)
     smooth = _smooth(residuals, p_values, false_alarm) if failed else {}
-    described = PARAMETERS[0] in posterior["posterior"].data_vars
+    described = GROUPS["discrepancy"][0] in posterior["posterior"].data_vars
     return xr.Dataset(
         {
             "p_value": (("discrepancy", "channel"), p_values),

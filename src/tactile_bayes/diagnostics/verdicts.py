@@ -18,13 +18,13 @@ from tactile_bayes.diagnostics.record_check import Residuals, check_record, resi
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.misfit import CHECK_RIG, GAUGE, is_inferred, what_to_try
-from tactile_bayes.inference.parameters.discrepancy import PARAMETERS
 from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM, contact_sides
 from tactile_bayes.record import CHANNELS, carried_sweeps
 from tactile_bayes.record.origin import column_entry
 from tactile_bayes.record.rig_entry import rig_entries, rig_entry
+from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["CONTRADICTION", "NOISE_FACTOR", "OFF_ZERO", "doubtful_sides", "verdicts"]
@@ -32,7 +32,7 @@ __all__ = ["CONTRADICTION", "NOISE_FACTOR", "OFF_ZERO", "doubtful_sides", "verdi
 _HOLDS, _NOT = "holds", "do not rely on it"
 """Conclusions of `trust`; another one is a reservation."""
 
-_NOISES = ("noise_scale", "moment_noise", "force_noise", *PARAMETERS)
+_NOISES = ("noise_scale", "moment_noise", "force_noise", *GROUPS["discrepancy"])
 
 NOISE_FACTOR = 2.0
 """Ratio of found to stated noise beyond which it is reported: data sheets are no more accurate."""
@@ -176,7 +176,7 @@ def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
 
 
 def _inferred(posterior: xr.DataTree) -> list[str]:
-    """Return the nuisance parameters of a run."""
+    """Return the unknowns of the rig of a run."""
     names: list[str] = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
     return names
 

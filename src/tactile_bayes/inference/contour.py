@@ -229,7 +229,7 @@ def rig_posterior(
 ) -> xr.DataTree:
     """Return the posterior of a rig's parameters from a record of a gauge; see `calibrate_rig`."""
     experiment = Experiment(records, rig, events=settings.events, gauge=Gauge(contour))
-    if not experiment.nuisances.names:
+    if not experiment.unknowns.names:
         raise ParameterError("nothing of the rig is unknown: say that one of its parameters is, like rigidity_scale")
     return _posterior_of(experiment, rng, settings, checkpoint, progress, keep)
 
@@ -282,7 +282,7 @@ def sampled(
         if walk.beyond:
             raise InferenceError(
                 f"the best fit is outside the priors, at {walk.beyond}: give wider ones, or check units, rod and base. "
-                + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
+                + what_to_try([model.family.name], model.unknowns.names, friction=model.unknowns.friction)
             )
         draws = sample(
             model.log_probability,

@@ -18,9 +18,8 @@ from tactile_bayes.errors import DriftWarning, ParameterError, ReachError
 from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import Ends
-from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.parameters.noise import Noise
-from tactile_bayes.inference.parameters.nuisances import Nuisances
+from tactile_bayes.inference.parameters.unknowns import Unknowns
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import zero_load
@@ -51,30 +50,30 @@ class ContourModel:
         self,
         measured: xr.Dataset,
         family: ContourFamily,
-        nuisances: Nuisances,
+        unknowns: Unknowns,
         noise: Noise,
         priors: Mapping[str, Distribution],
     ) -> None:
         self.measured = measured
         self.family = family
-        self.nuisances = nuisances
+        self.unknowns = unknowns
         self.noise = noise
         self.priors = priors
-        self.forward_parameters = (*family.parameters, *nuisances.names)
+        self.forward_parameters = (*family.parameters, *unknowns.names)
         self.names = (*self.forward_parameters, *noise.names)
-        bounds = [*family.bounds.values(), *(nuisances.bounds(name) for name in nuisances.names)]
+        bounds = [*family.bounds.values(), *(unknowns.bounds(name) for name in unknowns.names)]
         self.low, self.high = np.array([*bounds, *[(0.0, np.inf)] * len(noise.names)]).T
         # Densities of parameters that share a prior come from one call, whose overhead exceeds many numbers.
         columns: dict[int, list[int]] = {}
         for i, name in enumerate(self.names):
             columns.setdefault(id(priors[name]), []).append(i)
         self._columns = [(log_density_of(priors[self.names[which[0]]]), which) for which in columns.values()]
-        of_path = (*family.parameters, *nuisances.of_path)
+        of_path = (*family.parameters, *unknowns.of_path)
         self.of_path = [i for i, name in enumerate(self.forward_parameters) if name in of_path]
-        self._jointly = [self.names.index(name) for name in nuisances.joint.priors] if nuisances.joint else []
-        self.rubs = bool(nuisances.friction) or "friction" in nuisances.names
+        self._jointly = [self.names.index(name) for name in unknowns.joint.priors] if unknowns.joint else []
+        self.rubs = bool(unknowns.friction) or "friction" in unknowns.names
         self.likelihood = RecordLikelihood(
-            measured, noise.cell.straight, nuisances.friction, is_always_clear=family.is_always_clear and not self.rubs
+            measured, noise.cell.straight, unknowns.friction, is_always_clear=family.is_always_clear and not self.rubs
         )
         if noise.of_discrepancy and self.likelihood.encoder.count > 1:
             raise ParameterError(
@@ -161,12 +160,12 @@ class ContourModel:
 
     def rig(self, points: Floats) -> RigValues:
         """Return the rig of every point."""
-        return self.nuisances.rig(self.values(points))
+        return self.unknowns.rig(self.values(points))
 
     def loads(self, points: Floats) -> Floats:
         """Return the loads that the load cell senses at the drive angles read, shape (n, samples, 3)."""
         loads, _ = self.likelihood.predict(self.contours(points), self.rig(points))
-        return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell)
+        return self.unknowns.sensed(loads, self.values(points), self.likelihood.load_cell)
 
     def loads_and_events(self, points: Floats) -> tuple[Floats, Floats]:
         """Return `loads`, and drive angles of events as from `RecordLikelihood.predict_with_events`.
@@ -176,7 +175,7 @@ class ContourModel:
         _, first, path = np.unique(points[:, self.of_path], axis=0, return_index=True, return_inverse=True)
         different = points[first]
         loads, _, events = self.likelihood.predict_with_events(self.contours(different), self.rig(different))
-        sensed = self.nuisances.sensed(loads[path], self.values(points), self.likelihood.load_cell)
+        sensed = self.unknowns.sensed(loads[path], self.values(points), self.likelihood.load_cell)
         return sensed, events[path]
 
     def felt(self, points: Floats) -> tuple[Floats, Flags]:
@@ -189,7 +188,7 @@ class ContourModel:
     def sensed(self, points: Floats, felt: Floats) -> tuple[Floats, Discrepancy | None]:
         """Return the loads that the load cell senses, from those of `felt` and in their place, and the discrepancy."""
         discrepancy = self.discrepancy(points, felt[:, 0])
-        return self.nuisances.sensed(felt, self.values(points), self.likelihood.load_cell), discrepancy
+        return self.unknowns.sensed(felt, self.values(points), self.likelihood.load_cell), discrepancy
 
     def noise_scale(self, points: Floats) -> Floats:
         """Return the factors on the load cell's standard deviations, shape (n, 3)."""
@@ -207,7 +206,7 @@ class ContourModel:
             return None
         scale, length = points[:, [self.names.index(name) for name in self.noise.of_discrepancy]].T
         course = self.likelihood.segments.course
-        read = load_in_contact(loads, course) * self.likelihood.load_cell.own_gains
+        read = course.load_in_contact(loads) * self.likelihood.load_cell.own_gains
         return Discrepancy(course, scale[:, None, None] * read, length)
 
     def discrepancy_at(self, point: Floats) -> Discrepancy | None:
@@ -239,8 +238,8 @@ class ContourModel:
         values = np.zeros(len(points))
         for log_density, columns in self._columns:
             values += log_density(points[:, columns]).sum(axis=1)
-        if self.nuisances.joint is not None:
-            values += self.nuisances.joint.log_dependence(points[:, self._jointly])
+        if self.unknowns.joint is not None:
+            values += self.unknowns.joint.log_dependence(points[:, self._jointly])
         values[~self.within_bounds(points)] = -np.inf
         return values
 
@@ -271,8 +270,8 @@ class ContourModel:
         (count, d)."""
         priors = {**self.priors, **others}
         points = np.stack([priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
-        if self.nuisances.joint is not None:
-            points[:, self._jointly] = self.nuisances.joint.draw(rng, count)
+        if self.unknowns.joint is not None:
+            points[:, self._jointly] = self.unknowns.joint.draw(rng, count)
         return points
 
     def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:

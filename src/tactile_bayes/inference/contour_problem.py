@@ -51,7 +51,7 @@ class ContourProblem(NamedTuple):
     def without(self, samples: Flags) -> ContourModel:
         """Return the model of the record without some samples, a mask of shape (samples,)."""
         model, kept = self.model, ~samples
-        rig = replace(model.nuisances, elapsed=model.nuisances.elapsed[kept])
+        rig = replace(model.unknowns, elapsed=model.unknowns.elapsed[kept])
         measured = model.measured.isel(sample=np.flatnonzero(kept))
         return ContourModel(measured, model.family, rig, model.noise, model.priors)
 

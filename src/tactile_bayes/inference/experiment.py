@@ -14,11 +14,10 @@ from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.distributions import Distribution, all_in_words, in_words
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.family import Family, Gauge, family_of
-from tactile_bayes.inference.parameters.discrepancy import discrepancy_priors
 from tactile_bayes.inference.parameters.noise import Noise, noise_of
-from tactile_bayes.inference.parameters.nuisances import Nuisances, nuisances_of
 from tactile_bayes.inference.parameters.priors import default_priors as contour_priors
 from tactile_bayes.inference.parameters.rig_prior import refuse_other_rig
+from tactile_bayes.inference.parameters.unknowns import Unknowns, unknowns_of
 from tactile_bayes.inference.record_likelihood.shortening import shortened
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -65,12 +64,12 @@ class Experiment:
     @cached_property
     def noise(self) -> Noise:
         """Parameters of the noise, and of a discrepancy if it is unknown."""
-        return noise_of(self.record, self.rig, discrepancy_priors(self.rig))
+        return noise_of(self.record, self.rig)
 
     @cached_property
-    def nuisances(self) -> Nuisances:
+    def unknowns(self) -> Unknowns:
         """Unknown parameters of the rig."""
-        return nuisances_of(self.record, self.rig, self.noise.cell, gauge=self.gauge is not None)
+        return unknowns_of(self.record, self.rig, self.noise.cell, gauge=self.gauge is not None)
 
     @property
     def contours(self) -> ContourFamily:
@@ -91,14 +90,14 @@ class Experiment:
         if self.gauge is None:
             usual = contour_priors(self.contours, base, rod_of(self.record).length)
             of_contour = {name: self.own_family.priors.get(name, prior) for name, prior in usual.items()}
-        return {**of_contour, **self.nuisances.priors, **self.noise.priors}
+        return {**of_contour, **self.unknowns.priors, **self.noise.priors}
 
     @cached_property
     def model(self) -> ContourModel:
         """Prior times likelihood of all samples."""
         if self.rig.calibration is not None:
             refuse_other_rig(self.rig.calibration, self.about)
-        return ContourModel(self.record, self.contours, self.nuisances, self.noise, self.priors)
+        return ContourModel(self.record, self.contours, self.unknowns, self.noise, self.priors)
 
     @cached_property
     def shortened(self) -> Experiment:
@@ -116,21 +115,21 @@ class Experiment:
     def about(self) -> dict[str, Any]:
         """Attributes of a posterior: record, assumptions and priors."""
         attrs, cell = self.record.attrs, self.noise.cell
-        known = {**self.own_family.known, **self.nuisances.known}
+        known = {**self.own_family.known, **self.unknowns.known}
         return {
             "data_sha256": attrs.get(_WHOLE) or record_hash(self.record),
             **self._of_contour,
             "rig": replace(self.rig, load_cell=self.rig.load_cell or LoadCell.from_record(self.record)).text,
-            "friction": self.nuisances.friction,
+            "friction": self.unknowns.friction,
             "known": json.dumps(known),
-            "nuisances": json.dumps((*self.nuisances.names, *self.noise.of_discrepancy)),
+            "nuisances": json.dumps((*self.unknowns.names, *self.noise.of_discrepancy)),
             "events": int(self.events),
             "priors": all_in_words(self.priors),
             "units": attrs["units"],
             "load_cell_frame": frame_of(self.record),
             **{name: attrs[name] for name in (CONTACT_SIDES, "blocks") if name in attrs},
             **rod_attributes(rod_of(self.record)),
-            **({} if self.nuisances.joint is None else self.nuisances.joint.entries),
+            **({} if self.unknowns.joint is None else self.unknowns.joint.entries),
             "approximations": "; ".join(cell.approximations),
             **{f"load_cell_{name}": v for name, v in cell.entries().items() if name not in self.noise.inferred},
         }

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -100,13 +100,13 @@ class Family:
         return hash(self._identity)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made, (self.name, {**self.priors, **self.known})
+        return functools.partial(Family, self.name, **self.priors, **self.known), ()
 
     @property
     def _identity(self) -> tuple[Any, ...]:
         return self.name, all_in_words(self.priors), tuple(sorted(self.known.items()))
 
-    @cached_property
+    @functools.cached_property
     def contours(self) -> ContourFamily:
         """Contours of the unknown parameters."""
         family = family_named(self.name)
@@ -138,10 +138,6 @@ class Family:
         return Family(self.name, **{**self.priors, **self.known, **said})
 
 
-def _made(name: str, said: Mapping[str, Any]) -> Family:
-    return Family(name, **said)
-
-
 def family_of(family: str | Family) -> Family:
     """Return a family by name, or as it is."""
     return family if isinstance(family, Family) else Family(family)
@@ -158,7 +154,7 @@ class PartlyKnown(ContourFamily):
     def name(self) -> str:  # type: ignore[override]
         return self.whole.name
 
-    @cached_property
+    @functools.cached_property
     def table(self) -> Mapping[str, FamilyParameter]:  # type: ignore[override]
         return {name: entry for name, entry in self.whole.table.items() if name not in self.known}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from tactile_bayes.inference.parameters.nuisances import belongs
+from tactile_bayes.inference.parameters.unknowns import belongs
 
 __all__ = ["CHECK_RIG", "GAUGE", "NO_LOAD", "is_inferred", "what_to_try"]
 
@@ -25,19 +25,19 @@ _SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compl
 _SMOOTH = "shape-free"
 
 
-def is_inferred(suspect: str, nuisances: Collection[str]) -> bool:
+def is_inferred(suspect: str, unknowns: Collection[str]) -> bool:
     """Return True if an unknown of a rig, or one of its group, is among the inferred ones."""
-    return any(belongs(name, suspect) for name in nuisances)
+    return any(belongs(name, suspect) for name in unknowns)
 
 
-def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, friction: float = 0.0) -> str:
+def what_to_try(families: Collection[str], unknowns: Collection[str] = (), *, friction: float = 0.0) -> str:
     """Return sentences on the possible causes of a misfit, family and rig, and on what to try."""
     suspects = (*_SUSPECTS, GAUGE) if GAUGE in families else _SUSPECTS
-    left = [name for name in suspects if not is_inferred(name, nuisances)]
+    left = [name for name in suspects if not is_inferred(name, unknowns)]
     if friction and "friction" in left:
         left.remove("friction")
     instead = " in place of rigidity_scale"  # which measures the same as all gains
-    named = [f"{name}{instead}" if name == "gain" and "rigidity_scale" in nuisances else name for name in left]
+    named = [f"{name}{instead}" if name == "gain" and "rigidity_scale" in unknowns else name for name in left]
     more = f', or infer more of the rig ("default" under [unknown] of rig.toml: {", ".join(named)})' if named else ""
     if GAUGE in families:
         return f"It may be the gauge or the rig. Check the size of the gauge and its place from the pivot{more}."

@@ -28,21 +28,21 @@ from scipy.optimize import least_squares
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
     as_number,
-    as_numbers,
+    check_array,
     check_function,
     check_mapping,
     check_number,
     check_optional,
     check_positive,
     check_switch,
-    refused,
 )
-from tactile_bayes.distributions import Distribution, check_distribution, support_of
+from tactile_bayes.distributions import Distribution, check_distribution, refuse_unknown_names, support_of
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, scatter_walkers
 from tactile_bayes.inference.result import provenance, sample_stats
+from tactile_bayes.inference.starts.cloud import gather
 from tactile_bayes.mechanics.clamped_rod import base_curvature
-from tactile_bayes.numerics.random_numbers import Rng, Seed, seed_sequence, spawn
+from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, spawn
 from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["default_priors", "infer_point_load", "predictive_p_value"]
@@ -54,9 +54,6 @@ _VAGUE = 100.0  # prior sd of a sensor coefficient, in full scales of the readin
 _GUESSES = 400  # number of draws of the prior among which the search for a start begins
 _REFINED = 4  # number of the best of them that are refined
 _INITIAL_NOISE = 0.01  # noise over range of the readings at the beginning of the search
-_INFLATION = 2.0  # scatter of starts over the sd of the approximation; halved until enough are possible
-_LEAST_INFLATION = 1e-3
-_DROP = 10.0  # log-probability per parameter of a start below the centre, so that no minor mode captures it
 _SETTINGS = SamplerSettings(walkers=64)  # most of an evaluation does not depend on their number
 
 
@@ -224,33 +221,6 @@ def _normal_approximation(model: _Model, seed: np.random.SeedSequence) -> tuple[
     return centre, covariance
 
 
-def _scatter(
-    model: _Model, centre: Floats, covariance: Floats, top: float, *, seed: Seed, settings: SamplerSettings
-) -> Floats:
-    """Return starts around the centre, as wide as the posterior allows, which may be bent."""
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-
-    def not_far_down(points: Floats) -> Floats:
-        drop = top - model.log_probability(points)
-        return np.where(drop < _DROP * centre.size, 0.0, -np.inf)
-
-    inflation = _INFLATION
-    while True:
-
-        def around_centre(rng: np.random.Generator, count: int, inflation: float = inflation) -> Floats:
-            return centre + inflation * rng.normal(size=(count, centre.size)) @ root.T
-
-        try:
-            return scatter_walkers(
-                not_far_down, around_centre, parameters=centre.size, seed=seed, settings=settings, max_rounds=20
-            )
-        except InferenceError:
-            inflation *= 0.5
-            if inflation < _LEAST_INFLATION:
-                raise
-
-
 def _rms(residuals: Floats, fitted: int) -> float:
     """Return the root mean square of residuals over the noise, at least 1e-9."""
     return max(float(np.sqrt((residuals**2).sum() / (residuals.size - fitted))), 1e-9)
@@ -258,21 +228,14 @@ def _rms(residuals: Floats, fitted: int) -> float:
 
 def _checked(axial: ArrayLike, lateral: ArrayLike, reading: ArrayLike) -> tuple[Floats, Floats, Floats]:
     columns = {"axial": axial, "lateral": lateral, "reading": reading}
-    arrays: dict[str, Floats] = {}
-    for name, values in columns.items():
-        numbers = as_numbers(values)
-        if numbers is None:
-            raise refused(name, values, "give a list of numbers")
-        arrays[name] = numbers
-    sizes = {array.shape for array in arrays.values()}
-    if len(sizes) != 1 or arrays["reading"].ndim != 1:
+    arrays = {name: check_array(name, values, "give a list of numbers") for name, values in columns.items()}
+    if len({array.shape for array in arrays.values()}) != 1 or arrays["reading"].ndim != 1:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ParameterError(f"probe points and readings have shapes {shapes}: give three lists of the same length")
     for name, array in arrays.items():
         if not np.all(np.isfinite(array)):
-            raise ParameterError(
-                f"{name}[{int(np.argmin(np.isfinite(array)))}] is not a finite number: leave that row out"
-            )
+            row = int(np.argmin(np.isfinite(array)))
+            raise ParameterError(f"{name}[{row}] is not a finite number: leave that row out")
     if arrays["reading"].size < 10:
         raise ParameterError(f"{arrays['reading'].size} readings for nine unknowns: give at least 10")
     if np.ptp(arrays["reading"]) == 0.0:
@@ -285,20 +248,16 @@ def _split_priors(
 ) -> tuple[dict[str, Distribution], dict[str, float]]:
     """Return priors of unknown parameters, and values of known ones."""
     check_mapping("priors", priors, "give distributions, or numbers, by name")
-    given = dict(priors or {})
-    surplus = sorted(set(given) - set(defaults))
-    if surplus:
-        raise ParameterError(f"no such parameter: {', '.join(surplus)}; there are {', '.join(defaults)}")
-    known: dict[str, float] = {}
+    refuse_unknown_names(priors or {}, tuple(defaults))
     unknown: dict[str, Distribution] = {}
-    for name, default in defaults.items():
-        prior: Any = given.get(name, default)
+    known: dict[str, float] = {}
+    for name, prior in {**defaults, **(priors or {})}.items():
         number = as_number(prior)
         if number is not None:
             known[name] = number
         else:
             check_distribution(name, prior)
-            unknown[name] = prior
+            unknown[name] = prior  # type: ignore[assignment]
     check_number("compliance", known.get("compliance", 0.0), "it cannot be negative", least=0.0)
     check_positive("noise_sd", known.get("noise_sd", 1.0), "give the scatter of repeated readings, or a prior")
     if not unknown:
@@ -385,14 +344,19 @@ def infer_point_load(
 
     seed = seed_sequence(rng)
     for_guess, for_walkers, for_predictions = spawn(seed, 3)
-    centre, covariance = _normal_approximation(model, for_guess)
-    top = float(model.log_probability(centre[None])[0])
-    if not math.isfinite(top):
+    cloud = gather(model.log_probability, *_normal_approximation(model, for_guess), np.random.default_rng(for_walkers))
+    if not cloud.is_possible:
         raise InferenceError(
             "no clamp that the priors allow lets the rod reach all probe points: measure `axial` roughly from the "
             "clamp along the undeflected rod, or widen the priors"
         )
-    start = _scatter(model, centre, covariance, top, seed=for_walkers, settings=settings)
+    start = scatter_walkers(
+        lambda points: np.where(model.log_probability(points) > cloud.floor, 0.0, -np.inf),
+        cloud.draw,
+        parameters=len(model.names),
+        seed=for_walkers,
+        settings=settings,
+    )
     draws = sample(
         model.log_probability, start, names=model.names, seed=for_walkers, settings=settings, progress=progress
     )
@@ -423,38 +387,27 @@ def _tree(model: _Model, draws: Draws, rng: np.random.Generator) -> xr.DataTree:
         expected.append(np.einsum("nij,nj->ni", model.powers(curvature), coefficient))
         noises.append(noise)
     mean_reading, noise_sd = np.array(expected), np.array(noises)[..., None]
-    left = (model.reading - mean_reading) / noise_sd
+    predicted = mean_reading + noise_sd * rng.normal(size=mean_reading.shape)
+    log_likelihood = stats.norm.logpdf(model.reading, mean_reading, noise_sd)
     over_draws, over_points = ("chain", "draw"), ("chain", "draw", "point")
-    coordinates = {
-        "chain": np.arange(draws.samples.shape[0]),
-        "draw": np.arange(draws.samples.shape[1]),
-        "point": np.arange(model.reading.size),
-    }
-
-    def data(variables: Mapping[str, Any], *dims: str) -> xr.Dataset:
-        return xr.Dataset(variables, coords={dim: coordinates[dim] for dim in dims})
-
     posterior: dict[str, Any] = {
         name: (over_draws, draws.samples[..., i], {"units": _UNITS[name]} if name in _UNITS else {})
         for i, name in enumerate(draws.names)
     }
     posterior["sensor_coefficient"] = ((*over_draws, "power"), np.array(coefficients), {"units": "reading mm^power"})
-    predicted = mean_reading + noise_sd * rng.normal(size=mean_reading.shape)
-    log_likelihood = -0.5 * left**2 - np.log(noise_sd) - 0.5 * math.log(2.0 * math.pi)
+    points = {"axial": model.axial, "lateral": model.lateral}
     groups = {
-        "posterior": data(posterior, "chain", "draw").assign_coords(power=np.arange(_POWERS)),
-        "posterior_predictive": data(
-            {"reading": (over_points, predicted), "expected_reading": (over_points, mean_reading)}, *over_points
-        ),
-        "log_likelihood": data({"reading": (over_points, log_likelihood)}, *over_points),
-        "sample_stats": sample_stats(draws),
-        "observed_data": data({"reading": ("point", model.reading)}, "point"),
-        "constant_data": data(
-            {"axial": ("point", model.axial, {"units": "mm"}), "lateral": ("point", model.lateral, {"units": "mm"})},
-            "point",
-        ),
+        "posterior": posterior,
+        "posterior_predictive": {"reading": (over_points, predicted), "expected_reading": (over_points, mean_reading)},
+        "log_likelihood": {"reading": (over_points, log_likelihood)},
+        "observed_data": {"reading": ("point", model.reading)},
+        "constant_data": {name: ("point", values, {"units": "mm"}) for name, values in points.items()},
     }
-    return xr.DataTree.from_dict(groups)
+    tree = xr.DataTree.from_dict({name: xr.Dataset(variables) for name, variables in groups.items()})
+    for group in tree.children.values():
+        group.coords.update({dim: np.arange(size) for dim, size in group.sizes.items()})
+    tree["sample_stats"] = xr.DataTree(sample_stats(draws))
+    return tree
 
 
 def _sum_of_squares(residuals: Floats) -> Floats:

@@ -48,6 +48,20 @@ class Course(NamedTuple):
         """True if the samples are in the order of measurement."""
         return bool(np.all(np.diff(self.order) > 0))
 
+    def load_in_contact(self, loads: Floats) -> Floats:
+        """Return the largest load of the sweep at samples in contact, shape (..., samples, 3); 0 at the others.
+
+        The largest force in any direction stands for both forces, so that the discrepancy does not depend on the frame
+        of the load cell, and a force that happens to be small is as uncertain as the other.
+        """
+        sizes = np.stack([np.abs(loads[..., 0]), np.hypot(loads[..., 1], loads[..., 2])], axis=-1)
+        begins = np.isinf(self.step)
+        largest = np.maximum.reduceat(sizes[..., self.order, :], np.flatnonzero(begins), axis=-2)
+        of_sample = np.empty(self.order.size, dtype=np.intp)
+        of_sample[self.order] = np.cumsum(begins) - 1
+        in_contact = (sizes > 0.0).any(axis=-1, keepdims=True)
+        return np.asarray(np.where(in_contact, largest[..., of_sample, :][..., [0, 1, 1]], 0.0))
+
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:

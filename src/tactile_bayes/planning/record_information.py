@@ -136,7 +136,7 @@ def prior_precision(model: ContourModel) -> Floats:
     variance = np.array([float(model.priors[name].std()) ** 2 for name in model.names])
     is_known = np.isfinite(variance) & (variance > 0.0)
     precision = np.diag(np.where(is_known, 1.0 / np.where(is_known, variance, 1.0), 0.0))
-    if (joint := model.nuisances.joint) is not None:
+    if (joint := model.unknowns.joint) is not None:
         own = np.array([model.names.index(name) for name in joint.priors], dtype=np.intp)
         scale = np.sqrt(variance[own])
         precision[np.ix_(own, own)] = np.linalg.inv(joint.correlation) / np.outer(scale, scale)

@@ -93,12 +93,12 @@ def _settings(findings: Findings) -> Table:
 
 
 def _rig(findings: Findings) -> Table:
-    """Return rod, load cell, friction, and the nuisance parameters."""
+    """Return rod, load cell, friction, and the unknowns of the rig."""
     attrs = findings.posterior.attrs
     names = [name for name in attrs if str(name).startswith(("rod_", "load_cell_"))]
     rows = [[str(name), _plain(attrs[name])] for name in (*names, "units", "friction")]
-    nuisances = read_json(attrs["nuisances"], "nuisances")
-    rows.append(["inferred beside the contour", ", ".join(nuisances) or "nothing: the rig is taken as stated"])
+    unknowns = read_json(attrs["nuisances"], "nuisances")
+    rows.append(["inferred beside the contour", ", ".join(unknowns) or "nothing: the rig is taken as stated"])
     return Table("Rig, as assumed; numbers in the units of the record", ["entry", "value"], rows, 2)
 
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.parameters.discrepancy import is_discrepancy
-from tactile_bayes.inference.parameters.nuisances import Nuisances
+from tactile_bayes.inference.parameters.unknowns import Unknowns, belongs
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import known_of, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
@@ -85,10 +84,10 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     contour = contours_of(draw, posterior.attrs["family"])
     cell = LoadCell.from_record(record) or LoadCell()
     names = tuple(read_json(posterior.attrs["nuisances"], "nuisances"))
-    names = tuple(name for name in names if not is_discrepancy(name))
-    nuisances = Nuisances(names, {}, rod_of(record), known_of(posterior.attrs), pivots=len(bases_of(record)))
-    rig = nuisances.rig({name: np.atleast_1d(draw[name].values) for name in nuisances.names})
-    likelihood = RecordLikelihood(record, cell, nuisances.friction)
+    names = tuple(name for name in names if not belongs(name, "discrepancy"))
+    unknowns = Unknowns(names, {}, rod_of(record), known_of(posterior.attrs), pivots=len(bases_of(record)))
+    rig = unknowns.rig({name: np.atleast_1d(draw[name].values) for name in unknowns.names})
+    likelihood = RecordLikelihood(record, cell, unknowns.friction)
     paths = likelihood.paths(contour, rig)
 
     numbers = record.sweep.values
@@ -103,8 +102,8 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     angle = (read - likelihood.misread(rig)[0])[samples]
     angle_in_sweep_frame = np.where(mirrored, np.pi - angle, angle)
     states = paths.states(batch_index, likelihood.travels(read, rig)[0, samples])
-    found = {name: float(draw[name]) for name in nuisances.names}
-    rod = rod_with(rod_of(record), {**nuisances.known, **found})
+    found = {name: float(draw[name]) for name in unknowns.names}
+    rod = rod_with(rod_of(record), {**unknowns.known, **found})
     stiffer = float(np.ravel(rig.rigidity_scale)[0])
     units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
     in_lab_frame = to_lab_frame(paths.sweep_frame, batch_index, states, units)

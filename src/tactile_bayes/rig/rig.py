@@ -307,7 +307,7 @@ def rig_of(rig: Rig | None) -> Rig:
 
 
 def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
-    """Return a rod of the shape that nuisance parameters by name give it, others than those of shape without effect."""
+    """Return a rod of the shape that unknowns of the rig by name give it, others than those of shape without effect."""
     length = rig.get("length", rod.length)
     curvature = rig.get("rest_curvature", rod.mean_rest_curvature * rod.length / length)
     return rod.reshaped(curvature, rig.get("taper", rod.taper), rig.get("stem"), length)

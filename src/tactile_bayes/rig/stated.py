@@ -18,6 +18,9 @@ from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, NEUTRAL, parameter_
 
 __all__ = ["Stated", "cell_with", "stated_values", "unit_of", "within_bounds"]
 
+_LOUDEST = 10.0
+"""Largest noise in the default prior of an unknown one [EI/L, EI/L²]."""
+
 
 class Units(Protocol):
     """Units of a rod: a `Rod`, or arrays for many rods."""
@@ -64,7 +67,7 @@ class Stated(NamedTuple):
         parameter = parameter_named(name)
         assert parameter is not None
         scale = parameter.width * unit_of(name, self.units)
-        for names in (GROUPS["bias"], GROUPS["drift"]):  # as readings
+        for names in (GROUPS["bias"], GROUPS["drift"], ("moment_noise", "force_noise")):  # as readings
             if name in names:
                 scale = scale * self.own_gains[names.index(name)]
         if name == "rest_curvature":
@@ -74,6 +77,8 @@ class Stated(NamedTuple):
             return stats.lognorm(s=parameter.width, scale=centre)
         if parameter.default == "half_normal":
             return stats.halfnorm(scale=scale)
+        if parameter.default == "log_uniform":
+            return stats.loguniform(scale, _LOUDEST / parameter.width * scale)
         if name in MAY_VANISH:
             ends = ((end - centre) / scale for end in (parameter.low, parameter.high))
             return stats.truncnorm(*ends, loc=centre, scale=scale)

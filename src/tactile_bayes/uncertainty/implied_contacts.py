@@ -14,7 +14,7 @@ from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.parameters.nuisances import Nuisances
+from tactile_bayes.inference.parameters.unknowns import Unknowns
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.inference.result import contour_draws, known_of, posterior_draws, record_of
@@ -47,8 +47,8 @@ _KEPT = (
 )
 """Attributes of the posterior that hold for the contacts, too."""
 
-_ANGLE_NUISANCES = ("drive_angle_offset", "backlash", "suspension_compliance")
-"""Nuisance parameters by which the rod's slope at the pivot differs from the reading, draw by draw."""
+_ANGLE_UNKNOWNS = ("drive_angle_offset", "backlash", "suspension_compliance")
+"""Unknowns of the rig by which the rod's slope at the pivot differs from the reading, draw by draw."""
 
 _DIMS = ("chain", "draw", "sample")
 
@@ -156,22 +156,22 @@ def _checked_record(posterior: xr.DataTree) -> xr.Dataset:
 def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> dict[str, Floats]:
     """Return the variables of the contacts by name, each of shape (chains, draws, samples)."""
     inferred = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
-    nuisances = Nuisances(tuple(inferred), {}, rod_of(record), known_of(posterior.attrs))
+    unknowns = Unknowns(tuple(inferred), {}, rod_of(record), known_of(posterior.attrs))
     # `infer_contour` gives a cell whose noise it infers a noise of 1.
     unknown: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in picked}
     cell = replace(LoadCell.from_record(record) or LoadCell(), **unknown)
-    likelihood = RecordLikelihood(record, cell, nuisances.friction)
+    likelihood = RecordLikelihood(record, cell, unknowns.friction)
     angle = record["drive_angle"].values - cell.misread(record["direction"].values)
     contours = contours_of(picked, posterior.attrs["family"])
     values = {name: picked[name].values.ravel() for name in inferred}
     every = np.arange(contours.shape[0])
     parts = []
     for block in np.array_split(every, -(-every.size // _BLOCK)):
-        rig = nuisances.rig({name: of_draws[block] for name, of_draws in values.items()})
+        rig = unknowns.rig({name: of_draws[block] for name, of_draws in values.items()})
         parts.append(contacts_of(likelihood, contours.take(block), rig, angle))
     shape = (picked.sizes["chain"], picked.sizes["draw"], -1)
     names = [*PLACE, "tangential"]
-    if any(name in inferred for name in _ANGLE_NUISANCES):
+    if any(name in inferred for name in _ANGLE_UNKNOWNS):
         names.insert(-1, "drive_angle")
     return {name: np.concatenate([part[name] for part in parts]).reshape(shape) for name in names}
 

@@ -1,4 +1,4 @@
-"""Posteriors of all contacts of a record: engines, layout, chances, and what is refused."""
+"""Posteriors of all contacts of a record: layout, chances, and what is refused."""
 
 import warnings
 from dataclasses import replace
@@ -13,7 +13,6 @@ from helpers.refusals import refused
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contact_posterior import infer_contacts
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.result import posterior_draws, read_result, to_arviz, write_result
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.reconstruction import reconstruct
@@ -36,12 +35,7 @@ def infer(kind="plain", which=SOME, **options):
 
 @pytest.fixture(scope="module")
 def contacts():
-    return infer(draws=2000, method="importance")
-
-
-@pytest.fixture(scope="module")
-def walked():
-    return infer(draws=2000, method="emcee", which=[2, 21, 61, 99])
+    return infer(draws=2000)
 
 
 def stats_of(tree):
@@ -52,43 +46,10 @@ def draws_of(tree, i):
     return tree["posterior"].to_dataset().isel(sample=i)
 
 
-def ess(draws):
-    return float(array_stats.ess(draws.values, chain_axis=0, draw_axis=1, method="mean"))
+# --- Chains -----------------------------------------------------------------------------------------------------
 
 
-# --- Engines ----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("i", "k"), [(21, 1), (61, 2), (99, 3)])
-def test_emcee_and_importance_sampling_agree(i, k, walked):
-    """Means within 4 standard errors of both: false alarm 6e-5 a number."""
-    weighed = infer(draws=4000, method="importance", which=[i])
-    share = weighed["sample_stats"].tangential_probability.values[0], walked["sample_stats"].tangential_probability[k]
-    one, other = draws_of(weighed, 0), draws_of(walked, k)
-    effective = float(weighed["sample_stats"].effective_draws[0])
-    spread = float(other.tangential.std())
-    error = spread / np.sqrt(effective) + (spread / np.sqrt(ess(other.tangential)) if spread else 0.0)
-    assert abs(float(share[0] - share[1])) < 4.0 * error + 1.0 / effective
-    if share[1] > 0.999:
-        for name in NAMES:
-            error = np.hypot(
-                float(one[name].std()) / np.sqrt(min(effective, 4000.0)),
-                float(other[name].std()) / np.sqrt(ess(other[name])),
-            )
-            assert abs(float(one[name].mean() - other[name].mean())) < 4.0 * error, name
-
-
-@pytest.mark.slow
-def test_chains_of_emcee_agree(walked):
-    for k in (1, 2, 3):
-        for name in NAMES:
-            assert array_stats.rhat(draws_of(walked, k)[name].values, chain_axis=0, draw_axis=1) < 1.02
-    assert (stats_of(walked).r_hat[1:] < 1.011).all()
-    assert (stats_of(walked).ess[1:] >= 400).all()
-
-
-def test_chains_of_importance_sampling_agree_where_one_phase_is_certain(contacts):
+def test_chains_agree_where_one_phase_is_certain(contacts):
     """No two chains have a draw in common, and R̂ is that of independent draws."""
     certain = np.flatnonzero(stats_of(contacts).tangential_probability > 0.9999)
     assert certain.size >= 2
@@ -108,10 +69,10 @@ def test_small_errors_leave_the_normal_distribution_of_the_constrained_estimate(
     """Mean, standard deviation and correlation within 4.5 standard errors of 4000 draws, and 1 % for curvature."""
     cell = LoadCell(force_noise=1e-3, moment_noise=4e-4, drive_angle_noise=angle_noise)
     record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.3).record, rng=4)
-    found = infer_contacts(record, rig=Rig(load_cell=cell), rng=2, draws=4000, method="importance")
+    found = infer_contacts(record, rig=Rig(load_cell=cell), rng=2, draws=4000)
     normal = reconstruct(record, method="constrained", rig=Rig(load_cell=cell))
     stats_ = stats_of(found)
-    clear = np.flatnonzero((normal.status == "ok") & (normal.edge_distance > 6.0) & (stats_.engine == 1))
+    clear = np.flatnonzero((normal.status == "ok") & (normal.edge_distance > 6.0) & (stats_.converged == 1))
     assert clear.size >= 8
     for i in clear:
         assert bool(stats_.converged[i])
@@ -132,22 +93,16 @@ def test_small_errors_leave_the_normal_distribution_of_the_constrained_estimate(
 
 
 def test_the_same_seed_gives_the_same_draws_and_another_others():
-    one, again, other = (infer(which=[2, 21, 61], draws=400, method="importance", rng=seed) for seed in (1, 1, 2))
+    one, again, other = (infer(which=[2, 21, 61], draws=400, rng=seed) for seed in (1, 1, 2))
     xr.testing.assert_identical(again["posterior"].to_dataset(), one["posterior"].to_dataset())
-    there = stats_of(one).engine.values > 0
+    there = np.isfinite(stats_of(one).effective_draws.values)
     same = other["posterior"].contact_x.values == one["posterior"].contact_x.values
     assert not same[:, :, there].any()
 
 
-def test_the_same_seed_gives_the_same_walk():
-    settings = SamplerSettings(walkers=16, min_ess=50.0, max_steps=30, max_r_hat=1.5)
-    one, other = (infer(which=[61], method="emcee", draws=100, settings=settings) for _ in range(2))
-    xr.testing.assert_identical(one["posterior"].to_dataset(), other["posterior"].to_dataset())
-
-
 def test_other_samples_do_not_matter_beyond_chance(contacts):
     """Random numbers are shared by a block of samples; posteriors are not: 4.5 standard errors of both."""
-    alone = infer(draws=2000, method="importance", which=[61, 120])
+    alone = infer(draws=2000, which=[61, 120])
     for k, i in ((0, 4), (1, 6)):
         one, other = draws_of(alone, k), draws_of(contacts, i)
         for name in NAMES:
@@ -162,21 +117,19 @@ def test_layout(contacts):
     posterior = contacts["posterior"].to_dataset()
     assert list(posterior.data_vars) == [*NAMES, "contact_arclength", "drive_angle", "tangential"]
     assert dict(posterior.sizes) == {"chain": 4, "draw": 500, "sample": SOME.size}
-    unloaded = stats_of(contacts).engine.values == 0
+    unloaded = np.isnan(stats_of(contacts).effective_draws.values)
     assert unloaded.tolist() == [True] + [False] * 6
     for name in posterior.data_vars:
         assert (np.isnan(posterior[name].values).all(axis=(0, 1)) == unloaded).all()
         assert (np.isfinite(posterior[name].values).all(axis=(0, 1)) == ~unloaded).all()
     assert (stats_of(contacts).converged.values == ~unloaded).all()
-    assert np.isnan(stats_of(contacts).r_hat).all()
     assert set(contacts.children) == {"posterior", "sample_stats", "observed_data", "constant_data"}
     for name in ("drive_angle", *CHANNELS):
         np.testing.assert_array_equal(contacts["observed_data"][name], some()[name])
     assert contacts.attrs["data_sha256"] == record_hash(some())
-    wanted = {"seed": "1", "prior": "flat", "method": "importance", "draws": 2000, "converged": 1, "friction": 0.0}
+    wanted = {"seed": "1", "prior": "flat", "draws": 2000, "converged": 1, "friction": 0.0}
     assert {name: contacts.attrs[name] for name in wanted} == wanted
-    assert contacts.attrs["message"] == "6 contacts, 6 by importance sampling, 0 by emcee"
-    assert contacts["sample_stats"].engine.attrs["flag_meanings"] == "none importance_sampling emcee"
+    assert contacts.attrs["message"] == "6 contacts"
 
 
 def test_draws_are_contacts(contacts):
@@ -250,7 +203,7 @@ def test_the_truth_is_within_reach_of_the_posterior(further):
     """Squared distances of the truth, in standard deviations, of 20 contacts and more; not a calibration."""
     cell = LoadCell(force_noise=0.05, moment_noise=0.02, **further)
     record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, rng=6)
-    tree = infer_contacts(record, rig=Rig(load_cell=cell), rng=1, method="importance")
+    tree = infer_contacts(record, rig=Rig(load_cell=cell), rng=1)
     certain = stats_of(tree).tangential_probability.values > 0.999  # else the slope is far from normal
     on = certain & (stats_of(tree).converged.values == 1) & (record.truth_contact_phase.values != "none")
     assert on.sum() > 20
@@ -277,7 +230,7 @@ def test_what_samples_share_is_called_an_approximation():
 def test_few_draws_will_do():
     tree = infer(which=[21, 61], draws=4)
     assert tree["posterior"].sizes["draw"] == 1
-    assert tree.attrs["message"] == "2 contacts, 2 by importance sampling, 0 by emcee"
+    assert tree.attrs["message"] == "2 contacts"
 
 
 def without(*names):
@@ -323,7 +276,7 @@ def test_what_has_no_closed_form_is_refused():
 
 
 def test_draws_have_the_phases_of_the_weights():
-    tree = infer(draws=4000, method="importance", which=[20, 21, 99])
+    tree = infer(draws=4000, which=[20, 21, 99])
     for i in range(3):
         share = float(stats_of(tree).tangential_probability[i])
         by_chain = draws_of(tree, i).tangential.values.mean(axis=1)
@@ -331,13 +284,10 @@ def test_draws_have_the_phases_of_the_weights():
         assert np.abs(by_chain - share).max() < 4.5 * np.sqrt(share * (1.0 - share) / 700)
 
 
-@pytest.mark.parametrize("method", ["auto", "importance"])
-def test_a_sample_that_no_contact_explains_leaves_the_others_alone(method):
+def test_a_sample_that_no_contact_explains_leaves_the_others_alone():
     bad = some(which=[20, 21, 61])
     bad.force_y[1] = -50.0
-    tree = infer_contacts(
-        bad, rig=Rig(load_cell=CELL), rng=1, method=method, settings=SamplerSettings(walkers=16, max_steps=20)
-    )
+    tree = infer_contacts(bad, rig=Rig(load_cell=CELL), rng=1)
     assert stats_of(tree).converged.values[[0, 2]].all()
     assert stats_of(tree).converged[1] == 0
     assert np.isfinite(tree["posterior"].contact_x.values[..., [0, 2]]).all()
@@ -352,7 +302,7 @@ def test_cut_off_samples_are_left_out():
         cut[name] = cut[name].clip(-cell.force_range, cell.force_range)
     left = (np.abs(strong.force_y.values) < cell.force_range) & (np.abs(strong.force_x.values) < cell.force_range)
     assert 0 < np.count_nonzero(left) < 3
-    tree = infer_contacts(cut, rig=Rig(load_cell=cell), rng=1, method="importance")
+    tree = infer_contacts(cut, rig=Rig(load_cell=cell), rng=1)
     assert (np.isfinite(tree["posterior"].contact_x.values).all(axis=(0, 1)) == left).all()
     assert (stats_of(tree).converged.values == left).all()
 
@@ -361,19 +311,13 @@ def test_cut_off_samples_are_left_out():
 @pytest.mark.parametrize("degrees_of_freedom", [1.5, 2.0, 3.0])
 def test_outliers_of_every_kind_have_posteriors(degrees_of_freedom):
     cell = replace(CELL, degrees_of_freedom=degrees_of_freedom)
-    settings = SamplerSettings(walkers=24, min_ess=200.0, max_r_hat=1.05)
-    tree = infer_contacts(some(which=[21, 61, 99]), rig=Rig(load_cell=cell), rng=1, settings=settings)
+    tree = infer_contacts(some(which=[21, 61, 99]), rig=Rig(load_cell=cell), rng=1)
     assert stats_of(tree).converged.all()
-
-
-def test_ensembles_are_as_many_as_chains():
-    with refused(ParameterError, "2 ensembles", 4):
-        infer(settings=SamplerSettings(ensembles=2))
 
 
 def test_spawned_seeds_are_told_apart():
     seeds = np.random.SeedSequence(5).spawn(2)
-    words = [infer(which=[61], draws=4, method="importance", rng=seed).attrs["seed"] for seed in seeds]
+    words = [infer(which=[61], draws=4, rng=seed).attrs["seed"] for seed in seeds]
     assert words == ["5, spawn key (0,)", "5, spawn key (1,)"]
 
 

@@ -18,11 +18,11 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.parameters.discrepancy import PARAMETERS, load_in_contact
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.load_cell.discrepancy import Course
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import NOTHING, Rig
+from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.sweep import Rotation, Translation, scan
 from tactile_bayes.uncertainty.band import contour_band
 
@@ -45,8 +45,8 @@ def disturbed(size, seed=1, cell=CELL):
     return cell.measure(ideal, rng=seed)
 
 
-def model_of(record, nuisances=SMOOTH, cell=CELL, family="parabola"):
-    return Experiment(record, Rig(load_cell=cell, unknown=only(*nuisances)), family).model
+def model_of(record, unknowns=SMOOTH, cell=CELL, family="parabola"):
+    return Experiment(record, Rig(load_cell=cell, unknown=only(*unknowns)), family).model
 
 
 def points_of(model, **values):
@@ -56,15 +56,15 @@ def points_of(model, **values):
 
 def test_it_is_asked_for_by_name_or_by_a_prior():
     record = measured()
-    for asked in (["discrepancy"], ["discrepancy_scale"], list(PARAMETERS)):
-        assert model_of(record, asked).names[-2:] == PARAMETERS
+    for asked in (["discrepancy"], ["discrepancy_scale"], list(GROUPS["discrepancy"])):
+        assert model_of(record, asked).names[-2:] == GROUPS["discrepancy"]
     own = {"discrepancy_scale": stats.halfnorm(scale=0.02)}
     model = Experiment(record, Rig(load_cell=CELL, unknown=own)).model
-    assert model.names[-2:] == PARAMETERS
+    assert model.names[-2:] == GROUPS["discrepancy"]
     assert model.priors["discrepancy_scale"] is own["discrepancy_scale"]
-    assert not set(PARAMETERS) & set(Experiment(record, rig=Rig(load_cell=CELL)).model.names)
+    assert not set(GROUPS["discrepancy"]) & set(Experiment(record, rig=Rig(load_cell=CELL)).model.names)
     unknown = model_of(swept(CONTOUR), cell=None)
-    assert unknown.names[-4:] == ("moment_noise", "force_noise", *PARAMETERS)
+    assert unknown.names[-4:] == ("moment_noise", "force_noise", *GROUPS["discrepancy"])
 
 
 def test_standard_stands_for_the_default():
@@ -74,18 +74,18 @@ def test_standard_stands_for_the_default():
         record, rig=Rig(load_cell=CELL, unknown={"drift": "default", "discrepancy": "default"})
     ).model.names
     drifts = ("moment_drift", "force_x_drift", "force_y_drift")
-    assert more == (*usual[:-1], *drifts, usual[-1], *PARAMETERS)
+    assert more == (*usual[:-1], *drifts, usual[-1], *GROUPS["discrepancy"])
     beside = Experiment(record, rig=Rig(load_cell=CELL, unknown={"discrepancy": "default"})).model.names
-    assert beside == (*usual, *PARAMETERS)
+    assert beside == (*usual, *GROUPS["discrepancy"])
     known = Experiment(record, rig=Rig(load_cell=CELL, unknown={"discrepancy": "default", "friction": 0.1}))
     assert "friction" not in known.model.names
-    assert json.loads(known.about["nuisances"])[-2:] == list(PARAMETERS)
+    assert json.loads(known.about["nuisances"])[-2:] == list(GROUPS["discrepancy"])
 
 
 def test_it_is_zero_out_of_contact_and_has_the_largest_load_of_its_sweep():
     course = Course.along(np.array([0.0, 1.0, 2.0, 2.0, 1.0, 0.0]), [np.arange(3), np.arange(3, 6)])
     loads = np.array([[0, 0, 0], [1, 3, 4], [-2, 0, 1], [0, 0, 0], [0.5, 0, 0.1], [0, 0.1, 0.2]], dtype=float)
-    size = load_in_contact(np.stack([loads, 2.0 * loads]), course)
+    size = course.load_in_contact(np.stack([loads, 2.0 * loads]))
     later = [0.5, np.hypot(0.1, 0.2), np.hypot(0.1, 0.2)]
     np.testing.assert_allclose(size[0], [[0, 0, 0], [2, 5, 5], [2, 5, 5], [0, 0, 0], later, later])
     np.testing.assert_allclose(size[1], 2.0 * size[0])
@@ -171,8 +171,8 @@ def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
     assert 'discrepancy = "default"' in before.attrs["suggestion"]
     assert after.passed
     assert after.attrs["suggestion"] == ""
-    assert json.loads(smooth.attrs["nuisances"]) == list(PARAMETERS)
-    scale, length = (smooth["posterior"][name] for name in PARAMETERS)
+    assert json.loads(smooth.attrs["nuisances"]) == list(GROUPS["discrepancy"])
+    scale, length = (smooth["posterior"][name] for name in GROUPS["discrepancy"])
     assert 0.005 < float(scale.median()) < 0.05
     assert (scale.attrs["units"], length.attrs["units"]) == ("1", "rad")
     narrow, wide = (contour_band(tree, x) for tree in (blind, smooth))

@@ -404,7 +404,7 @@ def exact_sensed(model, point):
     found = paths.states(segment, likelihood.segments.angles_in_sweep_frame - signs * likelihood.misread(rig)[0]).wrench
     loads = np.stack([signs * found.holding_moment, signs * found.force_x, found.force_y], axis=-1)
     scaled = np.atleast_1d(rig.rigidity_scale)[:, None, None] * np.nan_to_num(loads)[None]
-    return model.nuisances.sensed(scaled, model.values(point), likelihood.load_cell)
+    return model.unknowns.sensed(scaled, model.values(point), likelihood.load_cell)
 
 
 def off_at_the_truth(noise, family, numbers):

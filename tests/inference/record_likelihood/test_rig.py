@@ -17,7 +17,6 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import calibrate_rig, infer_contour
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Gauge
-from tactile_bayes.inference.parameters.nuisances import CURVE
 from tactile_bayes.inference.parameters.rig_prior import rig_prior
 from tactile_bayes.inference.stored_experiment import experiment_of
 from tactile_bayes.inference.streams.stream import Stream
@@ -333,9 +332,11 @@ def test_a_sensor_in_counts_is_calibrated_on_a_gauge_whose_place_is_uncertain():
     whole = Rig(load_cell=stated, unknown=unknown)
     found = calibrate_rig(read_by(real, place, 1), contour=PIN, rig=whole, **known)
     assert_near(found.calibration.posterior, true)
-    assert set(found.calibration.priors) == {"moment_gain", *CURVE}
+    assert set(found.calibration.priors) == {"moment_gain", *GROUPS["moment_curve"]}
     posterior = infer_contour(read_by(real, OBJECT, 2), rig=found, **known)
-    assert_near(posterior, {"a": 0.7, "q": 0.45, **{name: true[name] for name in ("moment_gain", *CURVE)}})
+    assert_near(
+        posterior, {"a": 0.7, "q": 0.45, **{name: true[name] for name in ("moment_gain", *GROUPS["moment_curve"])}}
+    )
     assert not {"gauge_x", "gauge_y"} & set(posterior["posterior"].data_vars)
 
 

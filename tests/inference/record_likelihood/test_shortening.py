@@ -220,7 +220,7 @@ def test_a_posterior_of_a_long_record_is_of_its_blocks(monkeypatch):
 
 def test_contacts_of_a_long_record_are_of_every_so_many_samples(monkeypatch):
     monkeypatch.setattr(shortening, "MOST_SAMPLES", 100)
-    result = infer_contacts(long_record(300), rng=1, draws=40, method="importance")
+    result = infer_contacts(long_record(300), rng=1, draws=40)
     assert result["posterior"].sizes["sample"] <= 100
     assert "every" in result.attrs["message"]
 

@@ -14,7 +14,7 @@ from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family
-from tactile_bayes.inference.shape_free_posterior.normal_approximation import Observer
+from tactile_bayes.inference.shape_free_posterior.observer import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.starts.contour_optimum import contact_fit
 from tactile_bayes.load_cell import LoadCell
@@ -78,7 +78,7 @@ def model_of_record(measured, unknown=SMOOTH, cell=CELL):
 
 
 def whitened(model):
-    stated = [float(model.priors[name].median()) for name in model.nuisances.names]
+    stated = [float(model.priors[name].median()) for name in model.unknowns.names]
     point = np.concatenate([contact_fit(model), stated, [1.0]])
     return whitening_at(model, point, np.random.default_rng(1))
 
@@ -149,7 +149,7 @@ def test_in_its_coordinates_the_posterior_is_nearly_standard_normal(noise, sprea
 def test_a_smooth_contour_is_within_its_band(profile, unknown, evaluations):
     """Converged in some 100 steps; 95 % band, of nine places at most one is outside.
 
-    With the nuisances there are 43 parameters in place of 34, and as a step moves two walkers for each parameter in
+    With the unknowns there are 43 parameters in place of 34, and as a step moves two walkers for each parameter in
     each of four ensembles, it makes 344 evaluations in place of 272.
     """
     truth = paper_profile(profile, q=0.5)

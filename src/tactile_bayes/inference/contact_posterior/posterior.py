@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.checks import check_choice, check_function, check_optional, check_whole_number, refused
+from tactile_bayes.checks import check_function, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
-from tactile_bayes.inference.contact_posterior.draws import (
-    CHAINS,
-    EMCEE,
-    EMCEE_SETTINGS,
-    IMPORTANCE,
-    ContactDraws,
-    Method,
-    draw_contacts,
-)
-from tactile_bayes.inference.contact_posterior.importance import LEAST_DRAWS
-from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.contact_posterior.draws import CHAINS, LEAST_DRAWS, ContactDraws, draw_contacts
 from tactile_bayes.inference.importance import LARGEST_K
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.shortening import thinned
@@ -39,7 +27,7 @@ from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["infer_contacts"]
+__all__ = ["density_of", "infer_contacts"]
 
 _MIN_MISFIT_PROBABILITY = 1e-4  # probability of a misfit below which the message reports that the loads do not fit
 _MOST_DRAWS = 10**6  # largest number of draws for each sample
@@ -53,8 +41,6 @@ def infer_contacts(
     prior: ContactPrior = "flat",
     rng: Rng,
     draws: int = 1000,
-    method: Method = "auto",
-    settings: SamplerSettings | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.DataTree:
     """Infer the posterior of contact point and slope angle for every loaded sample, from that sample alone.
@@ -84,13 +70,9 @@ def infer_contacts(
         Random numbers; the same seed gives the same draws of the same samples. One sample more, or less,
         changes the draws of others, too.
     draws : int
-        Number of draws for each sample; a multiple of 4, since there are four independent chains.
-    method : {"auto", "importance", "emcee"}
-        Sampling method. Importance sampling draws from normal approximations on both branches and resamples by weight;
-        its diagnostic, Pareto's k̂ (Vehtari et al. 2024, JMLR 25(72)), certifies it. With "auto", emcee samples those
-        contacts for which it does not.
-    settings : SamplerSettings, optional
-        Settings of emcee; by default 4 ensembles of 24 walkers until an effective sample size of 400.
+        Number of draws for each sample; a multiple of 4, since there are four independent chains. They are importance
+        samples of normal approximations on both branches, resampled by weight, with Pareto's k̂ (Vehtari et al. 2024,
+        JMLR 25(72)) as certificate; without it, of kernels about the best of them, until they are certified.
     progress : callable, optional
         Called with the number of samples done, and the number of loaded samples.
 
@@ -101,8 +83,8 @@ def infer_contacts(
         contact_x, contact_y (on the object's surface), slope_angle, contact_arclength, drive_angle where the encoder is
         not exact, all in the record's units, and tangential (1 in tangential contact, 0 in tip contact). Draws of
         different samples are independent. Group `sample_stats`, by sample: tangential_probability, log_evidence (of the
-        dimensionless sample under the given prior; NaN with emcee), pareto_k, effective_draws (of the weights), r_hat
-        and ess (of emcee), engine (0 none, 1 importance sampling, 2 emcee) and converged (0 also without a contact).
+        dimensionless sample under the given prior), pareto_k, effective_draws (of the weights) and converged (k̂ of at
+        most 0.7 and 400 effective draws; 0 also without a contact).
         Groups `observed_data` and `constant_data`: the record. Attributes: a `message`, and misfit_probability, as
         `reconstruct` with method="constrained" states it: near 0 if the loads are not those of the rod, so that the
         result does not hold.
@@ -146,7 +128,9 @@ def infer_contacts(
     rig = rig_of(rig)
     measured = with_rod(validate(measured), rig.rod)
     seed = seed_sequence(rng)
-    _refuse_options(draws, method, settings)
+    correction = f"give a multiple of {CHAINS}, one share for each chain, and at most {_MOST_DRAWS}"
+    if check_whole_number("draws", draws, CHAINS, correction, most=_MOST_DRAWS) % CHAINS:
+        raise refused("draws", draws, correction)
     check_function("progress", progress)
     stated = rig.load_cell or LoadCell.from_record(measured)
     if stated is None:
@@ -158,13 +142,29 @@ def infer_contacts(
     if compliance:
         raise ParameterError("infer_contacts knows no compliant suspension: say that suspension_compliance is 0")
     measured, cell = thinned(measured, cell)
-    density, loaded = _density(measured, cell, friction, prior)
+    density, loaded = density_of(measured, cell, friction, prior)
     if not loaded.size:
         raise InferenceError(NO_LOAD)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
-        found = draw_contacts(density, draws, method, spawn(seed, 1)[0], settings, progress)
+        found = draw_contacts(density, draws, spawn(seed, 1)[0], progress)
         tree = xr.DataTree.from_dict(_groups(measured, density, loaded, found))
-    tree.attrs = _attributes(measured, cell, seed, prior, friction, draws, method, settings, found)
+    chance = _misfit_probability(measured, cell, friction)
+    tree.attrs = {
+        "inference_library": "tactile-bayes",
+        "inference_library_version": version("tactile-bayes"),
+        "sampler": "importance sampling",
+        "seed": seed_words(seed),
+        "data_sha256": record_hash(measured),
+        "prior": prior if isinstance(prior, str) else getattr(prior, "__name__", repr(prior)),
+        "friction": friction,
+        "draws": draws,
+        "dependence": "samples are independent of one another",
+        "converged": int(found.converged.all()),
+        "misfit_probability": chance,
+        "message": _message(found, chance, measured.attrs.get("blocks")),
+        "units": measured.attrs["units"],
+        "approximations": "; ".join(_approximations(cell)),
+    }
     return tree
 
 
@@ -175,17 +175,7 @@ def _misfit_probability(measured: xr.Dataset, cell: LoadCell, friction: float) -
     return float(contacts_of(Corrected(measured, cell, friction), "constrained").attrs["misfit_probability"])
 
 
-def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -> None:
-    check_optional("settings", settings, SamplerSettings, "give SamplerSettings(min_ess=400) and the like")
-    if settings is not None and settings.ensembles != CHAINS:
-        raise ParameterError(f"{settings.ensembles} ensembles: give {CHAINS}, one for each chain of the result")
-    correction = f"give a multiple of {CHAINS}, one share for each chain, and at most {_MOST_DRAWS}"
-    if check_whole_number("draws", draws, CHAINS, correction, most=_MOST_DRAWS) % CHAINS:
-        raise refused("draws", draws, correction)
-    check_choice("method", method, ("auto", "importance", "emcee"))
-
-
-def _density(
+def density_of(
     measured: xr.Dataset, cell: LoadCell, friction: float, prior: ContactPrior
 ) -> tuple[ContactDensity, Index]:
     """Return the density of the loaded samples, and their numbers."""
@@ -240,61 +230,25 @@ def _groups(measured: xr.Dataset, density: ContactDensity, loaded: Index, found:
 
 
 def _stats(size: int, loaded: Index, found: ContactDraws) -> xr.Dataset:
-    codes, done = np.zeros(size, dtype=np.int8), np.zeros(size, dtype=np.int8)
-    codes[loaded], done[loaded] = found.engine, found.converged
-    meanings = {"flag_values": [0, IMPORTANCE, EMCEE], "flag_meanings": "none importance_sampling emcee"}
-    numbers = {"tangential_probability": found.tangential}
-    numbers |= {name: getattr(found, name) for name in ("log_evidence", "pareto_k", "effective_draws", "r_hat", "ess")}
-    variables: dict[str, Any] = {name: ("sample", _everywhere(v, loaded, size)) for name, v in numbers.items()}
-    return xr.Dataset(variables | {"engine": ("sample", codes, meanings), "converged": ("sample", done)})
+    numbers = {name: _everywhere(values, loaded, size) for name, values in found._asdict().items() if name != "points"}
+    numbers["converged"] = np.nan_to_num(numbers["converged"]).astype(np.int8)
+    return xr.Dataset({name: ("sample", values) for name, values in numbers.items()})
 
 
-def _attributes(
-    measured: xr.Dataset,
-    cell: LoadCell,
-    seed: np.random.SeedSequence,
-    prior: ContactPrior,
-    friction: float,
-    draws: int,
-    method: str,
-    settings: SamplerSettings | None,
-    found: ContactDraws,
-) -> dict[str, Any]:
-    count, by_emcee = found.engine.size, int(np.count_nonzero(found.engine == EMCEE))
-    failed = int(np.count_nonzero(~found.converged))
-    message = f"{count} contacts, {count - by_emcee} by importance sampling, {by_emcee} by emcee"
+def _message(found: ContactDraws, chance: float, blocks: str | None) -> str:
+    message, failed = f"{found.converged.size} contacts", np.count_nonzero(~found.converged)
     if failed:
-        why = (
-            f"Pareto's k̂ above {LARGEST_K:g} or fewer than {LEAST_DRAWS:g} effective draws"
-            if method == "importance"
-            else "emcee ran out of steps"
-        )
+        why = f"Pareto's k̂ above {LARGEST_K:g} or fewer than {LEAST_DRAWS:g} effective draws"
         message += f"; not converged: {failed} ({why}), see sample_stats"
-    chance = _misfit_probability(measured, cell, friction)
     if chance < _MIN_MISFIT_PROBABILITY:
         message += f"; THE LOADS DO NOT FIT (probability {chance:.1g}): are rod, friction, frame and noise right?"
-    if "blocks" in measured.attrs:
-        message += f"; the record has {measured.attrs['blocks']}"
+    return message if blocks is None else f"{message}; the record has {blocks}"
+
+
+def _approximations(cell: LoadCell) -> list[str]:
     approximations = list(cell.approximations)
     if cell.drift is not None or any(cell.bias_uncertainty):
         approximations.append("unknown bias and drift, which samples share, count as noise of each sample")
     if cell.drive_angle_resolution:
         approximations.append("the steps of the drive angle are taken for noise of a twelfth of their square")
-    return {
-        "inference_library": "tactile-bayes",
-        "inference_library_version": version("tactile-bayes"),
-        "sampler": f"importance sampling, emcee {version('emcee')}",
-        "seed": seed_words(seed),
-        "settings": json.dumps(asdict(settings or EMCEE_SETTINGS)),
-        "data_sha256": record_hash(measured),
-        "prior": prior if isinstance(prior, str) else getattr(prior, "__name__", repr(prior)),
-        "friction": friction,
-        "draws": draws,
-        "method": method,
-        "dependence": "samples are independent of one another",
-        "converged": int(failed == 0),
-        "misfit_probability": chance,
-        "message": message,
-        "units": measured.attrs["units"],
-        "approximations": "; ".join(approximations),
-    }
+    return approximations

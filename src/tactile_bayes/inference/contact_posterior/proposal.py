@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
 
-from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.arrays import Floats
 
 __all__ = ["ContactProposal"]
 
@@ -22,60 +22,40 @@ class ContactProposal:
     """
 
     def __init__(self, mean: Floats, covariance: Floats, share: Floats, ways: Floats) -> None:
-        self._share = share
+        self._share, self._ways = share, ways
         self._root = np.linalg.cholesky(covariance)
-        spread = self._root[..., 0, 0]
-        self._low, self._high = (end[:, None] + 0.0 * share for end in ways.T)
+        farthest = _MAX_DISTANCE * self._root[..., 0, 0]
         self._mean = mean.copy()
-        self._mean[..., 0] = np.clip(
-            mean[..., 0], self._low - _MAX_DISTANCE * spread, self._high + _MAX_DISTANCE * spread
-        )
+        self._mean[..., 0] = np.clip(mean[..., 0], ways[:, :1] - farthest, ways[:, 1:] + farthest)
 
     def draw(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        """Draw `count` points for every sample, (count, n, k), in the shares of branches, with log-densities."""
+        """Draw `count` points for every sample, (count, n, k), in the shares of branches, with log-densities.
+
+        Coordinates are drawn one after the other, each given those before, between its bounds.
+        """
         size, k = self._share.shape[1], self._mean.shape[-1]
         # The draws are stratified: shares are exact to one draw.
         order = (np.arange(count)[:, None] + rng.random((count, size))) / count
         branch = sum(order >= until for until in np.cumsum(self._share, axis=0)[:-1]).astype(np.intp)
-        wide = (rng.random((count, size)) >= _SHARES[0]).astype(np.intp)
         who = np.broadcast_to(np.arange(size), branch.shape)
-        mean, root, width = self._mean[branch, who], self._root[branch, who], _WIDTHS[wide]
-        points = np.empty((count, size, k))
-        low, high = self._low[branch, who], self._high[branch, who]
-        scale = width * root[..., 0, 0]
-        normal = _between((low - mean[..., 0]) / scale, (high - mean[..., 0]) / scale, rng.random((count, size)))
-        points[..., 0] = np.clip(mean[..., 0] + scale * normal, low, high)
-        along = (points[..., 0] - mean[..., 0]) / root[..., 0, 0]
-        scale = width * root[..., 1, 1]
-        middle = mean[..., 1] + root[..., 1, 0] * along
-        normal = _between(-middle / scale, np.full(scale.shape, np.inf), rng.random((count, size)))
-        points[..., 1] = middle + scale * normal
-        if k == 3:
-            across = (points[..., 1] - middle) / root[..., 1, 1]
-            middle = mean[..., 2] + root[..., 2, 0] * along + root[..., 2, 1] * across
-            points[..., 2] = middle + width * root[..., 2, 2] * rng.standard_normal((count, size))
-        return points, self._log_density(points, branch, who)
-
-    def _log_density(self, points: Floats, branch: Index, who: Index) -> Floats:
         mean, root = self._mean[branch, who], self._root[branch, who]
-        k = points.shape[-1]
-        along = (points[..., 0] - mean[..., 0]) / root[..., 0, 0]
-        middle = mean[..., 1] + root[..., 1, 0] * along
-        across = (points[..., 1] - middle) / root[..., 1, 1]
-        squares = along**2 + across**2
-        if k == 3:
-            last = mean[..., 2] + root[..., 2, 0] * along + root[..., 2, 1] * across
-            squares += ((points[..., 2] - last) / root[..., 2, 2]) ** 2
+        width = np.where(rng.random((count, size)) < _SHARES[0], *_WIDTHS)
+        ends = np.moveaxis(self._ways[branch], -1, 0), (0.0, np.inf), (-np.inf, np.inf)
+        points, steps = np.empty((count, size, k)), np.empty((count, size, k))
+        logs = np.zeros((2, count, size)) + np.log(_SHARES / _WIDTHS**k)[:, None, None]
+        for j, (low, high) in zip(range(k), ends, strict=False):
+            scale = root[..., j, j]
+            middle = mean[..., j] + np.einsum("...i,...i", root[..., j, :j], steps[..., :j])
+            from_low, from_high = (low - middle) / scale, (high - middle) / scale
+            step = width * _between(from_low / width, from_high / width, rng.random((count, size)))
+            points[..., j] = np.clip(middle + scale * step, low, high)
+            steps[..., j] = step
+            for of_width, each in zip(logs, _WIDTHS, strict=True):
+                of_width -= 0.5 * np.square(step / each) + _log_mass(from_low / each, from_high / each)
         volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1) + 0.5 * k * np.log(2.0 * np.pi)
-        low, high = self._low[branch, who] - mean[..., 0], self._high[branch, who] - mean[..., 0]
-        parts = []
-        for width, share in zip(_WIDTHS, _SHARES, strict=True):
-            inside = _log_mass(low / (width * root[..., 0, 0]), high / (width * root[..., 0, 0]))
-            inside += log_ndtr(middle / (width * root[..., 1, 1]))
-            parts.append(np.log(share) - 0.5 * squares / width**2 - k * np.log(width) - inside)
         with np.errstate(divide="ignore"):
             of_branch = np.log(self._share[branch, who])
-        return np.asarray(logsumexp(np.stack(parts), axis=0) - volume + of_branch)
+        return points, np.asarray(logsumexp(logs, axis=0) - volume + of_branch)
 
 
 def _between(low: Floats, high: Floats, uniform: Floats) -> Floats:

@@ -1,27 +1,23 @@
-"""Parameters of a load cell's noise that are inferred beside a contour."""
+"""Parameters of a load cell's noise, and of a discrepancy of the model, that are inferred beside a contour."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import xarray as xr
-from scipy import stats
 
 from tactile_bayes.distributions import Distribution
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
-from tactile_bayes.rig.parameters import PARAMETERS
+from tactile_bayes.rig.parameters import GROUPS
+from tactile_bayes.rig.stated import Stated
 
 if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
 
 __all__ = ["Noise", "noise_of"]
-
-
-_LOUDEST = 10.0  # largest noise in the default prior of an unknown one [EI/L, EI/L²]
 
 
 class Noise(NamedTuple):
@@ -30,7 +26,7 @@ class Noise(NamedTuple):
     cell: LoadCell  # load cell in the record's units, whose noise the parameters scale
     names: tuple[str, ...]  # of the white noise, and then of the discrepancy, if it is inferred
     channels: tuple[tuple[str, ...], ...]  # channels that each parameter of the white noise scales
-    priors: dict[str, Distribution]  # default priors by name, in the record's units
+    priors: dict[str, Distribution]  # priors by name, in the record's units
 
     @property
     def of_white(self) -> tuple[str, ...]:
@@ -53,35 +49,37 @@ class Noise(NamedTuple):
         return ("frame", *self.names)
 
 
-def noise_of(measured: xr.Dataset, rig: Rig, discrepancy: Mapping[str, Distribution]) -> Noise:
+def noise_of(measured: xr.Dataset, rig: Rig) -> Noise:
     """Return the noise parameters of a record: a factor on the stated noise, or the scales if none is stated."""
     cell = rig.load_cell or LoadCell.from_record(measured)
     present = present_channels(measured)
     if cell is not None and any(cell.standard_deviations[name] > 0.0 for name in present):
-        return _scaled(cell, rig, discrepancy)
-    if cell is not None and cell.relative_noise:
-        raise ParameterError("the load cell states only relative_noise: state its force_noise and moment_noise as well")
-    cell = cell or LoadCell()
-    moment, force = cell.own_gains[:2] * rod_of(measured).load_units[:2]
-    sources = {"moment_noise": (CHANNELS[:1], moment), "force_noise": (CHANNELS[1:], force)}
-    sources = {name: source for name, source in sources.items() if set(source[0]) & set(present)}
-    if known := [name for name in sources if name in rig.known]:
-        raise ParameterError(f"{known[0]} is known: state it in LoadCell({known[0]}=...), and noise_scale = 1")
-    usual = {n: stats.loguniform(PARAMETERS[n].width * unit, _LOUDEST * unit) for n, (_, unit) in sources.items()}
-    priors = {name: rig.distributions.get(name, default) for name, default in usual.items()}
-    return Noise(
-        replace(cell, force_noise=1.0, moment_noise=1.0),
-        (*sources, *discrepancy),
-        tuple(channels for channels, _ in sources.values()),
-        {**priors, **discrepancy},
-    )
+        scales: dict[str, tuple[str, ...]] = {"noise_scale": CHANNELS}
+        if (factor := rig.known.get("noise_scale")) is not None:
+            scales = {}
+            louder = {n: factor * getattr(cell, n) for n in ("force_noise", "moment_noise", "relative_noise")}
+            cell = replace(cell, **louder)
+    else:
+        if cell is not None and cell.relative_noise:
+            raise ParameterError(
+                "the load cell states only relative_noise: state its force_noise and moment_noise as well"
+            )
+        cell = replace(cell or LoadCell(), force_noise=1.0, moment_noise=1.0)
+        scales = {"moment_noise": CHANNELS[:1], "force_noise": CHANNELS[1:]}
+        scales = {name: channels for name, channels in scales.items() if set(channels) & set(present)}
+        if known := [name for name in scales if name in rig.known]:
+            raise ParameterError(f"{known[0]} is known: state it in LoadCell({known[0]}=...), and noise_scale = 1")
+    names = (*scales, *_of_discrepancy(rig))
+    stated = Stated.of(rod_of(measured), cell)
+    priors = {name: rig.distributions.get(name, stated.default(name)) for name in names}
+    return Noise(cell, names, tuple(scales.values()), priors)
 
 
-def _scaled(cell: LoadCell, rig: Rig, discrepancy: Mapping[str, Distribution]) -> Noise:
-    """Return the noise of a cell that is stated up to a factor, which may be known."""
-    factor = rig.known.get("noise_scale")
-    if factor is None:
-        prior = rig.distributions.get("noise_scale", stats.lognorm(s=PARAMETERS["noise_scale"].width))
-        return Noise(cell, ("noise_scale", *discrepancy), (CHANNELS,), {"noise_scale": prior, **discrepancy})
-    louder = {n: factor * getattr(cell, n) for n in ("force_noise", "moment_noise", "relative_noise")}
-    return Noise(replace(cell, **louder), tuple(discrepancy), (), dict(discrepancy))
+def _of_discrepancy(rig: Rig) -> tuple[str, ...]:
+    """Return the parameters of the discrepancy, if it is unknown; none if nothing or zero is said of it."""
+    said = {name: value for name, value in rig.said.items() if name in GROUPS["discrepancy"]}
+    if known := [name for name, value in said.items() if isinstance(value, float) and value]:
+        raise ParameterError(
+            f"{known[0]} is a number: a discrepancy has no known size, so give a distribution, or 0 for none"
+        )
+    return GROUPS["discrepancy"] if any(not isinstance(value, float) for value in said.values()) else ()

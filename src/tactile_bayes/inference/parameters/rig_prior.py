@@ -36,9 +36,9 @@ _SENSES = (
 _NOISES = ("load_cell_drive_angle_noise", "load_cell_drive_angle_resolution")
 
 
-def _lasting(nuisances: Collection[str]) -> tuple[str, ...]:
+def _lasting(unknowns: Collection[str]) -> tuple[str, ...]:
     """Return the names of the parameters that a rig keeps from one record to the next."""
-    return tuple(name for name in nuisances if not any(part in _PASSING for part in name.split("_")))
+    return tuple(name for name in unknowns if not any(part in _PASSING for part in name.split("_")))
 
 
 def rig_prior(rig: xr.DataTree) -> RigPrior:

@@ -10,17 +10,16 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, ndtri_exp
 
-from tactile_bayes.arrays import Flags, Floats, Index
-from tactile_bayes.contours import Contour, Smooth
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.contours import Smooth
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.parameters.discrepancy import load_in_contact
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
+from tactile_bayes.inference.shape_free_posterior.observer import HUBER_THRESHOLD, Observer
 from tactile_bayes.numerics.scatter import robust_deviation
-from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.rig.parameters import MAY_VANISH
 
-__all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_names", "scale_names", "split"]
+__all__ = ["LinearPrior", "NormalApproximation", "joined", "linear_names", "scale_names", "split"]
 
 _OF_ROUGHNESS = ("amplitude", "length_scale")
 # Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
@@ -28,9 +27,7 @@ _OF_ROUGHNESS = ("amplitude", "length_scale")
 _STEP, _LARGEST_STEP = 1e-5, 0.01
 _FURTHER_DIFFERENCES = 2  # number of times that differences are taken again
 _MIN_CHANGE = 0.03  # least singular value of residuals that counts, in deviations per prior scale
-_MIN_WIDTH = 0.01  # smallest standard deviation of a snap-off, over half a step of the drive angle
 _FAR_DOWN = -35.0  # standard normal number of which, and of all below, a truncation at less changes nothing
-_HUBER_THRESHOLD = 4.0  # residual in standard deviations from which Huber's loss is linear
 
 
 class LinearPrior(NamedTuple):
@@ -51,7 +48,7 @@ def linear_names(model: ContourModel) -> tuple[str, ...]:
     Those that may vanish come last.
     """
     rough = [name for name in model.family.parameters if name not in _OF_ROUGHNESS]
-    return (*rough, *sorted(model.nuisances.names, key=MAY_VANISH.__contains__))
+    return (*rough, *sorted(model.unknowns.names, key=MAY_VANISH.__contains__))
 
 
 def _white_scales(model: ContourModel) -> slice:
@@ -91,7 +88,7 @@ class _SmoothNoise(NamedTuple):
             return nothing
         loads, _ = model.likelihood.predict(model.contours(point), model.rig(point))
         course = model.likelihood.segments.course
-        largest = load_in_contact(loads[0], course) / observer.noise
+        largest = course.load_in_contact(loads[0]) / observer.noise
         in_contact = largest.any(axis=1)
         if not in_contact.any():
             return nothing
@@ -108,64 +105,6 @@ class _SmoothNoise(NamedTuple):
         # The integral of Matérn's correlation, ν = 3/2, is 4/√3 lengths.
         alike = np.minimum(4.0 / np.sqrt(3.0) * length, self.longest) / self.step
         return np.asarray(np.hypot(white, scale * np.sqrt(np.maximum(alike, 1.0)) * self.size))
-
-
-class Observer:
-    """Residuals of contours and rigs with respect to the record.
-
-    Parameters
-    ----------
-    model : ContourModel
-    """
-
-    def __init__(self, model: ContourModel) -> None:
-        self.model = model
-        self.loaded = model.certainly_loaded
-        if not np.isfinite(model.zero[model.present]).all():  # hardly any sample is unloaded
-            self.loaded = loaded_samples(model.measured, model.noise.stated_cell)
-        stated = np.asarray(model.likelihood.load_cell.noise)
-        self.noise = model.of_samples(np.where(stated > 0.0, stated, model.deviation))
-        between = model.likelihood.segments.event_angles(self.loaded)[:, 2:]
-        self.ends = np.isfinite(between).all(axis=1)
-        self._end, self._within = between.mean(axis=1), 0.5 * np.diff(between, axis=1)[:, 0]
-        self._width = self._within / np.sqrt(3.0)
-
-    def __call__(self, contours: Contour, values: dict[str, Floats]) -> tuple[Floats, Flags, Floats]:
-        """Return residuals of readings, over `noise`; True for samples loaded as measured; and residuals of snap-offs.
-
-        Residuals are expected less measured values, those of snap-offs in standard deviations. Shapes are
-        (n, samples, 3), (n, samples) and (n, sweep segments that end).
-        """
-        model, rig = self.model, self.model.nuisances.rig(values)
-        loads, _ = model.likelihood.predict(contours, rig)
-        agree = (loads != 0.0).any(axis=2) == self.loaded
-        cell = model.likelihood.load_cell
-        beyond = cell.expected(model.nuisances.sensed(loads, values, cell)) - model.likelihood.measured
-        late = (model.likelihood.snap_offs(contours, rig) - self._end) / self._width
-        beyond /= self.noise
-        return beyond, agree, late[:, self.ends]
-
-    def narrow_snap_offs(self, point: Floats) -> bool:
-        """Reduce the widths of snap-offs that a point, (1, parameters), misses; return True if there are any."""
-        _, _, late = self(self.model.contours(point), self.model.values(point))
-        off = np.zeros(self._width.size, dtype=bool)
-        off[self.ends] = np.abs(late[0]) * self._width[self.ends] > self._within[self.ends]
-        off &= self._width > _MIN_WIDTH * self._within
-        self._width = np.where(off, self._width / 3.0, self._width)
-        return bool(off.any())
-
-    def log_density(self, points: Floats) -> Floats:
-        """Return a coarse log-likelihood, shape (n,), for a search, with Huber's loss of the readings.
-
-        Samples that are loaded unlike the record's have a constant loss, since the snap-offs account for them.
-        """
-        model = self.model
-        residual, agree, late = self(model.contours(points), model.values(points))
-        scale = model.noise_scale(points)
-        cost = _huber(residual / scale[:, None])
-        cost = np.where(agree[..., None], cost, 0.5 * _HUBER_THRESHOLD)[..., model.present].sum(axis=(1, 2))
-        volume = residual.shape[1] * np.log(scale[:, model.present]).sum(axis=1)
-        return np.nan_to_num(-cost - volume - 0.5 * np.square(late).sum(axis=1), nan=-np.inf)
 
 
 class _Observations(NamedTuple):
@@ -350,11 +289,6 @@ class NormalApproximation:
         return float(-0.5 * upper[-1, -1] ** 2 - volume)
 
 
-def _huber(residual: Floats) -> Floats:
-    size = np.abs(residual)
-    return np.where(size < _HUBER_THRESHOLD, 0.5 * size**2, _HUBER_THRESHOLD * (size - 0.5 * _HUBER_THRESHOLD))
-
-
 def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> _Observations:
     """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
 
@@ -363,7 +297,7 @@ def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: 
     a standard deviation give better ones.
     """
     model = observer.model
-    rig = linear_names(model)[prior.mean.size - len(model.nuisances.names) :]
+    rig = linear_names(model)[prior.mean.size - len(model.unknowns.names) :]
     nodes = centre.size - 2 - len(rig)
     units = np.append(np.ones(nodes), prior.precision[-2 - len(rig) :] ** -0.5)
     noises = scales[_white_scales(model)]
@@ -380,7 +314,7 @@ def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: 
         for chosen, noise in zip(model.noise_columns, noises, strict=True):
             of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
             scatter.append(robust_deviation(of_kind[-1]))
-            of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * noise / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
+            of_kind *= np.minimum(1.0, HUBER_THRESHOLD * noise / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
             lines.append(_Lines.of(of_kind, steps, axes))
         return [*lines, _Lines.of(late, steps, axes)], scatter
 

@@ -11,12 +11,12 @@ from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import (
     LinearPrior,
     NormalApproximation,
-    Observer,
     joined,
     linear_names,
     scale_names,
     split,
 )
+from tactile_bayes.inference.shape_free_posterior.observer import Observer
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
 __all__ = ["whitening_at"]

@@ -14,13 +14,12 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.least_squares import Optimum, descend, optima
-from tactile_bayes.inference.parameters.discrepancy import load_in_contact
-from tactile_bayes.inference.parameters.nuisances import BIASES
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.rig.corrected import corrected
+from tactile_bayes.rig.parameters import GROUPS
 
 __all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
 
@@ -270,7 +269,7 @@ def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, d
     if not model.noise.of_discrepancy:
         return np.empty(0)
     loads, _ = model.likelihood.predict(model.contours(point[None]), model.rig(point[None]))
-    largest = load_in_contact(loads[0], model.likelihood.segments.course)[:, model.present]
+    largest = model.likelihood.segments.course.load_in_contact(loads[0])[:, model.present]
     squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviations[:, model.present])
     least, most = np.quantile(drawn[:, 0], [0.05, 1.0])
     share = np.sqrt(squares[largest > 0.0].sum() / max(np.square(largest).sum(), np.finfo(float).tiny))
@@ -289,7 +288,7 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
     moment, *forces = model.deviation * rod.load_units
     cell = replace(model.noise.cell, moment_noise=float(moment), force_noise=float(max(forces)))
     try:
-        rig = {**model.nuisances.known, **(_zeros(model) if found is None else found)}
+        rig = {**model.unknowns.known, **(_zeros(model) if found is None else found)}
         contacts = contacts_of(corrected(model.measured, cell, rig), "constrained" if cell.has_variances else "raw")
     except (ParameterError, RecordError):
         return None
@@ -308,7 +307,7 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
 
 def _zeros(model: ContourModel) -> dict[str, float]:
     """Return inferred biases as estimated from the unloaded samples, by name."""
-    names, stated = model.nuisances.names, model.noise.cell.bias
-    units = [model.nuisances.units.get(name, np.nan) for name in BIASES]
-    shown = zip(BIASES, model.zero * np.array(units) - np.array(stated), strict=True)
+    names, stated = model.unknowns.names, model.noise.cell.bias
+    units = [model.unknowns.units.get(name, np.nan) for name in GROUPS["bias"]]
+    shown = zip(GROUPS["bias"], model.zero * np.array(units) - np.array(stated), strict=True)
     return {name: float(zero) for name, zero in shown if name in names and np.isfinite(zero)}

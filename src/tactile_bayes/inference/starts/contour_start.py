@@ -21,7 +21,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
 from tactile_bayes.inference.importance import approximate
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
-from tactile_bayes.inference.shape_free_posterior.normal_approximation import Observer
+from tactile_bayes.inference.shape_free_posterior.observer import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 from tactile_bayes.inference.starts.cloud import Cloud, gather
@@ -123,7 +123,7 @@ class _Start(NamedTuple):
         by_contacts = contact_fit(model)
         if by_contacts is not None:
             of_white = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / DEVIATION_OVER_MEDIAN))
-            of_rig, of_discrepancy = map(model.prior_medians, (model.nuisances.names, model.noise.of_discrepancy))
+            of_rig, of_discrepancy = map(model.prior_medians, (model.unknowns.names, model.noise.of_discrepancy))
             yield [np.concatenate([by_contacts, of_rig, of_white, of_discrepancy])]
         drawn, _ = model.draw_prior(self.rng, _SCALE_DRAWS, self.deadline)
         yield drawn[np.argsort(Observer(model).log_density(drawn))[::-1][:_LIKELIEST]]
@@ -191,7 +191,7 @@ def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> Inf
     return InferenceError(
         f"no {what} was found that describes the record{nearest}: are units, signs, drive angle, rod and base right? "
         "tactile-bayes inspect checks them. "
-        + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
+        + what_to_try([model.family.name], model.unknowns.names, friction=model.unknowns.friction)
     )
 
 

@@ -99,12 +99,15 @@ class Particles:
         self.correlation, self.shift, self.rise = np.nan, 0.0, 0.0
         self._mover = Mover(model, np.random.RandomState(random.integers(2**32)))
         self._generator = random
-        self._before, self._added = _model_of(old), []
+        self._before: ContourModel | None = None
+        self._added: list[str] = []
         if old is None:
-            self.points, share = self._first(count, random)
+            points, share = model.draw_prior(random, count)
+            self.points = points[np.arange(count) % len(points)]
             self.log_weights, self.log_integral = np.full(count, -np.log(count)), float(np.log(share))
         else:
-            self._added = [name for name in model.names if name not in old.experiment.model.names]
+            self._before = old.experiment.model
+            self._added = [name for name in model.names if name not in self._before.names]
             self.points = self._extended(old, random)
             self.log_weights, self.log_integral = old.log_weights, old.log_integral
         self._coordinates = model.coordinates
@@ -114,10 +117,6 @@ class Particles:
         expected = logsumexp(self.log_weights[:, None] + wider, axis=0) + self.log_integral
         self._run()
         self.log_ratios = np.asarray(expected - self.log_integral)
-
-    def _first(self, count: int, random: np.random.Generator) -> tuple[Floats, float]:
-        points, share = self.model.draw_prior(random, count)
-        return points[np.arange(count) % len(points)], share
 
     def _extended(self, old: StreamState, random: np.random.Generator) -> Floats:
         """Return the particles with new parameters drawn from their priors."""
@@ -244,10 +243,6 @@ class Particles:
             self.values = density[0] - log_jacobian
         else:
             self.values, self._old = self._both(self.points)
-
-
-def _model_of(state: StreamState | None) -> ContourModel | None:
-    return None if state is None else state.experiment.model
 
 
 def _is_continued(before: ContourModel | None, model: ContourModel) -> bool:

@@ -156,7 +156,7 @@ class Stream:
         began = perf_counter()
         old = self._state
         record = validate(samples) if old is None else _continued(old.record, samples)
-        experiment = self._experiment(record)
+        experiment = Experiment(record, self._rig, self._family)
         updates = 0 if old is None else old.updates + 1
         random = self._random(0, updates)
         with threadpool_limits(1):
@@ -318,13 +318,12 @@ class Stream:
 
     def restore(self, tree: xr.DataTree, path: Path, record: xr.Dataset | None = None) -> None:
         """Continue from the tree that `as_tree` has returned, which is in the file at a path; see `resume`."""
-        stored = state_in(tree, path)
-        own = stored.record
+        own, identity, numbers = state_in(tree, path)
         if record is not None:
             own = validate(record).isel(sample=slice(0, own.sizes["sample"]))
-        experiment = self._experiment(own)
-        state = stored.state(own, experiment)
-        differing = changes(stored.identity, self._identity(experiment))
+        experiment = Experiment(own, self._rig, self._family)
+        state = StreamState(own, experiment, **numbers)
+        differing = changes(identity, self._identity(experiment))
         if not differing:
             with threadpool_limits(1):
                 values = experiment.model.log_probability(state.points)
@@ -354,9 +353,6 @@ class Stream:
         if self._state is None:
             raise InferenceError("the stream has no samples yet: call update with some first")
         return self._state
-
-    def _experiment(self, record: xr.Dataset) -> Experiment:
-        return Experiment(record, self._rig, self._family)
 
     def _identity(self, experiment: Experiment) -> dict[str, str]:
         """Return all that the numbers of a stream depend on, as text."""
@@ -427,8 +423,8 @@ def _continued(record: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
     """Return a record with new samples behind its own."""
     new = validate(samples)
     for name in sorted({*record.attrs, *new.attrs}, key=str):
-        one, other = record.attrs.get(name), new.attrs.get(name)
-        if not np.array_equal(_plain(one), _plain(other)):
+        one, other = record.attrs.get(name, ""), new.attrs.get(name, "")
+        if not np.array_equal(one, other):
             raise RecordError(
                 f"attribute {name!r} of the new samples is {other!r}, but was {one!r}: give all samples in the same "
                 "units, of the same rod and load cell"
@@ -459,7 +455,3 @@ def _refuse_return(record: xr.Dataset, new: xr.Dataset, sweep: int) -> None:
             f"the new samples of sweep {sweep} begin at a drive angle of {sense * after[0]:.6g} rad, behind the last "
             f"one, {sense * before[-1]:.6g} rad: give each sample once, in the order in which they were measured"
         )
-
-
-def _plain(value: Any) -> Any:
-    return "" if value is None else value

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -18,7 +18,7 @@ from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["StoredState", "StreamState", "read_tree", "state_in", "tree_of"]
+__all__ = ["StreamState", "read_tree", "state_in", "tree_of"]
 
 _KIND = "stream of tactile-bayes"
 _FORMAT = 2
@@ -57,20 +57,6 @@ _ARRAYS = {
 _NUMBERS = tuple(field.name for field in fields(StreamState))[6:]
 
 
-class StoredState(NamedTuple):
-    """A state as read from its file, before an experiment is known."""
-
-    record: xr.Dataset
-    identity: Mapping[str, str]
-    particles: xr.Dataset
-
-    def state(self, record: xr.Dataset, experiment: Experiment) -> StreamState:
-        """Return the state of a stream for this experiment."""
-        known: dict[str, Any] = {name: self.particles[name].values for name in _ARRAYS}
-        known |= {name: self.particles[name].item() for name in _NUMBERS}
-        return StreamState(record, experiment, **known)
-
-
 def tree_of(state: StreamState, identity: Mapping[str, str]) -> xr.DataTree:
     """Return a state with its record and its identity as a tree for a file."""
     arrays = {name: (dims, getattr(state, name)) for name, dims in _ARRAYS.items()}
@@ -93,8 +79,8 @@ def read_tree(path: Path) -> xr.DataTree:
     )
 
 
-def state_in(tree: xr.DataTree, path: Path) -> StoredState:
-    """Return the state in a tree from `tree_of`, or of a part of the file."""
+def state_in(tree: xr.DataTree, path: Path) -> tuple[xr.Dataset, dict[str, str], dict[str, Any]]:
+    """Return record, identity, and all else of the state in a tree from `tree_of`, or of a part of the file."""
     if tree.attrs.get("kind") != _KIND:
         raise InferenceError(f"{path} holds no state of a stream: give a file that Stream.save has written")
     if tree.attrs["format"] != _FORMAT:
@@ -112,4 +98,5 @@ def state_in(tree: xr.DataTree, path: Path) -> StoredState:
         raise InferenceError(f"{path} holds no whole state of a stream ({error}): {_HOW}") from error
     if not np.isfinite(particles["points"]).all():
         raise InferenceError(f"{path} holds particles that are not finite: {_HOW}")
-    return StoredState(record, identity, particles)
+    arrays = {name: particles[name].values for name in _ARRAYS}
+    return record, identity, {**arrays, **{name: particles[name].item() for name in _NUMBERS}}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,21 +27,21 @@ if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
     from tactile_bayes.rig.rig_prior import RigPrior
 
-__all__ = ["BIASES", "CURVE", "DRIFTS", "GAINS", "LEVERS", "Nuisances", "belongs", "deviating", "nuisances_of"]
+__all__ = ["Unknowns", "belongs", "unknowns_of"]
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
-BIASES, DRIFTS, GAINS, LEVERS, CURVE = (GROUPS[what] for what in ("bias", "drift", "gain", "lever", "moment_curve"))
 _SAME_DIRECTION = 1e-3  # range of drive angles [rad] within which a rod keeps its direction
 # Parameters of the noise, which are none of the forward model.
-_OF_NOISE = ("discrepancy_scale", "discrepancy_length", "noise_scale", "moment_noise", "force_noise")
-_RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
+_OF_NOISE = (*GROUPS["discrepancy"], "noise_scale", "moment_noise", "force_noise")
 # Parameters that change the path or the reading of the drive angle, and their names in `RigValues`.
+_RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
 _RIG["backlash"] = "drive_angle_backlash"
-_SENSED = (*BIASES, *DRIFTS, *GAINS, *LEVERS, *CURVE)  # change only what the load cell senses, not the path
+# Groups that change only what the load cell senses, not the path.
+_SENSED = ("bias", "drift", "gain", "lever", "moment_curve")
 
 
 @dataclass(frozen=True)
-class Nuisances:
+class Unknowns:
     """Parameters of a rig that are inferred beside those of a contour."""
 
     names: tuple[str, ...]
@@ -52,19 +53,19 @@ class Nuisances:
     joint: RigPrior | None = None  # prior that a calibration found; `priors` are its marginals
     curve: tuple[float, float] = (0.0, 0.0)  # stated one of the moment [L/EI, (L/EI)²]
     pivots: int = 1
-    # Unit of each parameter in dimensionless calculations, in the record's units.
-    units: Mapping[str, float] = field(init=False)
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def units(self) -> dict[str, float]:
+        """Unit of each parameter in dimensionless calculations, in the record's units."""
         units = {name: unit_of(name, self.rod) for name in PARAMETERS}
         shifts = (n for n in self.names if BASE.fullmatch(n) or n in GROUPS["gauge"])
-        units |= dict.fromkeys(shifts, 1.0)  # they stay in the record's unit of length
-        object.__setattr__(self, "units", units)
+        return units | dict.fromkeys(shifts, 1.0)  # they stay in the record's unit of length
 
     def bounds(self, name: str) -> tuple[float, float]:
         """Return the bounds of a parameter, whatever its prior."""
         parameter = parameter_named(name)
-        return (-np.inf, np.inf) if parameter is None else (parameter.low, parameter.high)
+        assert parameter is not None
+        return parameter.low, parameter.high
 
     @property
     def friction(self) -> float:
@@ -74,7 +75,7 @@ class Nuisances:
     @property
     def of_path(self) -> tuple[str, ...]:
         """Names of the parameters that change the path, or where along it the samples lie."""
-        return tuple(name for name in self.names if name not in _SENSED)
+        return tuple(name for name in self.names if not any(belongs(name, group) for group in _SENSED))
 
     def _with_known(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return values by name, shape (n,), with the known parameters that are not as stated."""
@@ -122,7 +123,10 @@ class Nuisances:
         Zeros are given as readings, and enter as the loads that the cell reads as such if its own curve is left out.
         """
         values = self._with_known(values)
-        curve = [self._dimensionless(values, name, stated) for name, stated in zip(CURVE, self.curve, strict=True)]
+        curve = [
+            self._dimensionless(values, name, stated)
+            for name, stated in zip(GROUPS["moment_curve"], self.curve, strict=True)
+        ]
         is_bent = any(np.any(v) for v in curve)
         gains = [values.get(name) for name in GROUPS["gain"]]
         levers = [self._dimensionless(values, name) for name in GROUPS["lever"]]
@@ -169,7 +173,7 @@ def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
             loads[..., 0] += _by_point(arm, loads) * loads[..., channel]
 
 
-def nuisances_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool = False) -> Nuisances:
+def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool = False) -> Unknowns:
     """Return the parameters of a rig that are unknown and that the record shows, with their priors.
 
     A bias with a bias_uncertainty of the load cell is not among them: the likelihood integrates it out already. The
@@ -188,7 +192,7 @@ def nuisances_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool 
     known = {n: v for n, v in said.items() if isinstance(v, float) and (gauge or n not in GROUPS["gauge"])}
     stated = Stated.of(rod, cell)
     priors = {n: stated.default(n) if isinstance(v := said[n], str | float) else v for n in names if n not in of_joint}
-    return Nuisances(
+    return Unknowns(
         names,
         priors | of_joint,
         rod,
@@ -229,7 +233,7 @@ def _hidden(measured: xr.Dataset, rig: Rig, cell: LoadCell, present: Sequence[st
     hidden = {name for name in PARAMETERS if not _is_shown(name, present)}
     if not gauge:
         hidden |= set(GROUPS["gauge"])
-    for name, uncertainty in zip(BIASES, cell.bias_uncertainty, strict=True):
+    for name, uncertainty in zip(GROUPS["bias"], cell.bias_uncertainty, strict=True):
         if uncertainty > 0.0:
             hidden.add(name)
             if name in rig.distributions:
@@ -271,4 +275,4 @@ def _is_shown(name: str, present: Sequence[str]) -> bool:
     """Return True if a measured channel depends on a parameter."""
     channel, _, what = name.rpartition("_")
     is_measured = channel in present or name not in GROUPS.get(what, ())
-    return is_measured and (name not in (*GROUPS["lever"], *CURVE) or "moment" in present)
+    return is_measured and (name not in (*GROUPS["lever"], *GROUPS["moment_curve"]) or "moment" in present)

@@ -17,7 +17,6 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.parameters.nuisances import LEVERS
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
@@ -26,6 +25,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.record.attributes import same_rod
 from tactile_bayes.rig import NOTHING, Rig, make_record
+from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import rod_with
 from tactile_bayes.sweep import Translation, scan
 
@@ -44,8 +44,8 @@ STATED = {
 SI = Rod(length=0.1, flexural_rigidity=2e-4, diameter=0.002)
 
 
-def model_of(measured, nuisances, cell=CELL, exact=True):
-    model = Experiment(measured, Rig(load_cell=cell, unknown=only(*nuisances))).model
+def model_of(measured, unknowns, cell=CELL, exact=True):
+    model = Experiment(measured, Rig(load_cell=cell, unknown=only(*unknowns))).model
     model.likelihood.exact = exact
     return model
 
@@ -56,7 +56,7 @@ def priors_of(measured, *names, cell=None):
 
 
 def information(model):
-    """Fisher's, over contour and nuisances, with the normal priors' own for the latter; noise is known."""
+    """Fisher's, over contour and unknowns, with the normal priors' own for the latter; noise is known."""
     point = np.array([(TRUTH | STATED)[name] for name in model.forward_parameters])
     kinked = [name in ("friction", "suspension_compliance") for name in model.forward_parameters]  # no less than zero
     steps = 1e-5 * np.eye(point.size)
@@ -76,15 +76,15 @@ def information(model):
     return found
 
 
-def deviations(nuisances, channels=CHANNELS):
+def deviations(unknowns, channels=CHANNELS):
     """Of a, q and x_c, of profile II in a double sweep at 2°."""
     measured = scan(paper_profile("II", q=0.5), drive_step=np.radians(2.0)).record
     measured = measured.assign({c: np.nan * measured[c] for c in CHANNELS if c not in channels})
-    return np.sqrt(np.diag(np.linalg.inv(information(model_of(measured, nuisances)))))[:3]
+    return np.sqrt(np.diag(np.linalg.inv(information(model_of(measured, unknowns)))))[:3]
 
 
 @pytest.mark.parametrize(
-    ("nuisances", "channels", "expected"),
+    ("unknowns", "channels", "expected"),
     [
         ([], CHANNELS, (0.0013, 0.00015, 0.0005)),
         (["rigidity_scale"], CHANNELS, (None, 0.0005, None)),
@@ -98,9 +98,9 @@ def deviations(nuisances, channels=CHANNELS):
     ],
     ids=["none", "EI", "seven", "moment only", "moment only, EI"],
 )
-def test_what_nuisances_cost_is_what_was_found_independently(nuisances, channels, expected):
+def test_what_unknowns_cost_is_what_was_found_independently(unknowns, channels, expected):
     """Within a quarter, since they were quoted to a digit, with a step at events and priors that are not told."""
-    for found, quoted in zip(deviations(nuisances, channels), expected, strict=True):
+    for found, quoted in zip(deviations(unknowns, channels), expected, strict=True):
         if quoted is not None:
             assert found == pytest.approx(quoted, rel=0.25)
 
@@ -253,8 +253,8 @@ def test_a_pivot_that_is_off_is_found():
 def test_pivots_are_named_from_the_second_on():
     record = scanned(base=[(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0)])
 
-    def named(*nuisances):
-        return [name for name in priors_of(record, *nuisances) if name.startswith("base")]
+    def named(*unknowns):
+        return [name for name in priors_of(record, *unknowns) if name.startswith("base")]
 
     assert named("base") == ["base_2_x", "base_2_y", "base_3_x", "base_3_y"]
     assert named("base_y") == ["base_2_y", "base_3_y"]
@@ -413,7 +413,7 @@ def test_gains_biases_drifts_and_rigidity_change_what_is_sensed_as_they_say(rod)
     values |= dict(
         zip(("moment_bias", "force_x_bias", "force_y_bias"), np.array([0.01, -0.02, 0.03]) * units, strict=True)
     )
-    point = np.array([[0.5 / length, 0.5 * length, 0.0, *(values[name] for name in model.nuisances.names)]])
+    point = np.array([[0.5 / length, 0.5 * length, 0.0, *(values[name] for name in model.unknowns.names)]])
     loads = model.loads(point)
     found = model.likelihood.load_cell.expected(loads)[0] * units
     plain, _ = model.likelihood.predict(model.contours(point))
@@ -557,7 +557,7 @@ def test_a_lever_and_a_backlash_are_found_beside_all_that_is_standard():
     assert_near(result, {**TRUTH, **flaws}, 4.5)
 
 
-def test_a_prior_makes_a_nuisance_of_what_was_taken_as_stated():
+def test_a_prior_makes_an_unknown_of_what_was_taken_as_stated():
     result = infer_contour(
         CELL.measure(coarse(), rng=1),
         rig=Rig(unknown=only(suspension_compliance=stats.halfnorm(scale=0.1))),
@@ -604,8 +604,8 @@ def test_a_missing_channel_has_no_bias():
 @pytest.mark.parametrize("name", ["lever", "lever_y"])
 def test_a_lever_takes_a_moment_that_was_measured(name):
     measured = coarse().assign(holding_moment=np.nan * coarse().holding_moment)
-    assert not set(LEVERS) & set(priors_of(measured, name))
-    assert not set(LEVERS) & set(Experiment(measured, Rig(unknown={"lever_y": stats.norm(0.0, 0.01)})).priors)
+    assert not set(GROUPS["lever"]) & set(priors_of(measured, name))
+    assert not set(GROUPS["lever"]) & set(Experiment(measured, Rig(unknown={"lever_y": stats.norm(0.0, 0.01)})).priors)
 
 
 @pytest.mark.parametrize("direction", ["forward", "backward"])
