@@ -12,10 +12,6 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import event
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import LoweringPass, register_pass
-from numba.core.typed_passes import NativeLowering
 
 __all__ = ["cached", "compiled", "inlined"]
 
@@ -24,53 +20,27 @@ _NOTICE = "tactile-bayes: compiling the forward model; this takes a while the fi
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False, "no_cfunc_wrapper": True}
-"""Options of numba. The caller in Python owns all arrays: compiled code allocates nothing and does not count references
-to arrays, which would take longer than small functions do."""
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
+_KNOWN = (0, 61), (0, 68)
+"""First and last version of numba whose internals `parts` was tried with. Beyond them functions are compiled by its
+public options alone: the same results, but the first use takes 1.6 times as long (80 s of CPU where it takes 50)."""
 
-class _PartLibrary(JITCodeLibrary):
-    """LLVM code of a function, which is optimised and turned into machine code only inside its callers."""
+_OF_PARTS: dict[str, Any] = {}
+if _KNOWN[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= _KNOWN[1]:
+    from tactile_bayes.mechanics.parts import PartCompiler
 
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._finalized = True
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _PartEntry(LoweringPass):
-    """Registers a function under a key in place of an entry point, which it does not have."""
-
-    _name = "part_entry"
-
-    def __init__(self) -> None:
-        LoweringPass.__init__(self)
-
-    def run_pass(self, state: Any) -> bool:
-        key: Callable[..., object] = {}.__getitem__  # one of its own, as entry points are
-        state.targetctx.insert_user_function(key, state.cr.fndesc, [state.library])
-        state["cr"] = state.cr._replace(cfunc=key)
-        return True
-
-
-class _PartCompiler(CompilerBase):
-    """numba's compiler without machine code: that of a function would contain a copy of all that it calls."""
-
-    def define_pipelines(self) -> list[Any]:
-        state = self.state
-        state.flags.no_compile = True
-        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        passes = DefaultPassBuilder.define_nopython_pipeline(state)
-        passes.add_pass_after(_PartEntry, NativeLowering)
-        passes.finalize()
-        return [passes]
+    _OF_PARTS = {"pipeline_class": PartCompiler}
+    # The caller in Python owns all arrays: compiled code allocates nothing and does not count references to arrays,
+    # which would take longer than small functions do.
+    _OPTIONS["_nrt"] = False
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function as a part of its callers; Python cannot call it."""
+    """Compile a function as a part of its callers; Python cannot call it.
+
+    For a literal True, False or number in a call all is compiled once more: bool(1) is none.
+    """
     return _part(function)
 
 
@@ -83,8 +53,8 @@ def inlined(function: Function) -> Function:
 
 
 def _part(function: Function, **more: bool) -> Function:
-    options = {**_OPTIONS, "no_cpython_wrapper": True, **more}
-    made: Function = numba.njit(function, pipeline_class=_PartCompiler, **options)
+    options: dict[str, Any] = {**_OPTIONS, **_OF_PARTS, **more, "no_cpython_wrapper": True}
+    made: Function = numba.njit(function, **options)
     return made
 
 

@@ -20,6 +20,7 @@ from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics import compiler
 from tactile_bayes.mechanics.branches import sweeps
+from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -297,3 +298,22 @@ def test_it_is_compiled_once_and_says_so_at_a_terminal(places, tmp_path):
     assert len(first) == 1
     assert "compiling the forward model" in first[0]
     assert second == []
+
+
+OTHERWISE = """
+import numba
+numba.__version__ = "0.999.0"
+import tactile_bayes as tb
+from tactile_bayes.mechanics import compiler
+assert "pipeline_class" not in compiler._OF_PARTS
+print(*map(float, tb.mechanics.elastica.wrench_from_contact(0.2, 0.6, 0.1)))
+"""
+
+
+@pytest.mark.slow
+def test_a_numba_that_is_not_known_compiles_the_same_by_its_public_options(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    ran = [sys.executable, "-c", OTHERWISE]
+    said = subprocess.run(ran, env=environment, capture_output=True, text=True, timeout=300, check=True).stdout
+    found = [float(value) for value in said.split()]
+    np.testing.assert_allclose(found, wrench_from_contact(0.2, 0.6, 0.1), rtol=1e-13)

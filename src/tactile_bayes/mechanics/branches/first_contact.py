@@ -151,7 +151,7 @@ def _missing(outline: Outline, beam: Beam, what: _Sought, p: float) -> tuple[flo
         return beam.reach * beam.reach - at.x * at.x - at.y * at.y, -2.0 * along * at.speed
     # The angle between the line from the pivot and the contour's direction grows to the left as long as the contour
     # faces the pivot. It jumps below the pivot, where no contour is.
-    at, chord = _touch(outline, beam, p, False)
+    at, chord = _touch(outline, beam, p, bool(0))
     along, facing = frame(at)
     distance = math.hypot(at.x, at.y)
     angle = bearing(at) - math.atan2(at.sin, at.cos) + chord.at_point - outline.half_angle

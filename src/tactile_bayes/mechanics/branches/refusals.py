@@ -98,7 +98,7 @@ def _second_contact(scene: Scene, ends: tuple[float, float], goes_on: bool, stop
         if _touches_twice(scene, at, work.accuracy.exact or k == 0, ends):
             return at.p
     at = guess(work, stop)
-    return at.p if _touches_twice(scene, at, True, ends) else math.nan
+    return at.p if _touches_twice(scene, at, bool(1), ends) else math.nan
 
 
 @inlined

@@ -194,8 +194,8 @@ def raw_fits(
         sample = _Sample(beam, reading.drive_angle[i], loads[0], loads[1], loads[2], delta[i])
         rising, falling = contact_pair(*sample)
         noisy = has_noise and _write_errors(reading, axes, i, room)
-        deviation = _deviation(rising, sample, noisy, room, 0)
-        other_deviation = _deviation(falling, sample, noisy, room, 1)
+        deviation = _deviation(rising, sample, noisy, room, room.shifts[0])
+        other_deviation = _deviation(falling, sample, noisy, room, room.shifts[1])
         found, other, falls = rising, falling, other_deviation < deviation or math.isnan(rising.arclength)
         if falls:
             found, other = falling, rising
@@ -227,7 +227,7 @@ def _write_errors(reading: Reading, axes: Floats, i: int, room: Room) -> bool:
 
 
 @compiled
-def _deviation(found: Found, sample: _Sample, noisy: bool, room: Room, which: int) -> float:
+def _deviation(found: Found, sample: _Sample, noisy: bool, room: Room, shifts: Floats) -> float:
     """Deviation of a point without moment from a contact at the tip or along the rod, in standard deviations, or in L
     and rad without noise; infinite for no point. With noise the shifts are written."""
     if math.isnan(found.arclength):
@@ -236,7 +236,7 @@ def _deviation(found: Found, sample: _Sample, noisy: bool, room: Room, which: in
     turn -= 2.0 * math.pi * math.floor(0.5 * turn / math.pi + 0.25)
     by_length, by_turn = 1.0, 1.0
     if noisy:
-        z, errors, shifts = room.z, room.errors, room.shifts[which]
+        z, errors = room.z, room.errors
         z[0, 0], z[0, 1] = math.hypot(sample.force_x, sample.force_y), turn - sample.friction_angle
         z[0, 2], z[0, 3] = found.arclength, sample.drive_angle
         pose = contact_state(z, 0, sample.beam, room.by)
