@@ -175,14 +175,6 @@ class NormalApproximation:
         bent[:, self._vertex] += beyond if back else -beyond
         return bent
 
-    @property
-    def arrays(self) -> tuple[Floats, ...]:
-        """Arrays that determine `conditional` and `bent`."""
-        size, step, longest = self._smooth
-        smooth = [np.array([*size, step, longest])] if self.model.noise.of_discrepancy else []
-        anchor = (np.array([self._anchor.slope_angle]), self._anchor.centre)
-        return self._through.c, self._observations.values, *self.prior, *smooth, *anchor
-
     def _information(self, scales: Floats) -> tuple[Floats, Floats]:
         """Return slopes of the observations over the linear parameters, (n, observations, d), in units of their noise,
         and one over that noise, (n, observations); that of the snap-offs is known."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -38,13 +37,6 @@ class Whitening(Coordinates):
     def bent(self) -> int:
         """Number of coordinates that are logarithms, the first ones."""
         return self.scales.size
-
-    @property
-    def digest(self) -> str:
-        """Hash of all that determines the change of variables."""
-        vanishing = np.ones(self.approximation.vanishing)
-        arrays = (*self.approximation.arrays, self.scales, vanishing, self.mean, self.root)
-        return hashlib.sha256(b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in arrays)).hexdigest()
 
     @cached_property
     def _log_volume(self) -> float:
