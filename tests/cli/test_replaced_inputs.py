@@ -29,7 +29,7 @@ CALLS = [
     "infer {trust.nc} --out .",
     "infer record.csv --rig {posterior.nc} --out .",
     "infer record.csv --rig by.toml --out . {band.csv}",
-    "infer {block-00000000-00000100.npz} --out run --checkpoint .",
+    "infer {checkpoint.npz} --out run --checkpoint .",
     "compare {comparison.nc} --out .",
     "compare record.csv --rig {comparison.csv} --out .",
     "watch {band.csv} --out . --idle 0",
