@@ -57,9 +57,10 @@ _NEAR, _MOST_STEPS = 1e-5, 6
 _PAST = 1e-6
 """Share of a leg by which a step may pass the end."""
 
-_SETTLED, _ROUNDING = 1e-8, 1e-15
+_SETTLED, _ROUNDING, _NOISE = 1e-8, 1e-15, 1e-13
 """Newton step to an exact state, over the distance from the end of its leg, after which a first-order correction leaves
-rounding errors only: its square; and the rounding of a travel."""
+rounding errors only: its square; the rounding of a travel; and that of one by Taylor series, below which a step that
+does not halve what is missing is noise (at 1e-8, one state in some 200 just before a fold was not found)."""
 
 _MOST_HALVINGS = 100
 """Largest number of steps to an exact state: more than halvings of a leg to rounding."""
@@ -303,7 +304,7 @@ def _polished(part: Followed, wanted: float, way: float, start: Equilibrium) -> 
         missing = wanted - (state.travel if math.isfinite(state.travel) else course.begin)
         rate, room = state.rates.travel, course.stop - way
         step = missing / rate if rate > 0.0 else math.nan
-        if abs(step) <= _SETTLED * room or abs(missing) <= _ROUNDING or 0.5 * last < abs(missing) < _SETTLED:
+        if abs(step) <= _SETTLED * room or abs(missing) <= _ROUNDING or 0.5 * last < abs(missing) < _NOISE:
             break
         new, low, high, before = newton_step(way, missing, -rate, low, high, before)
         if new == way:
