@@ -148,6 +148,18 @@ HARD = {
     # The guess from the interpolant falls beyond the fold, where the drive angle is the same once more.
     "slim ellipse": Scene(Ellipse(0.07, 0.19, 0.85, 0.42), (0.0, 0.0), "backward"),
     "flat ellipse": Scene(Ellipse(5.0, 0.05, 0.3, 0.1)),
+    # Where loads change fast with the angle, what is missing of it halves slowly long before it is rounding.
+    "just before a fold": Scene(
+        ShapeFree(
+            np.array([-1.5, -0.5, 0.5, 1.5]),
+            np.array([0.249749571163064, 0.04548753734990708, 0.24974871765457296, 6.56104877556666e-07]),
+            x=0.33510746,
+            y=0.05,
+            at=0.0,
+        ),
+        (0.0, 0.0),
+        "backward",
+    ),
     "nearly square vertex": Scene(PowerLaw(6.8, 2.2, 0.54, -0.14), (0.06, 0.15), "backward"),
     "a dip before a join": Scene(
         Joined(
