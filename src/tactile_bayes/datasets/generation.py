@@ -309,7 +309,6 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
         relative=drives.way.ndim == 1,
         polished=False,
         lines=drives.lines,
-        asks_sliding=True,
     )
     return _Tried(candidate, paths, drives, units)
 

@@ -81,8 +81,6 @@ class Paths:
     then travels, in rod lengths."""
     sampled: Floats
     """States at the drive angles given to `trace`, shape (n, k, columns)."""
-    slides_from: float | None = None
-    """Drive angle of a single path from which friction opposes the slip, if it does not all along."""
 
     def is_clear(self) -> Flags:
         """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,).
@@ -165,7 +163,6 @@ def trace(
     relative: bool = False,
     polished: bool = True,
     lines: Floats | None = None,
-    asks_sliding: bool = False,
 ) -> Paths:
     """Follow the equilibria of every contour from first contact to snap-off.
 
@@ -186,13 +183,11 @@ def trace(
     lines : ndarray, shape (1 or n, lines, columns), optional
         Lines of drives that carry the base, in the sweep frame from the first pose of each, as in `lines_through`; NaN
         after the last. Drive angles are then travels, in rod lengths.
-    asks_sliding : bool
-        Whether there is a path only where friction opposes the slip all along it, as it always does on such lines.
     """
     sweeps = _sweeps_of(sweep_frame, friction_angle, suspension_compliance)
     shapes = shapes_of(sweep_frame.contour, *(sweep_frame.own_domain() if sweep_frame.contour.halves is None else ()))
     angles = np.empty(0) if drive_angles is None else drive_angles
-    options: dict[str, Any] = {"profile": profile, "tolerance": tolerance, "asks_sliding": asks_sliding}
+    options: dict[str, Any] = {"profile": profile, "tolerance": tolerance}
     solutions = _swept(shapes, sweeps, angles, lines, relative, states=True, polished=polished, **options)
     most = int(solutions.phases.max(initial=0))
     has_path = solutions.phases[:, None, None] > 0

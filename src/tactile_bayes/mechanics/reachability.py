@@ -34,7 +34,7 @@ class Reachability(IntEnum):
     BEGINS_INSIDE = 9
     """A rod that is carried touches the contour already at the beginning of its drive."""
     STICKS = 10
-    """Friction would hold the contact of a rod that is carried, or the contact would slide the other way."""
+    """Friction lets the contact neither slide nor stick at first, as where it is carried head-on, or both."""
     FOLDS_OVER = 11
     """The tip would turn over until the other side of the rod lies along the contour."""
 
@@ -72,3 +72,5 @@ class SnapOff(IntEnum):
     """The line of force passes through the pivot, so that the holding moment vanishes."""
     RELEASE = 4
     """The force vanishes: a rod that is curved or carried leaves the contour without a jump."""
+    JUMP = 5
+    """Friction lets the contact neither slide nor stick: it jumps."""

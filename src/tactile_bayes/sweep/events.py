@@ -71,10 +71,6 @@ class SweepEvents:
     clear : bool
         Whether the unloaded rod is clear of the object after snap-off. If it is not, the rod comes to rest in another
         contact, which no sweep reaches.
-    slides_from : float
-        Travel from which friction opposes the slip. It is that of first contact, unless a rod turns about a pivot that
-        is curved toward the object: with friction it sticks there at first, which is not modelled, and no samples of
-        its contact before this travel are recorded.
     touches_again : float
         Travel at which a drive that carries the base brings the rod, clear after snap-off, to the object again
         [length], and beyond which its state is not computed; NaN if it does not.
@@ -88,7 +84,6 @@ class SweepEvents:
     transitions: tuple[Event, ...]
     snap_off: Event
     clear: bool
-    slides_from: float
     touches_again: float
     largest_strain: float
 
@@ -112,9 +107,6 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
     else:
         base, columns["travel"] = drive.base, columns["drive_angle"]
         columns["base_x"], columns["base_y"] = (np.full(index.size, value) for value in base)
-    slides = float(columns["travel"][0])
-    if paths.slides_from is not None:
-        slides = np.pi - paths.slides_from if direction == "backward" else paths.slides_from
     kinds = [
         phases[0],
         *(f"{before} → {after}" for before, after in pairwise(phases)),
@@ -123,4 +115,4 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]
     found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
     strain = float(paths.largest_curvature[0]) * 0.5 * rod.diameter / rod.length
-    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, slides, again, strain)
+    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, again, strain)

@@ -385,8 +385,7 @@ def _within_a_turn(drive: Rotation, every: Floats, sweep: SweepEvents) -> Index:
             ClearanceWarning,
             stacklevel=4,
         )
-    sticks = (sense * (angles - first) >= 0.0) & (sense * (sweep.slides_from - angles) > 0.0)
-    return np.asarray(chosen[kept & ~sticks][:: int(sense)])
+    return np.asarray(chosen[kept][:: int(sense)])
 
 
 def _floats(values: ArrayLike) -> Floats:

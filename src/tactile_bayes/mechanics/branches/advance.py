@@ -6,14 +6,7 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.equilibrium import (
-    Balance,
-    Equilibrium,
-    Scene,
-    settle_at,
-    settle_at_limit,
-    tangential_psi1,
-)
+from tactile_bayes.mechanics.branches.equilibrium import Balance, settle_at, settle_at_limit
 from tactile_bayes.mechanics.branches.leg import (
     ANGLE,
     DIP,
@@ -30,7 +23,8 @@ from tactile_bayes.mechanics.branches.leg import (
     share_of,
     shortened,
 )
-from tactile_bayes.mechanics.branches.phase import limit
+from tactile_bayes.mechanics.branches.phase import limit, slides
+from tactile_bayes.mechanics.branches.scene import Equilibrium, Scene
 from tactile_bayes.mechanics.branches.series import change_of, tail
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
@@ -79,8 +73,6 @@ class Setting(NamedTuple):
     """Parameters at which the contour may not be smooth."""
     ends: tuple[float, float]
     """Least and greatest parameter of the contour."""
-    slides: bool
-    """Whether friction opposes the slip everywhere, or else there is no path."""
     may_release: bool
     """Whether the force may vanish: for a straight rod that turns about a pivot it does not."""
 
@@ -151,24 +143,24 @@ def _trial(here: Here, setting: Setting, length: float, known: float, work: LegS
     `known` is as in `sample_leg`."""
     scene, begin = here.scene, here.begin
     leg = leg_from(scene, begin, here.onward, length)
-    if known == 0.0 and scene.beam.varied is not None:
+    if known == 0.0 and scene.beam.varied is not None and slides(scene.phase):
         share = _share_in_phase(scene, leg)
         leg, length = shortened(leg, share), share * length
     share = release(scene, leg) if setting.may_release else math.nan
     is_released = share <= 1.0
     if is_released:
         leg, length, known = shortened(leg, share), share * length, share * known
-    is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, known, work)
+    is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, known, is_released, work)
     knot, at_knot = math.nan, begin
     if is_sound:
-        knot, node = first_knot(leg, setting.knots, setting.ends[0], work)
+        knot, node = first_knot(scene, leg, setting.knots, setting.ends[0], work)
         if node <= 1.0:  # rates at the end are those before the knot
             at_knot = settle_at(scene, knot, guess(work, node))
             share = share_of(leg, at_knot) * (1.0 - NUDGE)
             is_sound, is_released = share > 0.0, False
             if is_sound:
                 leg, length = shortened(leg, share), share * length
-                is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, share, work)
+                is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, share, is_released, work)
     return Step(is_sound, leg, length, end, before_end, knot, at_knot, is_released)
 
 
@@ -201,7 +193,7 @@ def _pace(excess: float, work: LegSeries) -> float:
 @compiled
 def _share_in_phase(scene: Scene, leg: Leg) -> float:
     """Share of a leg up to somewhat beyond the change of the phase, as far as its direction tells."""
-    end, sense = limit(scene.phase, tangential_psi1(scene))
+    _, end, sense = limit(scene, leg.begin.p)
     room = sense * (end - leg.begin.q) + (_ROOM_IN_TIP if scene.phase == TIP else _ROOM_PAST_TIP)
     pace = sense * leg.along.q
     return room / pace if pace > room > 0.0 else 1.0

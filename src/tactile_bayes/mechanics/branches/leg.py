@@ -15,31 +15,27 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.equilibrium import (
-    BY_FORCE,
-    NO_FORCE,
-    SETTLED,
-    Balance,
+from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, Rates, settle, unloaded
+from tactile_bayes.mechanics.branches.line import Line
+from tactile_bayes.mechanics.branches.outline import place
+from tactile_bayes.mechanics.branches.phase import STUCK, limit, slides, slip
+from tactile_bayes.mechanics.branches.scene import (
+    BY_Q,
     Equilibrium,
-    Rates,
     Scene,
     dot,
     less,
-    settle,
-    tangential_psi1,
     times,
 )
-from tactile_bayes.mechanics.branches.line import Line
-from tactile_bayes.mechanics.branches.outline import place
-from tactile_bayes.mechanics.branches.phase import limit
 from tactile_bayes.mechanics.branches.series import crossing, two_values, value, weighted
-from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.numerics import chebyshev
 
 __all__ = [
     "ANGLE",
     "DIP",
     "LOST",
+    "NOT_SLIPPING",
     "NUDGE",
     "PLACE",
     "RATE",
@@ -47,6 +43,7 @@ __all__ = [
     "Accuracy",
     "Leg",
     "LegSeries",
+    "change_of_mode",
     "change_of_phase",
     "end_of_line",
     "first_fall",
@@ -79,6 +76,15 @@ LOST = -1.0
 
 _WEAK = 0.5
 """Share of its force that a leg loses along its tangent for a release to be looked for on it."""
+
+NOT_SLIPPING = 1e-9
+"""Slip per length of a leg, or per travel, whose sense rounding may decide."""
+
+_TURNED = 1e-9
+"""Angle by which the force of a contact that sticks is beyond the cone [rad], and not by rounding at its beginning."""
+
+_MOST_HALVINGS = 60
+"""Largest number of steps to where the slip vanishes."""
 
 _LAST = 1e-13
 """Newton step, as a share of a leg, below which its interpolants have rounding errors only."""
@@ -181,8 +187,10 @@ def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -
 
     Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f.
     """
-    spot, tangent = place(scene.outline, begin.at.p + math.copysign(NUDGE, onward.p)), begin.tangent
-    by_p, loading = spot.speed * spot.speed + spot.bend * spot.bend, 1.0 + begin.at.force
+    tangent, loading, by_p = begin.tangent, 1.0 + begin.at.force, 1.0
+    if scene.phase != STUCK:
+        spot = place(scene.outline, begin.at.p + math.copysign(NUDGE, onward.p))
+        by_p = spot.speed * spot.speed + spot.bend * spot.bend
     by_force = _BY_FORCE if scene.line is None else _BY_FORCE_ON_LINE
     across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
     size = length / math.sqrt(dot(across, tangent))
@@ -255,12 +263,13 @@ def guess(work: LegSeries, way: float) -> Equilibrium:
 
 @compiled
 def sample_leg(
-    scene: Scene, leg: Leg, begin: Balance, before: Balance, known: float, work: LegSeries
+    scene: Scene, leg: Leg, begin: Balance, before: Balance, known: float, is_released: bool, work: LegSeries
 ) -> tuple[bool, Balance, Balance]:
     """Fit the series of a leg, unless the branch does not cut all planes, and return the equilibria at its last nodes.
 
     The search at a node starts from a polynomial through the nodes before it. If the series of a longer leg in the same
-    direction are at hand, of which this is the share `known` > 0, it starts from these.
+    direction are at hand, of which this is the share `known` > 0, it starts from these. At the end of one that is released
+    there is no force.
     """
     at_nodes, half = work.at_nodes, work.nodes.size
     settled = max(SETTLED, 0.1 * work.accuracy.last_step)
@@ -275,7 +284,10 @@ def sample_leg(
             else:
                 start = _cubic(leg, found, before, work.nodes[k])
             older, old = old, found
-            found = settle_on(scene, leg, work.nodes[k], start, settled)
+            if is_released and k == half - 1 and not slides(scene.phase):
+                found = _by_way(leg, unloaded(scene, start))
+            else:
+                found = settle_on(scene, leg, work.nodes[k], start, settled)
             if not math.isfinite(found.travel):
                 return False, begin, before
         at_nodes[0, k], at_nodes[0, half + k] = found.holding_moment, found.rates.moment
@@ -290,8 +302,10 @@ def sample_leg(
 
 
 @compiled
-def first_knot(leg: Leg, knots: Floats, low: float, work: LegSeries) -> tuple[float, float]:
+def first_knot(scene: Scene, leg: Leg, knots: Floats, low: float, work: LegSeries) -> tuple[float, float]:
     """First knot or end of the contour that a leg passes, and about where."""
+    if scene.phase == STUCK:
+        return math.nan, 2.0
     before, old = leg.begin.p, 0.0
     for k in range(1, work.nodes.size):
         after = work.at_nodes[PLACE, k]
@@ -305,18 +319,94 @@ def first_knot(leg: Leg, knots: Floats, low: float, work: LegSeries) -> tuple[fl
 
 @compiled
 def change_of_phase(scene: Scene, work: LegSeries) -> float:
-    """Position at which the phase changes."""
-    rest, grid = work.series[REST], work.grid
-    end, sense = limit(scene.phase, tangential_psi1(scene))
-    weighted(work.on_grid, rest, work.sampled)
+    """Position at which the phase changes between contact of the tip and of the rod."""
+    grid = work.grid
+    end = limit(scene, value(work.series[PLACE], 1.0))
+    row = PLACE if end.is_p else REST
+    weighted(work.on_grid, work.series[row], work.sampled)
     for cell in range(1, grid.size):
-        if sense * (work.sampled[cell] - end) > 0.0:
-            weighted(work.slopes, rest, work.slope)
-            left, right = grid[cell - 1], grid[cell]
-            if sense > 0.0:
-                left, right = right, left
-            return crossing(rest, work.slope, end, left, right, 0.5 * (left + right), work.accuracy.last_step)
+        if end.sense * (work.sampled[cell] - end.value) > 0.0:
+            return _through(row, end.value, end.sense, cell, work)
     return 2.0
+
+
+@compiled
+def _through(row: int, wanted: float, sense: float, cell: int, work: LegSeries) -> float:
+    """Position at which a series rises (1) or falls (−1) through a value, in the cell before a number of the grid."""
+    weighted(work.slopes, work.series[row], work.slope)
+    left, right = work.grid[cell - 1], work.grid[cell]
+    if sense > 0.0:
+        left, right = right, left
+    return crossing(work.series[row], work.slope, wanted, left, right, 0.5 * (left + right), work.accuracy.last_step)
+
+
+@compiled
+def change_of_mode(scene: Scene, leg: Leg, last: float, work: LegSeries) -> tuple[float, Balance]:
+    """Position on a leg, up to a last one, at which sliding or sticking ends, and the equilibrium there."""
+    delta, begin = scene.rig.friction_angle, settle_on(scene, leg, 0.0, leg.begin, SETTLED)
+    if delta == 0.0:
+        return 2.0, begin
+    if slides(scene.phase):
+        way = _end_of_sliding(scene, leg, last, work)
+        if way > last:
+            return 2.0, begin
+        return way, settle_on(scene, leg, way, guess(work, way), SETTLED)
+    weighted(work.on_grid, work.series[REST], work.sampled)
+    for cell in range(1, work.grid.size):
+        gamma = work.sampled[cell]
+        if abs(gamma) > abs(delta) + _TURNED:
+            edge, sense = math.copysign(delta, gamma), math.copysign(1.0, gamma)
+            way = _through(REST, edge, sense, cell, work)
+            if way > last:
+                break
+            start = guess(work, way)
+            found = settle(scene, start, Equilibrium(0.0, edge, 0.0), BY_Q, 0.0, SETTLED)
+            return min(max(share_of(leg, found), 0.0), last), found
+    return 2.0, begin
+
+
+@inlined
+def _end_of_sliding(scene: Scene, leg: Leg, last: float, work: LegSeries) -> float:
+    """Position up to which friction opposes the slip: between two nodes, by regula falsi (Illinois)."""
+    at_nodes, half, sense = work.at_nodes, work.nodes.size, math.copysign(1.0, scene.rig.friction_angle)
+    before, old = 0.0, 0.0
+    for k in range(half):
+        at = Equilibrium(at_nodes[PLACE, k], at_nodes[REST, k], 0.0)
+        along = Equilibrium(at_nodes[PLACE, half + k], at_nodes[REST, half + k], 0.0)
+        way, against = work.nodes[k], sense * slip(scene, at, along)
+        if k > 0 and against > NOT_SLIPPING:
+            if not before < 0.0:
+                return old
+            return _no_slip(scene, leg, sense, old, before, way, against, work)
+        if way > last:
+            break
+        before, old = against, way
+    return 2.0
+
+
+@compiled
+def _no_slip(
+    scene: Scene, leg: Leg, sense: float, low: float, before: float, high: float, after: float, work: LegSeries
+) -> float:
+    """Position between two at which the slip vanishes, from its values there."""
+    settled, side = work.accuracy.last_step * (high - low), 0
+    way = high
+    for _ in range(_MOST_HALVINGS):
+        new = (low * after - high * before) / (after - before)
+        found = settle_on(scene, leg, new, guess(work, new), SETTLED)
+        value_there = sense * slip(scene, found.at, found.tangent)
+        step, way = abs(new - way), new
+        if value_there > 0.0:
+            high, after = new, value_there
+            before *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            low, before = new, value_there
+            after *= 0.5 if side == -1 else 1.0
+            side = -1
+        if not step > settled or value_there == 0.0:
+            break
+    return way
 
 
 @compiled
@@ -327,7 +417,7 @@ def release(scene: Scene, leg: Leg) -> float:
     share = -leg.begin.force / leg.along.force
     begin, along = leg.begin, leg.along
     start = Equilibrium(begin.p + share * along.p, begin.q + share * along.q, 0.0)
-    share = share_of(leg, settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED))
+    share = share_of(leg, unloaded(scene, start))
     return share if 0.0 < share <= 1.0 else math.nan
 
 

@@ -16,15 +16,14 @@ from tactile_bayes.mechanics.branches.branch import (
     BranchWorkspace,
     branch_workspace,
     follow_branch,
-    refuse,
 )
 from tactile_bayes.mechanics.branches.clearance import travel_into
-from tactile_bayes.mechanics.branches.equilibrium import Rig, Scene
 from tactile_bayes.mechanics.branches.first_contact import clear_angle
 from tactile_bayes.mechanics.branches.leg import Accuracy
 from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_of
 from tactile_bayes.mechanics.branches.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.branches.readings import STATE, STATE_COLUMNS, Found, Samples
+from tactile_bayes.mechanics.branches.scene import NOWHERE, Rig, Scene
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_of, varied_of
@@ -41,8 +40,7 @@ __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "shapes_of", "solve_swee
 _SAME_ANGLE = 1e-5
 """Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
 
-_TOUCHES, _STICKS = int(Reachability.TOUCHES), int(Reachability.STICKS)
-_BEGINS_INSIDE = int(Reachability.BEGINS_INSIDE)
+_TOUCHES, _BEGINS_INSIDE = int(Reachability.TOUCHES), int(Reachability.BEGINS_INSIDE)
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
 _EXACT = Accuracy(
@@ -240,7 +238,7 @@ def _scene(
     rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, moment, moment / sweep.relative_length)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
-    return Scene(outline, beam, rig, line, TIP)
+    return Scene(outline, beam, rig, line, TIP, NOWHERE)
 
 
 @compiled
@@ -303,25 +301,6 @@ def _is_inside_before(scene: Scene, lines: Floats | None, first: float) -> bool:
     return -math.inf < inside < first - _SAME_ANGLE
 
 
-@compiled
-def _follow(
-    scene: Scene, room: Floats | None, samples: Samples, asks_sliding: bool, workspace: BranchWorkspace, found: Found
-) -> None:
-    """Follow a branch along which friction opposes the slip; in rotations it acts as if it did unless that is asked.
-
-    Where such a branch is refused for another reason, that is the reason.
-    """
-    yes, no = bool(1), bool(0)  # numba would compile all once for True and again for False
-    follow_branch(scene, room, samples, yes, workspace, found)
-    if found.event.reach == _STICKS and room is None:
-        where = found.event.snap_parameter
-        if asks_sliding:
-            samples = Samples(samples.angles[:0], samples.rows[:0], samples.relative)
-        follow_branch(scene, room, samples, no, workspace, found)
-        if asks_sliding and found.event.reach == _TOUCHES:
-            refuse(_STICKS, where, found.event)
-
-
 @cached
 def _solve(
     shapes: Shapes,
@@ -333,7 +312,6 @@ def _solve(
     room: Floats | None,
     line: Line | None,
     asks_clearance: bool,
-    asks_sliding: bool,
     workspace: BranchWorkspace,
     table: Floats,
     loads: Floats,
@@ -356,7 +334,7 @@ def _solve(
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
         samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
         found = Found(loads[c], all_states[c], event_states[i], event)
-        _follow(scene, room, samples, asks_sliding, workspace, found)
+        follow_branch(scene, room, samples, workspace, found)
         event.clear_angle = math.nan
         if asks_clearance and event.reach == _TOUCHES:
             event.clear_angle = _clear_angle(scene, room, event, accuracy)
@@ -376,7 +354,6 @@ def solve_sweeps(
     states: bool = False,
     polished: bool = True,
     asks_clearance: bool = True,
-    asks_sliding: bool = False,
 ) -> Solutions:
     """Follow the paths of sweeps, and compute loads, and states if wanted, of their samples.
 
@@ -385,9 +362,6 @@ def solve_sweeps(
     for loads with errors of some 1e-6 of the largest. `tolerance` are tolerated errors of moment and forces [EI/L and
     EI/L²], at least 1e-10 of the loads; without it events are exact, and loads have errors of some 1e-8 of the largest.
     States are exact if `polished`; otherwise they come from the series, with an error of 1e-10 of the largest.
-    `asks_sliding` says whether there is a path only where friction opposes the slip all along it, as it always does
-    where the base is carried; in rotations it otherwise acts as on a straight rod, which is wrong where a curved one
-    slides outward.
     """
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
@@ -410,7 +384,6 @@ def solve_sweeps(
             segments,
             *_carried(segments.lines),
             asks_clearance,
-            asks_sliding,
             branch_workspace(accuracy, order, longest, shapes.knots.shape[1], lines),
             np.empty(shapes.tables.shape[1:]),
             loads,
