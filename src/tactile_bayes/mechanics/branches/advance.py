@@ -120,7 +120,7 @@ def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: Leg
         # Rounding, which a shorter leg does not make smaller.
         is_noise = 0.5 * before < excess < (_NOISE if exact else 1.0)
         if is_noise:
-            pace = max(pace, 1.0)
+            pace = _MOST_PACE
         if excess <= _ACCEPT or is_noise or step.length <= (least if step.is_sound else _SHORTEST):
             break
         share, before = min(pace, _BACK), excess

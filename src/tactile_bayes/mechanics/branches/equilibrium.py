@@ -69,9 +69,6 @@ _MOST_TURN, _MOST_LOADING = 0.4, 1.0
 SETTLED = 1e-8
 """Step, over the largest, after which a first-order correction leaves rounding errors only: its square."""
 
-_SMALL = 1e-5
-"""Force [EI/L²] from which a contact that sticks is extrapolated to none: rounding leaves 1e-11 rad of its direction."""
-
 _NONE = Pose(0.0, 0.0, 0.0)
 
 
@@ -332,32 +329,25 @@ def settle_at(scene: Scene, p: float, start: Equilibrium) -> Balance:
 
 
 @compiled
-def unloaded(scene: Scene, start: Equilibrium) -> Balance:
+def unloaded(scene: Scene, start: Equilibrium, small: float) -> Balance:
     """Equilibrium without force, by Newton's method from a guess.
 
-    If the contact sticks, its force has no direction there. Direction and tangent are extrapolated from two small forces,
-    with errors of the cube and the square of these.
+    If the contact sticks, its force has no direction there. Direction and tangent are extrapolated from a small force and
+    its double, with errors of the cube and the square of these, and of their rounding.
     """
     if slides(scene.phase):
         return settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED)
-    small = settle(scene, Equilibrium(start.p, start.q, _SMALL), NO_FORCE, BY_FORCE, _SMALL, SETTLED)
-    large = settle(scene, Equilibrium(small.at.p, small.at.q, 2.0 * _SMALL), NO_FORCE, BY_FORCE, 2.0 * _SMALL, SETTLED)
-    by_small, by_large = (
-        times(1.0 / small.tangent.force, small.tangent),
-        times(1.0 / large.tangent.force, large.tangent),
-    )
-    rates, others = _by_force(small), _by_force(large)
-    half = 0.5 * _SMALL
-    at = Equilibrium(
-        small.at.p - half * (3.0 * by_small.p - by_large.p), small.at.q - half * (3.0 * by_small.q - by_large.q), 0.0
-    )
+    one = settle(scene, Equilibrium(start.p, start.q, small), NO_FORCE, BY_FORCE, small, SETTLED)
+    two = settle(scene, Equilibrium(one.at.p, one.at.q, 2.0 * small), NO_FORCE, BY_FORCE, 2.0 * small, SETTLED)
+    by_one, by_two = times(1.0 / one.tangent.force, one.tangent), times(1.0 / two.tangent.force, two.tangent)
+    rates, others, back = _by_force(one), _by_force(two), times(0.5 * small, less(times(3.0, by_one), by_two))
     return Balance(
-        at,
-        small.travel - half * (3.0 * rates.travel - others.travel),
+        Equilibrium(one.at.p - back.p, one.at.q - back.q, 0.0),
+        one.travel - 0.5 * small * (3.0 * rates.travel - others.travel),
         0.0,
         0.0,
         0.0,
-        less(times(2.0, by_small), by_large),
+        less(times(2.0, by_one), by_two),
         Rates(
             2.0 * rates.travel - others.travel,
             2.0 * rates.moment - others.moment,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, balance, nowhere, settle, unloaded
-from tactile_bayes.mechanics.branches.leg import NOT_SLIPPING
+from tactile_bayes.mechanics.branches.leg import HARDLY, NOT_SLIPPING
 from tactile_bayes.mechanics.branches.line import Line, line_of, pose_at
 from tactile_bayes.mechanics.branches.outline import (
     Outline,
@@ -88,7 +88,7 @@ near as its first contact is found."""
 
 
 _SLIGHT = 1e-3
-"""Force [EI/L²] with which the sense of a slip is decided that vanishes to first order, as that of straight rods does."""
+"""Travel [rad or L] on which the sense of a slip is decided that vanishes to first order, as that of straight rods does."""
 
 
 class Approach(NamedTuple):
@@ -424,9 +424,10 @@ def _opposes(scene: Scene, begin: Balance) -> bool:
     """True if friction opposes the slip as the force grows from none."""
     slipping = slip(scene, begin.at, begin.tangent) / begin.rates.travel
     if abs(slipping) <= NOT_SLIPPING:
-        at, tangent, size = begin.at, begin.tangent, _SLIGHT / begin.tangent.force
-        start = Equilibrium(at.p + size * tangent.p, at.q + size * tangent.q, _SLIGHT)
-        later = settle(scene, start, NO_FORCE, BY_FORCE, _SLIGHT, SETTLED)
+        at, tangent, size = begin.at, begin.tangent, _SLIGHT / begin.rates.travel
+        force = size * tangent.force
+        start = Equilibrium(at.p + size * tangent.p, at.q + size * tangent.q, force)
+        later = settle(scene, start, NO_FORCE, BY_FORCE, force, SETTLED)
         slipping = slip(scene, later.at, later.tangent) / later.rates.travel
     return _is_pushed(begin) and math.copysign(1.0, scene.rig.friction_angle) * slipping <= 0.0
 
@@ -435,7 +436,7 @@ def _opposes(scene: Scene, begin: Balance) -> bool:
 def _held(scene: Scene, begin: Balance) -> tuple[Scene, Balance]:
     """First contact that sticks, anchored nowhere if it would not."""
     there, at = stuck(scene, begin.at)
-    held = unloaded(there, Equilibrium(at.p, 0.0, 0.0))
+    held = unloaded(there, Equilibrium(at.p, 0.0, 0.0), abs(HARDLY * begin.tangent.force / begin.rates.travel))
     if _is_pushed(held) and abs(held.at.q) < abs(scene.rig.friction_angle):
         _, _, moment, force_x, force_y, tangent, rates = held
         return there, Balance(held.at, begin.travel, moment, force_x, force_y, tangent, rates)

@@ -34,6 +34,7 @@ from tactile_bayes.numerics import chebyshev
 __all__ = [
     "ANGLE",
     "DIP",
+    "HARDLY",
     "LOST",
     "NOT_SLIPPING",
     "NUDGE",
@@ -76,6 +77,10 @@ LOST = -1.0
 
 _WEAK = 0.5
 """Share of its force that a leg loses along its tangent for a release to be looked for on it."""
+
+HARDLY = 1e-5
+"""Force from which a contact that sticks is extrapolated to none, over that of a leg: rounding leaves 1e-11 rad of its
+direction."""
 
 NOT_SLIPPING = 1e-9
 """Slip per length of a leg, or per travel, whose sense rounding may decide."""
@@ -285,7 +290,7 @@ def sample_leg(
                 start = _cubic(leg, found, before, work.nodes[k])
             older, old = old, found
             if is_released and k == half - 1 and not slides(scene.phase):
-                found = _by_way(leg, unloaded(scene, start))
+                found = _by_way(leg, unloaded(scene, start, HARDLY * leg.begin.force))
             else:
                 found = settle_on(scene, leg, work.nodes[k], start, settled)
             if not math.isfinite(found.travel):
@@ -417,7 +422,7 @@ def release(scene: Scene, leg: Leg) -> float:
     share = -leg.begin.force / leg.along.force
     begin, along = leg.begin, leg.along
     start = Equilibrium(begin.p + share * along.p, begin.q + share * along.q, 0.0)
-    share = share_of(leg, unloaded(scene, start))
+    share = share_of(leg, unloaded(scene, start, HARDLY * begin.force))
     return share if 0.0 < share <= 1.0 else math.nan
 
 

@@ -211,7 +211,8 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
     onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
     along, sense = leg_from(scene, begin, onward, 1.0).along, math.copysign(1.0, scene.rig.friction_angle)
     off = along.q if was_sliding else slip(scene, begin.at, along)
-    return sense * off <= NOT_SLIPPING, Here(scene, line, begin, before, onward, longest)
+    # Where the slip has vanished, the force moves from the edge of the cone to second order.
+    return (changes and was_sliding) or sense * off <= NOT_SLIPPING, Here(scene, line, begin, before, onward, longest)
 
 
 @inlined
