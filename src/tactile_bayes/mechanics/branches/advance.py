@@ -57,8 +57,8 @@ _PAST_TIP = 1e-6
 _IN_A_DIP = 1e-5
 """Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
 
-_ROUNDING = 1e-14
-"""Tail of the series of a drive angle that its rounding leaves [rad]."""
+_ROUNDING, _ROUNDING_STUCK = 1e-14, 1e-11
+"""Tail of the series of a drive angle that its rounding leaves [rad], and where a contact sticks, which hardly yields."""
 
 _RESOLVED_LOADS = 1e-10
 """Error of loads that no tolerance is below, over the loads: rounding may leave it where the rod bears on its base."""
@@ -115,7 +115,7 @@ def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: Leg
     least, known, before, pace = LONGEST * 0.5**work.accuracy.halvings, 0.0, math.inf, 1.0
     for _ in range(_MOST_TRIES):
         step = _trial(here, setting, length, known, work)
-        excess = _excess(in_dip, work) if step.is_sound else math.inf
+        excess = _excess(in_dip, slides(here.scene.phase), work) if step.is_sound else math.inf
         pace = _pace(excess, work)
         # Rounding, which a shorter leg does not make smaller.
         is_noise = 0.5 * before < excess < (_NOISE if exact else 1.0)
@@ -127,7 +127,9 @@ def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: Leg
         if step.is_sound:
             share = _up_to_tip(here.scene, step.leg, share, work)
         length, known = share * step.length, share if step.is_sound else 0.0
-    return step, pace
+    # Rounding where a contact that sticks hardly yields: others would all be as short.
+    is_stiff = step.length <= least and not slides(here.scene.phase)
+    return step, _MOST_PACE if is_stiff else pace
 
 
 @inlined
@@ -165,13 +167,14 @@ def _trial(here: Here, setting: Setting, length: float, known: float, work: LegS
 
 
 @compiled
-def _excess(in_dip: bool, work: LegSeries) -> float:
+def _excess(in_dip: bool, is_sliding: bool, work: LegSeries) -> float:
     """Estimated error of the travel, the loads or the states over the tolerated one."""
     accuracy, series = work.accuracy, work.series
     angle, change = tail(series[ANGLE]), change_of(series[ANGLE])
     if in_dip:
         return angle / (_IN_A_DIP * DIP)
-    found = max(angle / max(accuracy.resolved * change, _ROUNDING), angle / accuracy.sharp)
+    rounding = _ROUNDING if is_sliding else _ROUNDING_STUCK
+    found = max(angle / max(accuracy.resolved * change, rounding), angle / accuracy.sharp)
     for c in range(3):
         of_load = change_of(series[c])
         tolerated = max(accuracy.tolerance[c], _RESOLVED_LOADS * (abs(series[c, 0]) + of_load))

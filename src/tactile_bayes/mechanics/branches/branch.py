@@ -29,8 +29,8 @@ from tactile_bayes.mechanics.branches.leg import (
     LegSeries,
     leg_series,
 )
-from tactile_bayes.mechanics.branches.meeting import OPEN, Meeting, fate_of, go_on, meet
-from tactile_bayes.mechanics.branches.phase import contact_at, tip_touches
+from tactile_bayes.mechanics.branches.meeting import OPEN, Meeting, fate_of, go_on, meet, slid_back
+from tactile_bayes.mechanics.branches.phase import contact_at, slides, tip_touches
 from tactile_bayes.mechanics.branches.readings import (
     Course,
     Found,
@@ -101,7 +101,13 @@ def follow_branch(
         in_dip = event.snap_off > _NEVER
         step, pace = advance(here, setting, length, in_dip, work)
         if not step.is_sound:
-            break
+            if slides(here.scene.phase):
+                break
+            here = slid_back(here)
+            if not math.isfinite(here.begin.at.p):
+                break
+            length = FIRST_LENGTH
+            continue
         met = meet(here, step, in_dip, followed == 0, work)
         if not in_dip:
             followed = _grow(followed, here, setting, step, met, samples, workspace, found)

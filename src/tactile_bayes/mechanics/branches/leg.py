@@ -85,8 +85,9 @@ direction."""
 NOT_SLIPPING = 1e-9
 """Slip per length of a leg, or per travel, whose sense rounding may decide."""
 
-_TURNED = 1e-9
-"""Angle by which the force of a contact that sticks is beyond the cone [rad], and not by rounding at its beginning."""
+_BEYOND, _BEYOND_BEGIN = 1e-9, 1e-5
+"""Angle by which the force of a contact that sticks is beyond the cone [rad], and not by rounding; and on a leg that begins
+at its edge, where the force may move inward to second order only."""
 
 _MOST_HALVINGS = 60
 """Largest number of steps to where the slip vanishes."""
@@ -190,20 +191,35 @@ def _onward(nodes: Floats) -> Floats:
 def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -> Leg:
     """Leg from an equilibrium in the sense of a direction.
 
-    Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f.
+    Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f; where the contact
+    sticks, in that which changes most.
     """
-    tangent, loading, by_p = begin.tangent, 1.0 + begin.at.force, 1.0
-    if scene.phase != STUCK:
+    tangent, loading = begin.tangent, 1.0 + begin.at.force
+    if slides(scene.phase):
         spot = place(scene.outline, begin.at.p + math.copysign(NUDGE, onward.p))
         by_p = spot.speed * spot.speed + spot.bend * spot.bend
-    by_force = _BY_FORCE if scene.line is None else _BY_FORCE_ON_LINE
-    across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
+        by_force = _BY_FORCE if scene.line is None else _BY_FORCE_ON_LINE
+        across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
+    else:
+        across = _fastest(tangent, loading)
     size = length / math.sqrt(dot(across, tangent))
     if dot(across, onward) < 0.0:
         size = -size
     along = times(size, tangent)
     scale = 1.0 / (size * dot(across, tangent))
     return Leg(begin.at, along, times(scale, across))
+
+
+@compiled
+def _fastest(tangent: Equilibrium, loading: float) -> Equilibrium:
+    """Direction across which a contact that sticks is followed. A rod that hardly yields along itself turns the force
+    through the cone at once, and at the edge, where the slip has vanished, that begins with the square of p."""
+    force = tangent.force / loading
+    if abs(tangent.q) > max(abs(tangent.p), abs(force)):
+        return Equilibrium(0.0, tangent.q, 0.0)
+    if abs(tangent.p) > abs(force):
+        return Equilibrium(tangent.p, 0.0, 0.0)
+    return Equilibrium(0.0, 0.0, force / loading)
 
 
 @compiled
@@ -357,9 +373,10 @@ def change_of_mode(scene: Scene, leg: Leg, last: float, work: LegSeries) -> tupl
             return 2.0, begin
         return way, settle_on(scene, leg, way, guess(work, way), SETTLED)
     weighted(work.on_grid, work.series[REST], work.sampled)
+    most = abs(delta) + (_BEYOND if abs(leg.begin.q) < abs(delta) - _BEYOND else _BEYOND_BEGIN)
     for cell in range(1, work.grid.size):
         gamma = work.sampled[cell]
-        if abs(gamma) > abs(delta) + _TURNED:
+        if abs(gamma) > most:
             edge, sense = math.copysign(delta, gamma), math.copysign(1.0, gamma)
             way = _through(REST, edge, sense, cell, work)
             if way > last:

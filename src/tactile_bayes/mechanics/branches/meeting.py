@@ -14,6 +14,7 @@ from tactile_bayes.mechanics.branches.equilibrium import (
     balance,
     nowhere,
     settle,
+    settle_at,
     settle_at_limit,
 )
 from tactile_bayes.mechanics.branches.leg import (
@@ -42,13 +43,25 @@ from tactile_bayes.mechanics.branches.phase import (
     sliding_on,
     slip,
     stuck,
+    tip_touches,
+    touching,
     turned_over,
 )
-from tactile_bayes.mechanics.branches.scene import Anchor, Equilibrium, Scene, anchored, dot, on_line, times
+from tactile_bayes.mechanics.branches.scene import (
+    Anchor,
+    Equilibrium,
+    Scene,
+    anchored,
+    dot,
+    in_phase,
+    on_line,
+    times,
+    with_friction,
+)
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 
-__all__ = ["KNOT", "OPEN", "Meeting", "fate_of", "go_on", "in_mode", "meet"]
+__all__ = ["KNOT", "OPEN", "Meeting", "fate_of", "go_on", "in_mode", "meet", "slid_back"]
 
 _SMOOTHLY, KNOT, _PHASE, _LINE, _MODE = range(5)
 """How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase between tip and
@@ -213,6 +226,23 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
     off = along.q if was_sliding else slip(scene, begin.at, along)
     # Where the slip has vanished, the force moves from the edge of the cone to second order.
     return (changes and was_sliding) or sense * off <= NOT_SLIPPING, Here(scene, line, begin, before, onward, longest)
+
+
+@compiled
+def slid_back(here: Here) -> Here:
+    """Where a contact slides back that would stick for so little travel that rounding hides it, for a rod that is as good as
+    straight does not yield to a pull along it; NaN if it does not slide back."""
+    scene, line, begin, _, _, longest = here
+    contact, delta = contact_at(scene, begin.at), scene.rig.friction_angle
+    tip = tip_touches(scene.phase)
+    scene = with_friction(in_phase(scene, touching(tip)), -delta)
+    psi1 = contact.psi1 + contact.friction_angle + delta
+    at = Equilibrium(contact.p, psi1 if tip else contact.arclength, begin.at.force)
+    begin = settle_at(scene, contact.p, at)
+    onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
+    if math.copysign(1.0, delta) * slip(scene, begin.at, onward) < 0.0:
+        begin = nowhere()
+    return Here(scene, line, begin, nowhere(), onward, longest)
 
 
 @inlined
