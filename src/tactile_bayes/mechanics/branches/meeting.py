@@ -81,6 +81,9 @@ _NEVER, _FOLD, _CORNER, _THRUST, _RELEASE, _JUMP = (int(kind) for kind in SnapOf
 _RUNS_OUT = int(Reachability.RUNS_OUT)
 
 
+_HIDDEN = 1e-5
+"""Slip per travel in the wrong sense of a contact that has stuck for less than that."""
+
 _ROOM_PAST_LINE = 1.1
 """Largest travel of a leg on a line of the drive, over the travel up to its end: a path of 40 lines takes half the
 Newton steps that it takes without."""
@@ -240,7 +243,7 @@ def slid_back(here: Here) -> Here:
     at = Equilibrium(contact.p, psi1 if tip else contact.arclength, begin.at.force)
     begin = settle_at(scene, contact.p, at)
     onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
-    if math.copysign(1.0, delta) * slip(scene, begin.at, onward) < 0.0:
+    if math.copysign(1.0, delta) * slip(scene, begin.at, onward) < -_HIDDEN * abs(begin.rates.travel):
         begin = nowhere()
     return Here(scene, line, begin, nowhere(), onward, longest)
 
