@@ -29,6 +29,8 @@ _CONVERGED, _MOST_ITERATIONS = 1e-7, 12
 """Last step of Newton's method, after which the error is of the size of its square."""
 _SENSE = 1e-12
 """Slip against the sense of a state that is rounding."""
+_JUMP = 0.5
+"""Largest change of the force in a step, over one more than the force."""
 
 
 def _quadrature() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -145,6 +147,7 @@ class State(NamedTuple):
 
     kind: str
     mode: int
+    pose: np.ndarray
     phi: np.ndarray
     fx: float
     fy: float
@@ -152,6 +155,8 @@ class State(NamedTuple):
     s1: float
     offset: float
     slip: float
+    slipping: float
+    """Rate of the slip at the end of the step, times the step."""
     end: float
     """φ(s1)."""
     moment: float
@@ -238,17 +243,24 @@ class Stepper:
             largest = float(np.abs(change[:n]).max()) + abs(change[n + 2]) + abs(change[n + 3])
             if not largest < 5.0:
                 return None
-            share = min(1.0, 0.3 / largest)
+            share = 0.3 / max(largest, 0.3)
             phi = phi - share * change[:n]
             fx, fy, p, s1 = ((fx, fy, p, s1) - share * change[n:]).tolist()
             if not (0.0 < s1 < 1.5 and abs(p) < 3.0 and self.rod.taper * s1 < 0.99):
                 return None
             if largest + (abs(change[n]) + abs(change[n + 1])) / (1.0 + abs(fx) + abs(fy)) < _CONVERGED:
-                slip, sign = self.slip(self.contour.at(p), old, s1), float(np.linalg.slogdet(matrix)[0])
-                return State(
-                    kind, mode, phi, fx, fy, p, s1, old.offset, slip, *self.outcome(pose, phi, fx, fy, s1), sign
-                )
+                at, sign = self.contour.at(p), float(np.linalg.slogdet(matrix)[0])
+                by_drive = np.linalg.solve(matrix, self.driven(kind, pose - old.pose))
+                ends = self.slip(at, old, s1), at.speed * by_drive[n + 2] - old.side * by_drive[n + 3]
+                rest = self.outcome(pose, phi, fx, fy, s1)
+                return State(kind, mode, pose, phi, fx, fy, p, s1, old.offset, *ends, *rest, sign)
         return None
+
+    @staticmethod
+    def driven(kind: str, move: np.ndarray) -> np.ndarray:
+        """What a motion of the base takes off the equations."""
+        turn = move[2] if kind == "flank" else 0.0
+        return np.array([*[move[2]] * NODES, -move[0], -move[1], -turn, 0.0])
 
     def outcome(self, pose, phi, fx, fy, s1) -> tuple[float, float, float]:
         """φ(s1), M(0) and the elastic energy."""
@@ -268,12 +280,14 @@ class Stepper:
         """Whether an equilibrium obeys the inequalities, and lies near the state before it."""
         alpha, before = self.contour.at(new.p).alpha, self.contour.at(old.p).alpha
         across, along = self.pressed(new)
+        jump = math.hypot(new.fx - old.fx, new.fy - old.fy)
         return (
             across >= 0.0
             and (new.mode != 0 or abs(along) <= self.friction * across * (1.0 + 1e-9))
-            and (self.friction == 0.0 or new.mode * (new.slip - old.slip) >= -_SENSE)
+            and (self.friction == 0.0 or min(new.mode * (new.slip - old.slip), new.mode * new.slipping) >= -_SENSE)
             and (new.s1 <= 1.0 if new.kind == "flank" else math.sin(new.end - alpha) >= 0.0)
             and max(abs(alpha - before), abs(new.end - old.end), abs(new.s1 - old.s1)) < near
+            and jump < _JUMP * (1.0 + math.hypot(old.fx, old.fy))
             and ((new.kind, new.mode) != (old.kind, old.mode) or old.sign in (0.0, new.sign))
         )
 
@@ -320,5 +334,5 @@ class Stepper:
         p = self.contour.parameter(*self.rod.rest(np.array([s1]), pose)[:, 0])
         at, slope = self.contour.at(p), pose[2] + float(self.rod.turn(s1))
         offset, phi = math.pi * round((slope - at.alpha) / math.pi), pose[2] + self.rod.turn(s1 * X)
-        state = State(kind, 0, phi, 0.0, 0.0, p, s1, offset, 0.0, slope, 0.0, 0.0, 0.0)
+        state = State(kind, 0, pose, phi, 0.0, 0.0, p, s1, offset, 0.0, 0.0, slope, 0.0, 0.0, 0.0)
         return t, state._replace(slip=self.slip(at, state, s1))

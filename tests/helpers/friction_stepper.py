@@ -22,6 +22,9 @@ _NEAR, _STEEP = 0.2, 3.0
 before a fold."""
 _FINEST = 1e-8
 """Smallest step, as a share of the travel."""
+_TINY, _STRAIGHT = 1e-7, 30.0
+"""Share of the travel in which several ways lead on, and how fast they go: other equilibria do not come nearer with the
+step."""
 _FIRST = 30.0
 """Size of the first step in contact over the resolution: slip grows with the square of the travel there."""
 _UNLOADED = 1e-3
@@ -109,29 +112,32 @@ class _Run:
             self.part = 0.25 * part
             return
         if self.alternatives:
-            words = [f"{one.kind} {_MODES[one.mode]}" for one in self.found(self.resolution * self.drive.travel)]
+            tiny = min(part, _TINY * self.drive.travel)
+            ways = self.found(tiny, _STRAIGHT * tiny) if state.loaded else self.found(part)
+            words = [f"{one.kind} {_MODES[one.mode]}" for one in ways]
             if len(words) > 1:
                 self.say("either " + " or ".join(words))
-        if changed:
+        if changed or not state.loaded:
             self.say(f"{new.kind} {_MODES[new.mode]}")
         self.accept(new, self.t + part if part < target - self.t else target)
         self.part = 4.0 * part
 
-    def found(self, part: float) -> Iterator[State]:
-        near = min(_NEAR, _STEEP * math.sqrt(part / self.drive.travel))
+    def found(self, part: float, near: float | None = None) -> Iterator[State]:
+        """States at the end of a step, near the last one."""
+        near = near or min(_NEAR, _STEEP * math.sqrt(part / self.drive.travel))
         return self.stepper.next_states(self.state, self.drive.pose(self.t + part), near)
 
     def accept(self, new: State, t: float) -> None:
         """Take a state as the next one, with the energies by the trapezoidal rule."""
-        old, pose = self.state, self.drive.pose(t)
+        old = self.state
         mean = 0.5 * np.array([old.fx + new.fx, old.fy + new.fy, old.moment + new.moment])
-        self.work -= float(mean @ (pose - self.drive.pose(self.t)))
+        self.work -= float(mean @ (new.pose - old.pose))
         rubbed = 0.5 * (self.stepper.pressed(old)[1] + self.stepper.pressed(new)[1])
         self.dissipated -= rubbed * (new.slip - old.slip)
         self.t, self.state = t, new
         if abs(self.stepper.contour.at(new.p).alpha) >= 0.5 * math.pi:
             self.say("end of the contour", last=True)
-        elif self.stepper.clearance(new, pose) < _INSIDE:
+        elif self.stepper.clearance(new, new.pose) < _INSIDE:
             self.say("touches twice", last=True)
 
     def lose(self) -> None:
