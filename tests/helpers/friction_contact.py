@@ -24,7 +24,7 @@ from numpy.polynomial import legendre
 from scipy.optimize import brentq
 from scipy.special import ellipeinc
 
-NODES = 14
+NODES = 26
 _CONVERGED, _MOST_ITERATIONS = 1e-7, 12
 """Last step of Newton's method, after which the error is of the size of its square."""
 _SENSE = 1e-12

@@ -25,10 +25,14 @@ _FINEST = 1e-8
 _TINY, _STRAIGHT = 1e-7, 30.0
 """Share of the travel in which several ways lead on, and how fast they go: other equilibria do not come nearer with the
 step."""
+_APART = 1e-10
+"""Least distance of two different states."""
 _FIRST = 30.0
 """Size of the first step in contact over the resolution: slip grows with the square of the travel there."""
 _UNLOADED = 1e-3
 """Force below which contact that is lost was released, without a jump."""
+_SHARE = 1e-9
+"""Share of the samples' spacing that is rounding."""
 _INSIDE = -1e-7
 """Clearance below which a rod lies in the object."""
 _MODES = {0: "stick", 1: "slip+", -1: "slip-"}
@@ -114,9 +118,10 @@ class _Run:
         if self.alternatives:
             tiny = min(part, _TINY * self.drive.travel)
             ways = self.found(tiny, _STRAIGHT * tiny) if state.loaded else self.found(part)
-            words = [f"{one.kind} {_MODES[one.mode]}" for one in ways]
-            if len(words) > 1:
-                self.say("either " + " or ".join(words))
+            first, *others = list(ways) or [new]
+            apart = [abs(one.p - first.p) + abs(one.end - first.end) > _APART for one in others]
+            if any(apart):
+                self.say(" or ".join(f"{one.kind} {_MODES[one.mode]}" for one in (first, *others)))
         if changed or not state.loaded:
             self.say(f"{new.kind} {_MODES[new.mode]}")
         self.accept(new, self.t + part if part < target - self.t else target)
@@ -175,13 +180,15 @@ def step_through(case: dict[str, Any], *, resolution: float = 1e-5, alternatives
     drive = Drive(case["poses"])
     stepper = Stepper(Flexible(**case["rod"]), contour_of(case["contour"]), case["friction"])
     run, rows = _Run(stepper, drive, resolution, alternatives), []
-    samples = case["step"] * np.arange(math.floor(drive.travel / case["step"] + 1e-9) + 1)
-    for target in np.union1d(samples[samples < drive.travel], drive.knots).tolist():
+    samples = case["step"] * np.arange(math.floor(drive.travel / case["step"] + _SHARE) + 1)
+    apart = np.abs(samples - drive.knots[:, None]).min(axis=1) > _SHARE * case["step"]
+    samples = np.minimum(samples, drive.travel)
+    for target in np.union1d(samples, drive.knots[apart]).tolist():
         while run.t < target and not run.ended:
             run.touch(target) if run.state is None else run.step(target)
         if run.ended:
             break
-        if target in samples or target == drive.travel:
+        if target in samples:
             rows.append(run.sample())
     return History({name: np.array([row[name] for row in rows]) for name in rows[0]}, run.events)
 
