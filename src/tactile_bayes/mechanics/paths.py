@@ -22,7 +22,7 @@ from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = ["Paths", "States", "trace"]
+__all__ = ["Mode", "Paths", "States", "trace"]
 
 
 class States(NamedTuple):
@@ -40,6 +40,16 @@ class States(NamedTuple):
         """Return the states at indices, one for each axis."""
         wrench: list[Any] = [column[where] for column in self.wrench]
         return States(self.parameter[where], self.x[where], self.y[where], self.slope_angle[where], Wrench(*wrench))
+
+
+class Mode(NamedTuple):
+    """How rod and object touch along a part of a path."""
+
+    tip: bool
+    """True if the tip touches, else the rod."""
+    sticks: bool
+    to_right: bool
+    """True if it slips along the contour to the right; of one that sticks it is not defined, nor without friction."""
 
 
 @dataclass(frozen=True)
@@ -135,10 +145,15 @@ class Paths:
         shape (*index.shape,); NaN out of contact."""
         return _as_states(self.sampled[index, sample])
 
-    def changes_to_tip(self) -> list[list[bool]]:
-        """Return whether the phases of each path are tip contact."""
-        to_tip = (self.events[..., 0] == TIP).tolist()
-        return [of_path[:count] for of_path, count in zip(to_tip, self.phases.tolist(), strict=True)]
+    def modes(self) -> list[list[Mode]]:
+        """Return how each path touches, one after the other."""
+        column = {name: self.events[..., k] for k, name in enumerate(STATE_COLUMNS)}
+        to_right = (column["friction_angle"] < 0.0) != self.sweep_frame.mirrored[:, None]
+        found = zip(column["phase"] == TIP, column["sticks"] > 0.0, to_right, self.phases, strict=True)
+        return [
+            [Mode(*map(bool, one)) for one in zip(tip[:n], sticks[:n], right[:n], strict=True)]
+            for tip, sticks, right, n in found
+        ]
 
     def event_states(self) -> States:
         """Exact states at first contact, at the changes of the phase and at snap-off, shape (n, phases + 1).

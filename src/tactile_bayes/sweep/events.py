@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from tactile_bayes.mechanics.branches.line import lines_through
-from tactile_bayes.mechanics.paths import Paths
+from tactile_bayes.mechanics.paths import Mode, Paths
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Direction, Drive
@@ -24,11 +24,13 @@ class Event:
     Attributes
     ----------
     kind : str
-        At first contact "tip" or "tangential"; at a change "tip → tangential" and so on; at snap-off "fold" (a smooth
-        maximum of the drive angle, or of the travel), "corner" (a maximum where the phase changes or the contour's
-        curvature jumps) or "thrust" (the line of force passes through the pivot). A rod that is curved or carried
-        may also leave the contour without a jump ("release"), and one that is carried still touch it at the end of the
-        drive ("never").
+        At first contact "tip" or "tangential". At a change "tip → tangential" and so on; "stick" where the slip
+        vanishes and friction holds the contact, and "slip right" or "slip left" where it no longer does, after the
+        sense in which the rod then slips along the contour. At snap-off "fold" (a smooth maximum of the drive angle, or
+        of the travel), "corner" (a maximum where the phase changes or the contour's curvature jumps), "thrust" (the
+        line of force passes through the pivot) or "jump" (friction lets the contact neither slide nor stick). A rod
+        that is curved or carried may also leave the contour without a jump ("release"), and one that is carried still
+        touch it at the end of the drive ("never").
     travel : float
         Position along the drive: the drive angle of a rotation [rad], or the distance moved by the base [length].
     drive_angle, slope_angle : float
@@ -67,7 +69,7 @@ class SweepEvents:
         The pivot, or where the drive begins [length].
     first_contact, snap_off : Event
     transitions : tuple of Event
-        Changes of the phase, in their order.
+        Changes of the phase, and of sliding and sticking, in their order.
     clear : bool
         Whether the unloaded rod is clear of the object after snap-off. If it is not, the rod comes to rest in another
         contact, which no sweep reaches.
@@ -88,9 +90,19 @@ class SweepEvents:
     largest_strain: float
 
 
+_PHASES = {True: "tip", False: "tangential"}
+
+
+def _change(before: Mode, after: Mode) -> str:
+    """Name of a change between two parts of a path."""
+    if before.tip != after.tip:
+        return f"{_PHASES[before.tip]} → {_PHASES[after.tip]}"
+    return "stick" if after.sticks else f"slip {'right' if after.to_right else 'left'}"
+
+
 def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> SweepEvents:
-    phases = ["tip" if tip else "tangential" for tip in paths.changes_to_tip()[0]]
-    index = np.zeros(len(phases) + 1, dtype=np.intp)
+    modes = paths.modes()[0]
+    index = np.zeros(len(modes) + 1, dtype=np.intp)
     states = paths.event_states().take(index, np.arange(index.size))
     columns = to_lab_frame(paths.sweep_frame, index, states, rod)
     if np.any(paths.sweeps.compliance):  # the rod at its base has another direction than the drive
@@ -108,8 +120,8 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
         base, columns["travel"] = drive.base, columns["drive_angle"]
         columns["base_x"], columns["base_y"] = (np.full(index.size, value) for value in base)
     kinds = [
-        phases[0],
-        *(f"{before} → {after}" for before, after in pairwise(phases)),
+        _PHASES[modes[0].tip],
+        *(_change(before, after) for before, after in pairwise(modes)),
         SnapOff(int(paths.snap_off[0])).name.lower(),
     ]
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]

@@ -58,7 +58,8 @@ _IN_A_DIP = 1e-5
 """Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
 
 _ROUNDING, _ROUNDING_STUCK = 1e-14, 1e-11
-"""Tail of the series of a drive angle that its rounding leaves [rad], and where a contact sticks, which hardly yields."""
+"""Tail of the series of a drive angle that its rounding leaves [rad], and where a contact sticks, which hardly
+yields."""
 
 _RESOLVED_LOADS = 1e-10
 """Error of loads that no tolerance is below, over the loads: rounding may leave it where the rod bears on its base."""

@@ -96,7 +96,8 @@ class Balance(NamedTuple):
 
 
 class _Equations(NamedTuple):
-    """The two equations at a point, their derivatives, and those of travel, holding moment and direction of the force."""
+    """The two equations at a point, their derivatives, and those of travel, holding moment and direction of the
+    force."""
 
     miss_one: float
     miss_two: float
@@ -332,8 +333,8 @@ def settle_at(scene: Scene, p: float, start: Equilibrium) -> Balance:
 def unloaded(scene: Scene, start: Equilibrium, small: float) -> Balance:
     """Equilibrium without force, by Newton's method from a guess.
 
-    If the contact sticks, its force has no direction there. Direction and tangent are extrapolated from a small force and
-    its double, with errors of the cube and the square of these, and of their rounding.
+    If the contact sticks, its force has no direction there. Direction and tangent are extrapolated from a small force
+    and its double, with errors of the cube and the square of these, and of their rounding.
     """
     if slides(scene.phase):
         return settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED)

@@ -88,7 +88,8 @@ near as its first contact is found."""
 
 
 _SLIGHT = 1e-3
-"""Travel [rad or L] on which the sense of a slip is decided that vanishes to first order, as that of straight rods does."""
+"""Travel [rad or L] on which the sense of a slip is decided that vanishes to first order, as that of straight rods
+does."""
 
 
 class Approach(NamedTuple):

@@ -86,8 +86,8 @@ NOT_SLIPPING = 1e-9
 """Slip per length of a leg, or per travel, whose sense rounding may decide."""
 
 _BEYOND, _BEYOND_BEGIN = 1e-9, 1e-5
-"""Angle by which the force of a contact that sticks is beyond the cone [rad], and not by rounding; and on a leg that begins
-at its edge, where the force may move inward to second order only."""
+"""Angle by which the force of a contact that sticks is beyond the cone [rad], and not by rounding; and on a leg that
+begins at its edge, where the force may move inward to second order only."""
 
 _MOST_HALVINGS = 60
 """Largest number of steps to where the slip vanishes."""
@@ -191,8 +191,8 @@ def _onward(nodes: Floats) -> Floats:
 def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -> Leg:
     """Leg from an equilibrium in the sense of a direction.
 
-    Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f; where the contact
-    sticks, in that which changes most.
+    Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f; where the
+    contact sticks, in that which changes most.
     """
     tangent, loading = begin.tangent, 1.0 + begin.at.force
     if slides(scene.phase):
@@ -203,7 +203,7 @@ def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -
     else:
         across = _fastest(tangent, loading)
     size = length / math.sqrt(dot(across, tangent))
-    if dot(across, onward) < 0.0:
+    if dot(across if slides(scene.phase) else tangent, onward) < 0.0:
         size = -size
     along = times(size, tangent)
     scale = 1.0 / (size * dot(across, tangent))
@@ -289,8 +289,8 @@ def sample_leg(
     """Fit the series of a leg, unless the branch does not cut all planes, and return the equilibria at its last nodes.
 
     The search at a node starts from a polynomial through the nodes before it. If the series of a longer leg in the same
-    direction are at hand, of which this is the share `known` > 0, it starts from these. At the end of one that is released
-    there is no force.
+    direction are at hand, of which this is the share `known` > 0, it starts from these. At the end of one that is
+    released there is no force.
     """
     at_nodes, half = work.at_nodes, work.nodes.size
     settled = max(SETTLED, 0.1 * work.accuracy.last_step)

@@ -64,8 +64,8 @@ from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 __all__ = ["KNOT", "OPEN", "Meeting", "fate_of", "go_on", "in_mode", "meet", "slid_back"]
 
 _SMOOTHLY, KNOT, _PHASE, _LINE, _MODE = range(5)
-"""How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase between tip and
-rod, the end of a line of the drive, or sliding or sticking ends."""
+"""How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase between tip
+and rod, the end of a line of the drive, or sliding or sticking ends."""
 
 OPEN = -1
 """In place of a `SnapOff` as long as the end of a path is not known."""
@@ -156,8 +156,8 @@ def fate_of(step: Step, met: Meeting) -> int:
 
 @inlined
 def go_on(here: Here, setting: Setting, step: Step, met: Meeting, event: Any, work: LegSeries) -> Here:
-    """Where the branch goes on; NaN where it, the drive or the contour ends, or friction would not let it go on, which is
-    written."""
+    """Where the branch goes on; NaN where it, the drive or the contour ends, or friction would not let it go on, which
+    is written."""
     if event.snap_off > _NEVER:
         position, begin = _regained_at(here, step, met, event.snap_angle, work)
         if position == LOST:
@@ -233,8 +233,8 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
 
 @compiled
 def slid_back(here: Here) -> Here:
-    """Where a contact slides back that would stick for so little travel that rounding hides it, for a rod that is as good as
-    straight does not yield to a pull along it; NaN if it does not slide back."""
+    """Where a contact slides back that would stick for so little travel that rounding hides it, for a rod that is as
+    good as straight does not yield to a pull along it; NaN if it does not slide back."""
     scene, line, begin, _, _, longest = here
     contact, delta = contact_at(scene, begin.at), scene.rig.friction_angle
     tip = tip_touches(scene.phase)
