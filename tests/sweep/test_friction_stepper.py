@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import tactile_bayes as tb
 from helpers.friction_cases import drawn_case
 from helpers.friction_contact import Flexible
+from helpers.friction_scans import scanned
 from helpers.friction_stepper import contour_of, step_through
 
 LOADS = ("holding_moment", "force_x", "force_y")
-FAMILIES = {"circle": tb.contours.Circle, "ellipse": tb.contours.Ellipse, "parabola": tb.contours.Parabola}
 CIRCLE = {"family": "circle", "r": 0.4, "q": 0.6}
 PARABOLA = {"family": "parabola", "a": 0.6, "q": 0.45, "x_c": 0.1}
 TAPERED = {"taper": 0.5, "curvature": (-0.2, 0.3)}
@@ -24,20 +23,6 @@ CARRIED = [[0.8, -0.1, 1.2], [-0.4, -0.15, 1.5]]
 
 def case_of(rod, contour, friction, poses, step=0.02):
     return {"rod": rod, "contour": contour, "friction": friction, "poses": poses, "step": step}
-
-
-def scanned(case):
-    """The package's scan of a case."""
-    rod, contour = case["rod"], dict(case["contour"])
-    curvature, known = rod.get("curvature", (0.0,)), {}
-    if any(curvature):
-        known["rest_curvature"] = lambda s: np.polynomial.polynomial.polyval(s, curvature)
-    x, y, angle = np.transpose(case["poses"])
-    return tb.scan(
-        FAMILIES[contour.pop("family")](**contour),
-        drive=tb.Motion(x, y, angle, drive_step=case["step"]),
-        rig=tb.Rig(rod=tb.Rod(taper=rod.get("taper", 0.0), **known), unknown={"friction": case["friction"]}),
-    )
 
 
 def agree(case, tolerance):

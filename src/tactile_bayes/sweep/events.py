@@ -102,16 +102,18 @@ def _change(before: Mode, after: Mode) -> str:
 
 def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> SweepEvents:
     modes = paths.modes()[0]
-    index = np.zeros(len(modes) + 1, dtype=np.intp)
-    states = paths.event_states().take(index, np.arange(index.size))
+    held = [0] if modes[0].sticks else []
+    order = np.array([0, *held, *range(1, len(modes) + 1)])
+    index = np.zeros(order.size, dtype=np.intp)
+    states = paths.event_states().take(index, order)
     columns = to_lab_frame(paths.sweep_frame, index, states, rod)
     if np.any(paths.sweeps.compliance):  # the rod at its base has another direction than the drive
-        driven = paths.drive_angles_at(paths.event_travels()[0, : index.size])
+        driven = paths.drive_angles_at(paths.event_travels()[0, order])
         columns["drive_angle"] = np.pi - driven if direction == "backward" else driven
     clear, again = bool(paths.is_clear()[0]), np.nan
     if isinstance(drive, Carried):
         internal = lines_through(drive.poses, rod.length, backward=direction == "backward").travels
-        columns["travel"] = np.interp(paths.event_travels()[0, : index.size], internal, drive.travels)
+        columns["travel"] = np.interp(paths.event_travels()[0, order], internal, drive.travels)
         if paths.clear_angle[0] > paths.snap_angle[0]:
             clear, again = True, float(np.interp(paths.clear_angle[0], internal, drive.travels))
         columns["base_x"], columns["base_y"], _ = drive.at(columns["travel"]).T
@@ -121,6 +123,7 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
         columns["base_x"], columns["base_y"] = (np.full(index.size, value) for value in base)
     kinds = [
         _PHASES[modes[0].tip],
+        *("stick" for _ in held),
         *(_change(before, after) for before, after in pairwise(modes)),
         SnapOff(int(paths.snap_off[0])).name.lower(),
     ]

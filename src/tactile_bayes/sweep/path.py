@@ -34,13 +34,6 @@ of the object on one side seems to have passed it on the other."""
 
 _FREE = "without friction the rod has a path (friction = 0 under [unknown] of rig.toml); with it, "
 
-_SLIDING = (
-    "split a drive that turns back while the rod is in contact into drives that go one way, or take another heading or "
-    "drive angle",
-    "take a rod that is less curved toward the object, the other direction, or another pivot",
-)
-"""What to do where friction would hold a rod that is carried, and one that turns about a pivot."""
-
 _IN_CONTACT: dict[Reachability, tuple[type[TactileBayesError], str]] = {
     Reachability.GRAZES: (
         ReachError,
@@ -189,13 +182,11 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 "(are contour, drive and rod in one unit?)"
             )
         case Reachability.STICKS:
-            free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)
-            is_free = Reachability(int(free.reach[0])) is Reachability.TOUCHES
             raise ReachError(
-                f"{sweep} friction would hold the contact at {_point(paths)}: the rod would have to slide the other "
-                "way there, or would not slide at first, and sticking is not modelled; "
-                + (_FREE if is_free else "")
-                + _SLIDING[not is_carried]
+                f"{sweep} friction lets the rod neither slide nor yield at {_point(paths)}, where it meets the object "
+                "head-on, as a strut that buckles to either side; "
+                + (_FREE if _is_free(paths, rod) else "")
+                + "take another heading or drive angle, or another pivot"
             )
         case Reachability.TOO_FAR:
             raise ReachError(
@@ -224,6 +215,12 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 f"{sweep} the rod would still touch at {_end(contour, direction == 'backward')}, and "
                 "nothing is known of the object beyond: extend the contour, or move the pivot"
             )
+
+
+def _is_free(paths: Paths, rod: Rod) -> bool:
+    """True if there is a path without friction."""
+    free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)
+    return Reachability(int(free.reach[0])) is Reachability.TOUCHES
 
 
 def _point(paths: Paths) -> str:

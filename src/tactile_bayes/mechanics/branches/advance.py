@@ -54,6 +54,9 @@ and in arc length [L]."""
 _PAST_TIP = 1e-6
 """Share of a leg by which it passes the tip of a rod that is not smooth there."""
 
+_SCATTER = 1e-12
+"""Distance from a knot, in the contour's parameter, which rounding does not pass where a leg ends."""
+
 _IN_A_DIP = 1e-5
 """Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
 
@@ -113,7 +116,7 @@ class Step(NamedTuple):
 def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: LegSeries) -> tuple[Step, float]:
     """Next leg, at most as long as given, and the factor of the length of the one after it."""
     exact = work.accuracy.exact
-    least, known, before, pace = LONGEST * 0.5**work.accuracy.halvings, 0.0, math.inf, 1.0
+    least, known, before, pace, is_noise = LONGEST * 0.5**work.accuracy.halvings, 0.0, math.inf, 1.0, False
     for _ in range(_MOST_TRIES):
         step = _trial(here, setting, length, known, work)
         excess = _excess(in_dip, slides(here.scene.phase), work) if step.is_sound else math.inf
@@ -121,7 +124,7 @@ def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: Leg
         # Rounding, which a shorter leg does not make smaller.
         is_noise = 0.5 * before < excess < (_NOISE if exact else 1.0)
         if is_noise:
-            pace = _MOST_PACE
+            pace = max(pace, 1.0)
         if excess <= _ACCEPT or is_noise or step.length <= (least if step.is_sound else _SHORTEST):
             break
         share, before = min(pace, _BACK), excess
@@ -129,7 +132,7 @@ def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: Leg
             share = _up_to_tip(here.scene, step.leg, share, work)
         length, known = share * step.length, share if step.is_sound else 0.0
     # Rounding where a contact that sticks hardly yields: others would all be as short.
-    is_stiff = step.length <= least and not slides(here.scene.phase)
+    is_stiff = not slides(here.scene.phase) and (step.length <= least or is_noise)
     return step, _MOST_PACE if is_stiff else pace
 
 
@@ -159,7 +162,8 @@ def _trial(here: Here, setting: Setting, length: float, known: float, work: LegS
         knot, node = first_knot(scene, leg, setting.knots, setting.ends[0], work)
         if node <= 1.0:  # rates at the end are those before the knot
             at_knot = settle_at(scene, knot, guess(work, node))
-            share = share_of(leg, at_knot) * (1.0 - NUDGE)
+            share = share_of(leg, at_knot)
+            share -= max(NUDGE * share, _SCATTER / abs(leg.along.p))
             is_sound, is_released = share > 0.0, False
             if is_sound:
                 leg, length = shortened(leg, share), share * length
