@@ -31,7 +31,7 @@ from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import expanded
 
-__all__ = ["Sampled", "calibrate_rig", "contours_of", "infer_contour", "rig_posterior", "sampled"]
+__all__ = ["Sampled", "calibrate_rig", "contours_of", "infer_contour", "sampled"]
 
 _PRIOR_SECONDS = 3.0  # time limit for draws from the prior [s] if time is limited, since a rod may reach few contours
 
@@ -211,27 +211,12 @@ def calibrate_rig(
     ['rigidity_scale']
     """
     settings, rig = settings_of(settings), rig_of(rig)
-    posterior = rig_posterior(records, contour, rig, rng, settings, checkpoint, progress, keep)
-    found = rig_prior(posterior)
-    left = {name: value for name, value in expanded(rig.entries).items() if name not in found.priors}
-    return replace(rig, unknown=left, calibration=found)
-
-
-def rig_posterior(
-    records: xr.Dataset,
-    contour: Contour,
-    rig: Rig,
-    rng: Rng,
-    settings: SamplerSettings,
-    checkpoint: str | os.PathLike[str] | None = None,
-    progress: Callable[[Progress], object] | None = None,
-    keep: Callable[[xr.DataTree], object] | None = None,
-) -> xr.DataTree:
-    """Return the posterior of a rig's parameters from a record of a gauge; see `calibrate_rig`."""
     experiment = Experiment(records, rig, events=settings.events, gauge=Gauge(contour))
     if not experiment.unknowns.names:
         raise ParameterError("nothing of the rig is unknown: say that one of its parameters is, like rigidity_scale")
-    return _posterior_of(experiment, rng, settings, checkpoint, progress, keep)
+    found = rig_prior(_posterior_of(experiment, rng, settings, checkpoint, progress, keep))
+    left = {name: value for name, value in expanded(rig.entries).items() if name not in found.priors}
+    return replace(rig, unknown=left, calibration=found)
 
 
 def _posterior_of(
@@ -313,10 +298,7 @@ def sampled(
 def _likeliest(
     problem: ContourProblem, seed: np.random.SeedSequence, settings: SamplerSettings, deadline: Deadline
 ) -> tuple[ContourProblem, Walk]:
-    """Return the problem with the most evidence, of those with all sides of contact, and the start of its walkers.
-
-    Its attributes state the sides of contact and their probability.
-    """
+    """Return the problem with the most evidence of those with all sides of contact, and the start of its walkers."""
     if not problem.others:
         return problem, walk_of(problem.model, seed, settings, deadline)
     found: list[tuple[float, ContourProblem, Walk]] = []

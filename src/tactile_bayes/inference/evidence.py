@@ -52,28 +52,19 @@ def bridge_evidence(
     *,
     proposals: int = _PROPOSALS,
 ) -> Evidence:
-    """Return the logarithm of the integral of a density, from draws of it.
+    """Return the logarithm of the integral of a density, from draws (chains, n, d), walker-major, and their values.
 
     With density f = Z p and draws of p and of a normalised density q like it,
 
         Z = E_q[f h]/E_p[q h],  h = 1/(s f/Z + (1 − s) q),  s = n/(n + m),
 
-    for n effective draws of p and m draws of q; this h has the least error (Meng & Wong 1996, Statistica Sinica 6, 831;
-    Gronau et al. 2017, doi 10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and compared with the
-    other, since a comparison with the fitted draws is biased (Overstall & Forster 2010, doi
-    10.1016/j.csda.2010.03.008). The result is the mean over both assignments of the halves. Its standard error has both
-    terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with the autocorrelation of the terms.
-    The errors due to the fits are common to both results and do not average out; only the error that is independent of
-    the fit does, whose share is estimated by the correlation of the terms under both fits. In tens of dimensions that
-    is slightly too small, and makes the standard error up to a quarter too large.
-
-    q is a normal distribution of normal scores, each piecewise linear in one parameter, to account for hard bounds and
-    skewness of single parameters; or in one of the uncorrelated axes nearest to the parameters, if the draws are more
-    probable under that fit. For normal densities in 40 dimensions and 500 independent draws in each half the error is a
-    sixth larger than with a plain normal fit; with 15 half-normal parameters among them it is half as large. A t
-    distribution and a symmetrised density (Warp-III of Meng & Schilling 2002, at equal evaluations) gained nothing.
-
-    Shapes: draws (chains, n, d), walker-major, log_densities (chains, n).
+    for n effective draws of p and m of q (Meng & Wong 1996, Statistica Sinica 6, 831; Gronau et al. 2017, doi
+    10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and compared with the other, and vice versa: a
+    comparison with the fitted draws is biased (Overstall & Forster 2010, doi 10.1016/j.csda.2010.03.008). The error has
+    both terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with autocorrelation; only what does
+    not depend on the fit averages out. In tens of dimensions it is up to a quarter too large. q is normal in scores
+    that are piecewise linear in one parameter, for hard bounds and skewness, or in one of the uncorrelated axes nearest
+    to the parameters. Neither t distributions nor a symmetrised density (Warp-III) gained anything.
     """
     count = proposals // 2
     _refuse_few(draws)
@@ -108,10 +99,9 @@ class ContourEvidence(NamedTuple):
 
 
 def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Generator) -> ContourEvidence:
-    """Return the evidence of a model by bridge sampling, in the coordinates of the sampler.
+    """Return the evidence of a model by bridge sampling, with the prior restricted to contours within reach.
 
-    The prior is restricted to contours within reach, as in the generator, so that the integral over all contours is
-    divided by their share. With priors of other widths, the evidence follows from the same draws by importance weights.
+    With priors of other widths, the evidence follows from the same draws by importance weights.
     """
     coordinates, (chains, _, size) = sampled.coordinates, sampled.draws.samples.shape
     kept = sampled.draws.evenly(_POSTERIOR_DRAWS // chains)
@@ -144,11 +134,7 @@ def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Gener
 
 
 def _fitted(points: Floats) -> _Fit:
-    """Return the fit to points, shape (n, d), along the axes that make them more probable.
-
-    Axes along the parameters resolve hard bounds. If the parameters are so strongly correlated that errors of their
-    scores exceed the remaining variance, the nearest uncorrelated axes are better.
-    """
+    """Return the fit to points, (n, d), along parameters, which resolves bounds, or uncorrelated axes: the likelier."""
     deviation = points.std(axis=0)
     same = np.flatnonzero(deviation <= 0.0)
     if same.size:
@@ -235,8 +221,8 @@ class _Bridge(NamedTuple):
 def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
     """Return the bridge estimate from log f − log q at draws of f, shape (chains, n), and of q, shape (m,).
 
-    Draws and proposals enter by logistic functions, whose sums over both are equal at the threshold log Z + log(m/n);
-    one increases with the threshold and the other decreases (Bennett 1976, doi 10.1016/0021-9991(76)90078-4).
+    The sums of logistic functions over both are equal at the threshold log Z + log(m/n) (Bennett 1976, doi
+    10.1016/0021-9991(76)90078-4).
     """
     if not np.any(np.isfinite(proposed)):
         raise InferenceError(

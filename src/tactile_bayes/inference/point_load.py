@@ -122,10 +122,7 @@ class _Model:
         return (curvature / self.unit_curvature)[..., None] ** np.arange(_POWERS)
 
     def coefficients(self, curvature: Floats, noise_sd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the posterior mean of the sensor's coefficients, R of its precision RᵀR/σ², and the sum of squares.
-
-        The prior is four more observations of zero; QR loses fewer digits than normal equations.
-        """
+        """Return the posterior mean of the sensor's coefficients, R of its precision RᵀR/σ², and the sum of squares."""
         powers = self.powers(curvature)
         ridge = (noise_sd / self.coefficient_sd)[:, None, None] * np.eye(_POWERS)
         q, r = np.linalg.qr(np.concatenate([powers, ridge], axis=1))
@@ -137,8 +134,7 @@ class _Model:
     def log_probability(self, points: Floats) -> Floats:
         """Return the log of prior times marginal likelihood of points, shape (n, parameters), in shape (n,).
 
-        The readings are normal with covariance σ² I + S² B Bᵀ, B the powers of the curvature and S the coefficients'
-        prior sd; with λ = σ²/S² its determinant is σ^(2n) λ^(−4) det(BᵀB + λ I).
+        With λ = σ²/S², S the coefficients' prior sd, the covariance's determinant is σ^(2n) λ^(−4) det(BᵀB + λ I).
         """
         values = np.zeros(len(points))
         for i, prior in enumerate(self.priors.values()):
@@ -351,11 +347,12 @@ def infer_point_load(
             "clamp along the undeflected rod, or widen the priors"
         )
     start = scatter_walkers(
-        lambda points: np.where(model.log_probability(points) > cloud.floor, 0.0, -np.inf),
+        model.log_probability,
         cloud.draw,
         parameters=len(model.names),
         seed=for_walkers,
         settings=settings,
+        floor=lambda: cloud.floor,
     )
     draws = sample(
         model.log_probability, start, names=model.names, seed=for_walkers, settings=settings, progress=progress
@@ -415,11 +412,10 @@ def _sum_of_squares(residuals: Floats) -> Floats:
 
 
 def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats] = _sum_of_squares) -> float:
-    """Return the posterior predictive p-value of a discrepancy.
+    """Return the posterior predictive p-value of a discrepancy of residuals over the noise.
 
-    For each draw the discrepancy is computed from the residuals over the noise, of the real readings and of predicted
-    ones (Gelman, Meng and Stern 1996, Statistica Sinica 6, 733). If the model holds, the p-value lies closer to one
-    half than a uniform number does.
+    If the model holds, it is closer to one half than a uniform number (Gelman, Meng & Stern 1996, Statistica Sinica 6,
+    733).
     """
     posterior = tree["posterior"].to_dataset()
     if "noise_sd" in posterior:

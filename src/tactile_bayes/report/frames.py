@@ -93,10 +93,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     numbers = record.sweep.values
     every = max(1, -(-numbers.size // most))
     samples = np.concatenate([rows[::every] for rows in rows_of_sweeps(numbers)])
-    batch_indices = np.empty(numbers.size, dtype=np.intp)
-    for index, segment in enumerate(likelihood.segments):
-        batch_indices[segment.samples] = index
-    batch_index = batch_indices[samples]
+    batch_index = likelihood.segments.of_sample[samples]
     mirrored = paths.sweep_frame.mirrored[batch_index]
     read = record.drive_angle.values - cell.misread(record.direction.values)
     angle = (read - likelihood.misread(rig)[0])[samples]
@@ -114,8 +111,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rod.mirrored(sign))
     loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
     base_x, base_y = (record[name].values[samples] for name in ("base_x", "base_y"))
-    of_sample = likelihood.segments.of_sample
-    first = np.array([segment.base for segment in likelihood.segments])[of_sample[samples]]
+    first = likelihood.segments.bases[batch_index]
     base_x = paths.sweep_frame.base_x[batch_index] + base_x - first[:, 0]
     base_y = paths.sweep_frame.base_y[batch_index] + base_y - first[:, 1]
     return Motion(

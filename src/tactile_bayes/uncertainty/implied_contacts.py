@@ -184,14 +184,14 @@ def contacts_of(
     Drive angles, shape (samples,), are readings corrected by the data sheet; NaN where no contact is sought. With
     ``exact=False`` the events are found to 1e-6 rad, at a quarter of the cost.
     """
-    count, segments = contours.shape[0], likelihood.segments
+    count, segments = contours.shape[0], likelihood.segments.samples
     travels = np.broadcast_to(likelihood.travels(angle, rig), (count, angle.size))
-    shape = (len(segments), max(segment.samples.size for segment in segments))
+    shape = (len(segments), max(own.size for own in segments))
     samples = np.zeros(shape, dtype=np.intp)
     in_sweep_frame = np.full((shape[0], count, shape[1]), np.nan)
-    for which, of_segment, segment in zip(samples, in_sweep_frame, segments, strict=True):
-        which[: segment.samples.size] = segment.samples
-        of_segment[:, : segment.samples.size] = travels[:, segment.samples]
+    for which, of_segment, own in zip(samples, in_sweep_frame, segments, strict=True):
+        which[: own.size] = own
+        of_segment[:, : own.size] = travels[:, own]
     paths = likelihood.paths(contours, rig, exact=exact, drive_angles=in_sweep_frame.reshape(-1, shape[1]))
     batch_index, rank, states = paths.loaded_states()
     columns = to_lab_frame(paths.sweep_frame, batch_index, states, likelihood.rod)

@@ -18,11 +18,9 @@ _LOST_BELOW = 10.0  # distance of a lost walker's largest log-probability below 
 
 
 def lost_walkers(values: Floats) -> Flags:
-    """Return True for walkers far less probable than the rest, shape (chain, walker), from their log-probabilities.
+    """Return True for walkers far less probable than the rest, (chain, walker), from their log-probabilities.
 
-    R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails of the
-    result. Fewer than one in thousands of draws from a posterior is so improbable, and practically never the most
-    probable of a walker's many draws.
+    R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails.
     """
     if not values.shape[1]:
         return np.zeros((len(values), values.shape[2]), dtype=bool)
@@ -83,10 +81,7 @@ def walker_major(samples: Floats) -> Floats:
 
 
 def autocorrelation_time(samples: Floats) -> Floats:
-    """Return emcee's τ [steps] of samples (chain, step, walker, parameter), averaged over chains.
-
-    All walkers are computed at once: `emcee.autocorr.integrated_time` takes them one by one, as slow as a short run.
-    """
+    """Return emcee's τ [steps] of samples (chain, step, walker, parameter), all walkers at once, mean over chains."""
     chains, steps, _, parameters = samples.shape
     if steps < 2:
         return np.full(parameters, np.nan)

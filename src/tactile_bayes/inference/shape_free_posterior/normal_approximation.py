@@ -43,10 +43,7 @@ def scale_names(model: ContourModel) -> tuple[str, ...]:
 
 
 def linear_names(model: ContourModel) -> tuple[str, ...]:
-    """Return the parameters in which loads are linearised, r by its logarithm: all but those of `scale_names`.
-
-    Those that may vanish come last.
-    """
+    """Return the parameters in which loads are linearised, r by its logarithm; those that may vanish come last."""
     rough = [name for name in model.family.parameters if name not in _OF_ROUGHNESS]
     return (*rough, *sorted(model.unknowns.names, key=MAY_VANISH.__contains__))
 
@@ -118,13 +115,11 @@ class _Observations(NamedTuple):
 
 
 class NormalApproximation:
-    """Normal distribution of the linear parameters, given amplitude and length scale of the random radius, and noise.
+    """Normal distribution of the linear parameters, given amplitude, length scale and noise, `scales` of the model.
 
-    It is exact if loads and snap-offs are linear in the logarithms of the radii and in the rig, and priors are normal.
-    Loads are linearised at a point, `scales` and `linear`; they are rather linear in parameters with the vertex moved
-    by `bent`, if what the record touches is beside it. The dependence on the length scale is tabulated at those of the
-    random radius, and interpolated. Parameters that may vanish, like friction, have the positive part of the
-    distribution alone.
+    It is exact if loads and snap-offs are linear in the log-radii and in the rig, with the vertex moved by `bent`, and
+    priors are normal. Loads are linearised at a point; over the length scale, the map is interpolated. Parameters that
+    may vanish, like friction, have the positive part of the distribution alone.
     """
 
     def __init__(self, observer: Observer, prior: LinearPrior, scales: Floats, linear: Floats) -> None:
@@ -166,10 +161,7 @@ class NormalApproximation:
         return self._radius.log_radius(linear[:, 0], scales[:, 0], scales[:, 1], linear[:, 1 : 1 + self._count])
 
     def bent(self, scales: Floats, linear: Floats, *, back: bool = False) -> Floats:
-        """Return linear parameters, (n, d), with the vertex where the contour's anchor is as a linear map has it.
-
-        With `back`, return those of which this makes the given ones.
-        """
+        """Return linear parameters, (n, d), with the vertex where the anchor is as a linear map has it, or back."""
         beyond = self._anchor.beyond_line(self._log_radius(scales, linear))
         bent = linear.copy()
         bent[:, self._vertex] += beyond if back else -beyond
@@ -186,8 +178,7 @@ class NormalApproximation:
         return np.swapaxes(through, 1, 2), certainty
 
     def nearest(self, scales: Floats) -> Floats:
-        """Return the linear parameters, (d,), with which a contour of other scales, (scales,), is nearest the centre:
-        first of all in what is observed, then in the logarithms of the radii."""
+        """Return the linear parameters, (d,), that observe most like the centre at other scales, (scales,)."""
         (through,), (certainty,) = self._information(scales[None])
         each = np.eye(self.prior.mean.size)
         radii = self._log_radius(np.tile(scales, (len(each), 1)), each).T
@@ -202,7 +193,7 @@ class NormalApproximation:
         return upper[:, :-1, -1], np.swapaxes(upper[:, :-1, :-1], 1, 2)
 
     def _triangular(self, scales: Floats) -> Floats:
-        """Return Lᵀ with L⁻¹b as its last column, and below that the root of the least sum of squares, up to its sign.
+        """Return Lᵀ with L⁻¹b as last column, and below that the root of the least squares, up to sign.
 
         Orthogonal transformations keep the digits that squares lose, as precisions differ by factors of up to 1e15.
         """
@@ -242,10 +233,9 @@ class NormalApproximation:
         return np.asarray(there)
 
     def truncated(self, pulled: Floats, root: Floats, normal: Floats) -> tuple[Floats, Floats]:
-        """Return standard normal numbers, (n, d), as those by which parameters that may vanish are positive, and the
-        log of the determinant of that map, (n,); `conditional` gives the other arguments.
+        """Return numbers, (n, d), for which parameters that may vanish are positive, and the log-determinant, (n,).
 
-        Since these parameters come last and Lᵀ is upper triangular, each depends on its own number and later ones only.
+        These come last and Lᵀ is upper triangular, so that each depends on its own number and later ones only.
         """
         normal, growth = normal.copy(), np.zeros(len(normal))
         for k, least in self._least(pulled, root, normal):
@@ -284,9 +274,8 @@ class NormalApproximation:
 def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> _Observations:
     """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
 
-    Differences along the parameters give rough slopes: loads may exceed the noise so far that a step which is small for
-    one direction leaves another one to rounding errors. Their singular vectors are directions in which steps of about
-    a standard deviation give better ones.
+    Differences along the parameters give rough slopes, and steps of about a deviation along their singular vectors
+    better ones.
     """
     model = observer.model
     rig = linear_names(model)[prior.mean.size - len(model.unknowns.names) :]

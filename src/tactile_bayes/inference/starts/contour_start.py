@@ -69,10 +69,7 @@ class Walk(NamedTuple):
 def walk_of(
     model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings, deadline: Deadline = NEVER
 ) -> Walk:
-    """Return walkers scattered more widely than the posterior, around optima that are found from the record alone.
-
-    After the deadline every search ends with its present step, and walkers start at any point of finite density.
-    """
+    """Return walkers scattered more widely than the posterior, around optima that are found from the record alone."""
     start = _Start(model, seed, np.random.default_rng(seed), settings, deadline)
     return start.whitened() if isinstance(model.family, ShapeFreeFamily) else start.scattered()
 
@@ -140,11 +137,12 @@ class _Start(NamedTuple):
         if not cloud.is_possible:
             raise InferenceError("nothing near is possible")
         start = scatter_walkers(
-            lambda points: np.where(log_probability(points) > cloud.floor_by(deadline), 0.0, -np.inf),
+            log_probability,
             cloud.draw,
             parameters=count,
             seed=self.seed,
             settings=replace(self.settings, walkers=self.settings.walkers or max(48, 2 * count)),
+            floor=lambda: cloud.floor_by(deadline),
         )
         # If posteriors are standard normal in these coordinates, evidences differ as densities at the centre.
         log_evidence = float(log_probability(whitening.middle[None])[0])
@@ -161,9 +159,6 @@ class _Start(NamedTuple):
         common = modes[0].coordinates
         proposal = Mixture(tuple(mode.proposal for mode in modes))
 
-        def floor() -> float:
-            return min(mode.cloud.floor_by(deadline) for mode in modes)
-
         def draw(rng: np.random.Generator, count: int) -> Floats:
             counts = rng.multinomial(count, proposal.shares)
             points = [mode.cloud.draw(rng, int(each)) for mode, each in zip(modes, counts, strict=True)]
@@ -171,11 +166,12 @@ class _Start(NamedTuple):
 
         try:
             start = scatter_walkers(
-                lambda points: np.where(model.log_probability(points) > floor(), 0.0, -np.inf),
+                model.log_probability,
                 draw,
                 parameters=len(model.names),
                 seed=self.seed,
                 settings=self.settings,
+                floor=lambda: min(mode.cloud.floor_by(deadline) for mode in modes),
             )
         except InferenceError as error:
             point = modes[0].optimum.point
@@ -220,11 +216,7 @@ class _Modes:
         self._own = model.coordinates
 
     def found_by_search(self) -> list[_Mode]:
-        """Return modes of the posterior, that with the most mass first.
-
-        There is one if it explains a record of many loaded samples; else there are all to which searches lead, except
-        those of little mass.
-        """
+        """Return modes, that with the most mass first: one if it explains many loaded samples, else all of mass."""
         found = self.found
         for optimum in sorted(self._not_explaining(), key=lambda one: one.cost):
             least = min((mode.optimum.cost for mode in found), default=optimum.cost)
@@ -268,10 +260,7 @@ class _Modes:
         return any(np.linalg.norm(mode.proposal.steps(mode.coordinates.of(point))) < far for mode in self.found)
 
     def _around(self, optimum: ContourOptimum) -> _Mode:
-        """Approximate a mode around an optimum, in the coordinates in which the posterior is nearer to a normal one.
-
-        Modes on the same flank share the coordinates of the first.
-        """
+        """Approximate a mode in the coordinates in which it is nearer to normal; modes on a flank share them."""
         model, point = self.model, optimum.point
         usual = self._in(self._own, optimum, optimum.covariance, model.walked_ends)
         if usual.proposal.efficiency > _EFFICIENT or self.deadline.has_passed:

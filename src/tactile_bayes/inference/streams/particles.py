@@ -38,8 +38,7 @@ _RISING = 3.0
 class Mover:
     """Moves particles by distributions fitted to half of them, now and then by differences.
 
-    `rises` says whether the mean log-density rose in the last step of a fitted distribution by more than chance
-    explains.
+    `rises`: the mean log-density rose in the last step of a fitted distribution by more than chance explains.
     """
 
     def __init__(self, model: ContourModel, random: np.random.RandomState) -> None:
@@ -88,9 +87,9 @@ _MOST_STAGES = 200  # of an update
 class Particles:
     """Weighted particles of the record so far, from those of the record before, or from the prior (None).
 
-    `log_weights` are normalised, `values` and `log_integral` are logarithms of prior times likelihood and of its
-    integral over contours within reach; `correlation`, `shift`, `rise` are as in `Stream.update`; `log_ratios` are
-    predictive densities of the new samples with wider noise, over those with the model's.
+    `log_integral` is that of prior times likelihood over contours within reach; `log_ratios` are predictive densities
+    of the new samples with wider noise, over those with the model's; `correlation`, `shift`, `rise` are as in
+    `Stream.update`.
     """
 
     def __init__(self, model: ContourModel, old: StreamState | None, count: int, random: np.random.Generator) -> None:
@@ -130,9 +129,9 @@ class Particles:
         return np.stack(columns, axis=1)
 
     def _with_wider_noise(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the log-density of points, and the log-likelihood of the new samples with wider noise.
+        """Return the log-density of points, (n,), and that of new samples with wider noise, (n, factors).
 
-        Shapes are (n,) and (n, factors). It is NaN if there is a discrepancy, which may couple a sample to later ones.
+        It is NaN if there is a discrepancy, which may couple a sample to later ones.
         """
         model = self.model
         values, wider = model.log_prior(points), np.full((len(points), len(WIDER)), -np.inf)
@@ -246,10 +245,7 @@ class Particles:
 
 
 def _is_continued(before: ContourModel | None, model: ContourModel) -> bool:
-    """Return True if the first samples of a record have the paths that they had before it was continued.
-
-    They have others if new samples changed the side of a contact, or, where the base is carried, the line of the drive.
-    """
+    """Return True if a record's first samples have their paths as before: the same sides, and no carried base."""
     if before is None or model.likelihood.segments.is_carried:
         return False
     sides = before.likelihood.segments.signs_of_samples

@@ -409,7 +409,7 @@ def _share_within_reach(model: ContourModel, old: StreamState | None, random: np
     before = None if old is None else old.experiment.model
     if old is None or before is None or model.likelihood.segments.is_carried or before.names != model.names:
         return model.share_within_reach(random, _PRIOR_DRAWS)
-    is_same = before.likelihood.segments.contacts == model.likelihood.segments.contacts
+    is_same = np.array_equal(before.likelihood.segments.contacts, model.likelihood.segments.contacts)
     return old.share if is_same else model.share_within_reach(random, _PRIOR_DRAWS)
 
 
