@@ -68,7 +68,7 @@ class ContactDensity:
 
     @property
     def ways(self) -> Floats:
-        """Ranges of the way on tip, tangential and, unless rods are straight, over-turned tip contact; (branches, 2)."""
+        """Ranges of the way: tip, tangential and, unless rods are straight, over-turned tip, (branches, 2)."""
         normal = 0.5 * np.pi + self.delta
         branches = [(0.0, normal), (-1.0, 0.0), (normal, np.pi)]
         return np.array(branches[:2] if self.samples.rods.are_straight else branches)

@@ -16,10 +16,11 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates.base import in_coordinates
 from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal, effective_number, normalised
 from tactile_bayes.inference.ensembles.moves import FittedMove, step_ensembles
+from tactile_bayes.inference.streams.e_value import WIDER
 from tactile_bayes.inference.streams.stream_state import StreamState
 from tactile_bayes.numerics.selection import resampled
 
-__all__ = ["DECORRELATED", "LOST_ONCE", "SETTLED", "WIDER", "Mover", "Particles"]
+__all__ = ["DECORRELATED", "LOST_ONCE", "SETTLED", "Mover", "Particles"]
 
 # Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28
 # samples of a double sweep were accepted, 0.20 of those of 4 parts, 0.29 of 12, and 0.05 of a single distribution.
@@ -80,7 +81,6 @@ DECORRELATED, _BRIDGED = 0.2, 0.35
 SETTLED = 0.4
 LOST_ONCE = 1.2  # that increase in any stage, of particles that lost the posterior: evidences were then too small by 7
 _MOST_STEPS, _BRIDGE_STEPS = 40, 10  # after these stages; up to the first one while the log-density rises
-WIDER = (1.5, 3.0, 6.0)  # factors on the noise of the alternatives with which the e-value compares the model
 _MOST_STAGES = 200  # of an update
 
 

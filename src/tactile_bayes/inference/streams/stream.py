@@ -12,12 +12,11 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_function, check_numbers, check_path, check_whole_number
-from tactile_bayes.errors import InferenceError, RecordError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import identity_of
@@ -27,15 +26,17 @@ from tactile_bayes.inference.ensembles.checkpoint import changes
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import STREAMED, provenance
-from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, WIDER, Particles
+from tactile_bayes.inference.streams.e_value import surprise_after
+from tactile_bayes.inference.streams.growing_record import continued
+from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, Particles
 from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, tree_of
 from tactile_bayes.numerics.random_numbers import Rng, child, seed_sequence, whole_seed
 from tactile_bayes.numerics.selection import resampled
-from tactile_bayes.record import carried_sweeps, validate
+from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["LEVELS", "Stream", "surprise_after"]
+__all__ = ["LEVELS", "Stream"]
 
 LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)  # levels of the quantiles of parameters and of the band
 _MOST_SURPRISE = 700.0  # largest logarithm of an e-value that is stated, which is finite
@@ -155,7 +156,7 @@ class Stream:
         """
         began = perf_counter()
         old = self._state
-        record = validate(samples) if old is None else _continued(old.record, samples)
+        record = validate(samples) if old is None else continued(old.record, samples)
         experiment = Experiment(record, self._rig, self._family)
         updates = 0 if old is None else old.updates + 1
         random = self._random(0, updates)
@@ -391,19 +392,6 @@ class Stream:
         return result
 
 
-def surprise_after(old: StreamState | None, log_ratios: Floats) -> tuple[Floats, float]:
-    """Return the products of ratios after a block, and the logarithm of the largest e-value so far.
-
-    The block from which the model is wrong has the prior weight 1/(k(k + 1)), for the k-th; what remains of it, for
-    blocks to come, has no ratio yet.
-    """
-    blocks = 1 if old is None else old.updates + 2
-    before = np.full(len(WIDER), -np.inf) if old is None else old.log_products
-    products = np.logaddexp(before, -np.log(blocks * (blocks + 1.0))) + log_ratios
-    now = float(np.logaddexp(logsumexp(products) - np.log(len(WIDER)), -np.log(blocks + 1.0)))
-    return products, now if old is None else float(np.fmax(now, old.surprise))
-
-
 def _share_within_reach(model: ContourModel, old: StreamState | None, random: np.random.Generator) -> float:
     """Return the share of the prior within reach, which only a new sweep or parameter changes."""
     before = None if old is None else old.experiment.model
@@ -417,41 +405,3 @@ def _weighted_quantiles(values: Floats, weights: Floats) -> Floats:
     """Return quantiles of every column, shape (levels, columns); NaN where a value is."""
     found = np.quantile(values, LEVELS, axis=0, weights=weights, method="inverted_cdf")
     return np.where(np.isfinite(values).all(axis=0), found, np.nan)
-
-
-def _continued(record: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
-    """Return a record with new samples behind its own."""
-    new = validate(samples)
-    for name in sorted({*record.attrs, *new.attrs}, key=str):
-        one, other = record.attrs.get(name, ""), new.attrs.get(name, "")
-        if not np.array_equal(one, other):
-            raise RecordError(
-                f"attribute {name!r} of the new samples is {other!r}, but was {one!r}: give all samples in the same "
-                "units, of the same rod and load cell"
-            )
-    if set(record.variables) != set(new.variables):
-        odd = ", ".join(map(repr, sorted(map(str, set(record.variables) ^ set(new.variables)))))
-        raise RecordError(f"the new samples and those before do not have the same columns, they differ in {odd}")
-    last, first = int(record.sweep[-1]), int(new.sweep[0])
-    had = set(record.sweep.values.tolist()) - {last}
-    if again := sorted(had & set(new.sweep.values.tolist())):
-        raise RecordError(
-            f"sweep {again[0]} was over when sweep {last} began: give samples in the order in which they were measured"
-        )
-    joined = validate(xr.concat([record, new], "sample", combine_attrs="override"))
-    if first == last and last not in carried_sweeps(joined):
-        _refuse_return(record, new, last)
-    return joined
-
-
-def _refuse_return(record: xr.Dataset, new: xr.Dataset, sweep: int) -> None:
-    """Refuse new samples that begin further back in a sweep than its encoder scatters."""
-    sense = 1.0 if str(new.direction.values[0]) == "forward" else -1.0
-    before, after = (sense * each.drive_angle.values[each.sweep.values == sweep] for each in (record, new))
-    scatter = max((float(-np.diff(part).min(initial=0.0)) for part in (before, after)), default=0.0)
-    scatter = max(scatter, float(record.attrs.get("load_cell_drive_angle_noise", 0.0)))
-    if after[0] < before[-1] - 6.0 * scatter - 1e-9:
-        raise RecordError(
-            f"the new samples of sweep {sweep} begin at a drive angle of {sense * after[0]:.6g} rad, behind the last "
-            f"one, {sense * before[-1]:.6g} rad: give each sample once, in the order in which they were measured"
-        )
