@@ -39,33 +39,27 @@ from tactile_bayes.uncertainty.rod_reach import reach_attributes
 
 __all__ = ["GIVEN_UP", "SHAPES", "checked_families", "compare_families", "matched", "with_known"]
 
+# Families that are compared by default; the last but one has flanks of two shapes.
 SHAPES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
-"""Families that are compared by default; the last but one has flanks of two shapes."""
-
 _USUAL = WIDTHS.index(1.0)
 
+# Distance of a family's largest log-likelihood below the best log-evidence from which the family is not sampled.
 GIVEN_UP = 100.0
-"""Distance of a family's largest log-likelihood below the best log-evidence from which the family is not sampled."""
-
+# Distance of the largest log-likelihood of a family without evidence below the best log-evidence from which the
+# family's probability is zero.
 _HOPELESS = 20.0
-"""Distance of the largest log-likelihood of a family without evidence below the best log-evidence from which the
-family's probability is zero."""
 
 
-_KEPT_DRAWS = 2000
-"""Largest number of draws of a contour that are kept of each family."""
-
+_KEPT_DRAWS = 2000  # largest number of draws of a contour that are kept of each family
 _BY_DRAW = ("family", "contour_draw", "contour_parameter")
 
 
 class _Tried(NamedTuple):
     """Result of one family; a family that is not sampled has the first entry alone."""
 
-    ceiling: float
-    """Largest log-likelihood found, which the evidence cannot exceed unless a better contour was missed."""
+    ceiling: float  # largest log-likelihood found, which the evidence cannot exceed unless a better contour was missed
     draws: Draws | None = None
-    evidence: ContourEvidence | None = None
-    """None also where it cannot be computed from the draws."""
+    evidence: ContourEvidence | None = None  # None also where it cannot be computed from the draws
     predicted: PredictedSamples | None = None
     p_value: float = np.nan
     passed: bool = False

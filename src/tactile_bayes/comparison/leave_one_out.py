@@ -33,49 +33,38 @@ __all__ = [
     "stacking_weights",
 ]
 
-_LEAST_DRAWS = 25
-"""Smallest number of draws; a fifth of them, the tail, suffices to fit two parameters."""
-
-_LEAST_EFFECTIVE = 10.0
-"""Number of effective draws below which their scatter does not estimate the error of their mean."""
-
-_SAME = 1e-12
-"""Difference of logarithms below which weights are equal."""
-
-_OFF = 1e-5
-"""Largest loss of log-density per sample of the stacking weights relative to the best."""
+_LEAST_DRAWS = 25  # smallest number of draws; a fifth of them, the tail, suffices to fit two parameters
+_LEAST_EFFECTIVE = 10.0  # number of effective draws below which their scatter does not estimate the error of their mean
+_SAME = 1e-12  # difference of logarithms below which weights are equal
+_OFF = 1e-5  # largest loss of log-density per sample of the stacking weights relative to the best
 
 
 class LeftOut(NamedTuple):
     """Predictive log-density of each sample given all the others."""
 
-    log_density: Floats
-    """Shape (samples,)."""
+    log_density: Floats  # shape (samples,)
+    # Monte-Carlo error of each, allowing for autocorrelation; too small, maybe several times, where k̂ is above 0.5,
+    # and infinite where it is above `largest_k`.
     standard_error: Floats
-    """Monte-Carlo error of each, allowing for autocorrelation; too small, maybe several times, where k̂ is above 0.5,
-    and infinite where it is above `largest_k`."""
+    # Shape of the weights' tail, k̂; −∞ where the largest weights are all the same, ∞ where no tail can be fitted.
     pareto_k: Floats
-    """Shape of the weights' tail, k̂; −∞ where the largest weights are all the same, ∞ where no tail can be fitted."""
 
 
 class FromWider(NamedTuple):
     """Predictive log-density of one sample given all the others, from a posterior given fewer samples."""
 
-    log_density: float
-    """NaN where no draw has any weight."""
+    log_density: float  # NaN where no draw has any weight
+    # Monte-Carlo error, allowing for autocorrelation; infinite with fewer than 10 effective draws.
     standard_error: float
-    """Monte-Carlo error, allowing for autocorrelation; infinite with fewer than 10 effective draws."""
-    effective: float
-    """Effective number of draws of the weights, (Σ w)² / Σ w²; autocorrelation reduces it further."""
+    effective: float  # effective number of draws of the weights, (Σ w)² / Σ w²; autocorrelation reduces it further
 
 
 class Difference(NamedTuple):
     """Difference of two models' leave-one-out log-densities."""
 
+    # Sum over samples of the first model's log-densities less the second's; positive if the first predicts better.
     difference: float
-    """Sum over samples of the first model's log-densities less the second's; positive if the first predicts better."""
-    standard_error: float
-    """Standard error from the scatter between samples: √n standard deviations."""
+    standard_error: float  # standard error from the scatter between samples: √n standard deviations
 
 
 def largest_k(draws: int) -> float:

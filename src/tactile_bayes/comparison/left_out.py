@@ -17,19 +17,16 @@ from tactile_bayes.numerics.random_numbers import Seed, spawn
 
 __all__ = ["PredictedSamples", "predicted_samples"]
 
-_DRAWS = 2000
-"""Largest number of draws under which densities are computed."""
+_DRAWS = 2000  # largest number of draws under which densities are computed
 
 
 class PredictedSamples(NamedTuple):
     """Leave-one-out log-density of each sample, its channels together, in units of EI/L and EI/L²."""
 
+    # Shape (samples,); NaN next to events if the load cell drifts or has an unknown bias, or beside a discrepancy.
     log_density: Floats
-    """Shape (samples,); NaN next to events if the load cell drifts or has an unknown bias, or beside a discrepancy."""
-    standard_error: Floats
-    """Monte-Carlo error; infinite where it cannot be trusted."""
-    pareto_k: Floats
-    """NaN where the contour was inferred again without the sample."""
+    standard_error: Floats  # Monte-Carlo error; infinite where it cannot be trusted
+    pareto_k: Floats  # NaN where the contour was inferred again without the sample
 
 
 def predicted_samples(

@@ -199,6 +199,11 @@ class ContourModel:
         read = course.load_in_contact(loads) * self.likelihood.load_cell.own_gains
         return Discrepancy(course, scale[:, None, None] * read, length)
 
+    def load_in_contact(self, point: Floats) -> Floats:
+        """Return the largest load of each sample's segment if it is in contact, (samples, 3), at a point, (d,)."""
+        loads, _ = self.likelihood.predict(self.contours(point[None]), self.rig(point[None]))
+        return self.likelihood.segments.course.load_in_contact(loads[0])
+
     def discrepancy_at(self, point: Floats) -> Discrepancy | None:
         """Return the discrepancy of one point, shape (d,), for a single record; None without."""
         if not self.noise.of_discrepancy:

@@ -20,8 +20,7 @@ from tactile_bayes.reconstruction.samples import Samples
 
 __all__ = ["AXIAL_ALARM", "axial_score"]
 
-AXIAL_ALARM = 6.0
-"""Size of the axial score above which the force along the rod is reported to disagree with the moment."""
+AXIAL_ALARM = 6.0  # size of the axial score above which the force along the rod is reported to disagree with the moment
 
 
 def axial_score(samples: Samples, friction: float) -> float:

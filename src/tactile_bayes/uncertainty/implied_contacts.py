@@ -29,10 +29,9 @@ from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["contacts_of", "implied_contacts"]
 
-_BLOCK = 200
-"""Number of contours whose paths are traced at a time."""
-
+_BLOCK = 200  # number of contours whose paths are traced at a time
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
+# Attributes of the posterior that hold for the contacts, too.
 _KEPT = (
     "sampler",
     "seed",
@@ -45,11 +44,8 @@ _KEPT = (
     "converged",
     "approximations",
 )
-"""Attributes of the posterior that hold for the contacts, too."""
-
+# Unknowns of the rig by which the rod's slope at the pivot differs from the reading, draw by draw.
 _ANGLE_UNKNOWNS = ("drive_angle_offset", "backlash", "suspension_compliance")
-"""Unknowns of the rig by which the rod's slope at the pivot differs from the reading, draw by draw."""
-
 _DIMS = ("chain", "draw", "sample")
 
 

@@ -16,14 +16,11 @@ from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
 
 __all__ = ["normal_band", "normal_offsets"]
 
-_BLOCK = 100_000
-"""Number of normals that are searched at once."""
-
+_BLOCK = 100_000  # number of normals that are searched at once
+# Lower bound of the rate: where the contour's parameter does not move the point, the root stays as it is.
 _SLOWEST = float(np.finfo(float).tiny)
-"""Lower bound of the rate: where the contour's parameter does not move the point, the root stays as it is."""
-
+# Distance of a point from a normal, relative to the lengths involved, beyond which the normal misses the contour.
 _MISSED = 1e-9
-"""Distance of a point from a normal, relative to the lengths involved, beyond which the normal misses the contour."""
 
 
 def normal_band(

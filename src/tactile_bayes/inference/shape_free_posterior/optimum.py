@@ -8,14 +8,9 @@ from scipy.optimize import minimize
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.shape_free_posterior.normal_approximation import (
-    LinearPrior,
-    NormalApproximation,
-    joined,
-    linear_names,
-    scale_names,
-    split,
-)
+from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, scale_names, split
+from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation
+from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior
 from tactile_bayes.inference.shape_free_posterior.observer import Observer
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.coordinates.base import Coordinates
-from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation, joined, split
+from tactile_bayes.inference.shape_free_posterior.columns import joined, split
+from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation
 
 __all__ = ["Whitening"]
 

@@ -246,8 +246,7 @@ def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, d
     """Return the discrepancy that fits residuals as in `fitted_noise`, from prior draws (n, 2); empty without one."""
     if not model.noise.of_discrepancy:
         return np.empty(0)
-    loads, _ = model.likelihood.predict(model.contours(point[None]), model.rig(point[None]))
-    largest = model.likelihood.segments.course.load_in_contact(loads[0])[:, model.present]
+    largest = model.load_in_contact(point)[:, model.present]
     squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviations[:, model.present])
     least, most = np.quantile(drawn[:, 0], [0.05, 1.0])
     share = np.sqrt(squares[largest > 0.0].sum() / max(np.square(largest).sum(), np.finfo(float).tiny))
