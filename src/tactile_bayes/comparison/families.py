@@ -253,6 +253,7 @@ def with_known(family: Family, points: Floats) -> Floats:
 
 
 def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Dataset:
+    """Return the comparison of families; `asked` are further attributes."""
     evidences = np.full((len(tried), len(WIDTHS)), np.nan)
     errors = np.full(len(tried), np.nan)
     for i, one in enumerate(tried.values()):
@@ -263,7 +264,6 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
     counted = np.where(hopeless[:, None], -np.inf, evidences)
     complete = not np.isnan(counted).any()
     by_width = np.exp(counted - logsumexp(counted, axis=0)) if complete else np.full(evidences.shape, np.nan)
-    runs = [one.draws for one in tried.values()]
     variables = {
         "probability": ("family", by_width[:, _USUAL]),
         "log_evidence": ("family", evidences[:, _USUAL]),
@@ -272,10 +272,7 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
         "probability_by_width": (("prior_width", "family"), by_width.T),
         "p_value": ("family", [one.p_value for one in tried.values()]),
         "fits": ("family", [one.passed for one in tried.values()]),
-        "sampled": ("family", [run is not None for run in runs]),
-        "converged": ("family", [run is not None and run.converged for run in runs]),
-        "steps": ("family", [0 if run is None else run.steps_run for run in runs]),
-        "seconds": ("family", [0.0 if run is None else run.seconds for run in runs]),
+        **_runs([one.draws for one in tried.values()]),
     }
     predicted = [one.predicted for one in tried.values()]
     if any(of_family is not None for of_family in predicted):
@@ -287,6 +284,15 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
         "most_probable": str(result.family.values[np.argmax(result.probability.values)]) if complete else "",
     }
     return result
+
+
+def _runs(runs: Sequence[Draws | None]) -> dict[str, Any]:
+    """Return whether and how families were sampled."""
+    made = [
+        (False, False, 0, 0.0) if run is None else (True, run.converged, run.steps_run, run.seconds) for run in runs
+    ]
+    names = ("sampled", "converged", "steps", "seconds")
+    return {name: ("family", list(values)) for name, values in zip(names, zip(*made, strict=True), strict=True)}
 
 
 def _contour_draws(drawn: Sequence[tuple[Family, Draws | None]]) -> Floats:

@@ -47,11 +47,10 @@ class Stream:
     """The posterior of a contour from the record so far, updated with every new block of samples.
 
     Weighted particles represent the posterior. They come from the prior; each block multiplies their weights by the
-    ratio of the likelihoods of the record with and without it. If their effective number falls below half of them, the
-    block enters by powers of that ratio, and after each the particles are resampled (systematically) and moved by the
-    steps of `infer_contour` (Del Moral, Doucet & Jasra 2006, doi 10.1111/j.1467-9868.2006.00553.x). The likelihood is
-    that of `infer_contour` for the record so far, so that after the last sample both have the same posterior, within
-    the Monte-Carlo error of the particles. Samples without contact count from the first one on.
+    ratio of the likelihoods of the record with and without it. If too few of them remain effective, the block enters by
+    powers of that ratio, and after each the particles are resampled and moved by the steps of `infer_contour` (Del
+    Moral, Doucet & Jasra 2006, doi 10.1111/j.1467-9868.2006.00553.x). The likelihood is that of `infer_contour` for the
+    record so far, and so is the posterior, within the Monte-Carlo error of the particles.
 
     Parameters
     ----------
@@ -77,8 +76,7 @@ class Stream:
     -----
     Each update computes the likelihood of the whole record so far again: exact for drifts, correlated noise and
     integrated biases, but an update costs more the longer the record. With 1,000 particles, updates by 28 samples, up
-    to 330 of a double sweep, took 0.1 to 0.6 s on one core with four parameters, and 0.1 to 1.0 s with 13, once the rod
-    had touched; the first two took 2 and 1 s, and 4 and 2 s. The result states its `seconds`.
+    to 330 of a double sweep, took 0.1 to 1.0 s on one core with 13 parameters; the first two took 4 and 2 s.
 
     `e_value` is the largest so far of a martingale: the density of the samples from some block on with noise that is
     wider by 1.5, 3 or 6, over that of the model, both given the samples before. For records of the model, drawn from
