@@ -34,10 +34,8 @@ def predicted_samples(
 ) -> PredictedSamples:
     """Return the leave-one-out predictive densities of a record.
 
-    They come from the posterior by Pareto-smoothed importance sampling, except next to first contact and snap-off.
-    There the record without a sample allows contours that would have been touched later, or let go earlier, of which
-    the posterior has none: these samples are predicted from a posterior that is inferred again without any of them,
-    weighted by the likelihood of all of them except one.
+    Next to first contact and snap-off the posterior has none of the contours that the record without a sample allows:
+    these samples are predicted from a posterior without any of them.
     """
     model = problem.model
     logs = _densities(model, sampled.draws)

@@ -53,11 +53,7 @@ class Samples(NamedTuple):
 
 
 def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: float = 0.0) -> Samples:
-    """Samples of a valid record with all load channels.
-
-    With a compliant suspension the pivot turns under the moment, so that the rod's slope differs from the drive angle,
-    with which the load cell may turn.
-    """
+    """Return the samples of a valid record with all load channels, on a suspension that may turn under the moment."""
     absent = [name for name in CHANNELS if name not in present_channels(measured)]
     if absent:
         raise RecordError(

@@ -46,15 +46,11 @@ _ALL_BUT_OUTLIERS = 0.98
 
 
 def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floats:
-    """Side of contact of every sample: +1 as in a forward sweep, −1 as in a backward one, shape (samples,).
+    """Return the side of contact of every sample: +1 as in a forward sweep, −1 as in a backward one, (samples,).
 
-    It is the side of the sweep's direction unless the moment contradicts it, since a drive may also turn back in
-    contact: then the moment in contact has the opposite sign by more than six standard errors. Its zero is the mean of
-    the unloaded samples of the sweep, or else of the record, as `zero_load` finds them, or else 0 with a standard
-    deviation of 0.1 EI/L. A zero beyond five of these deviations is accepted only if it stands both before and after
-    contact; otherwise it is a load. Since seemingly unloaded samples may have a constant load, the moment must also
-    have the opposite sign for all zeros within three of these deviations. A record may state the sides of its sweeps
-    (`with_sides`).
+    It is the side of the sweep's direction unless the moment in contact contradicts it by more than six standard
+    errors, for its zero before or after contact, as `zero_load` finds it, and for all zeros that are likely: seemingly
+    unloaded samples may have a constant load. A record may state the sides (`with_sides`).
     """
     sides, _ = sides_and_doubts(record, load_cell)
     side = np.ones(record.sizes["sample"])

@@ -188,8 +188,7 @@ def _with_likelier_sides(
 ) -> tuple[xr.Dataset, dict[int, str]]:
     """Return the record with the sides of its sweeps stated, and the sides of doubtful sweeps.
 
-    A doubtful sweep takes the side of its direction or, if the misfit is clearly smaller, the other. Without a noise
-    level there is no misfit, and it takes the side of its direction.
+    A doubtful sweep takes the side of its direction unless the misfit of the other is clearly smaller.
     """
     taken: dict[int, str] = {}
     sides, doubtful = sides_and_doubts(_in_channels(measured, cell), cell)

@@ -132,8 +132,8 @@ def normal_offsets(contours: Contour, x: Floats, y: Floats, slope_angle: Floats)
 def _offsets(many: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats:
     """Return the signed distance of each contour from its own point along the normal there.
 
-    While the contour's tangent turns by less than a right angle from that at the normal's foot, the coordinate along
-    the foot's tangent grows along the contour: it has at most one root, where the normal enters the object.
+    Until its tangent turns by a right angle from the foot's, a contour meets the normal at most once, going into the
+    object.
     """
     sin, cos = np.sin(slope_angle), np.cos(slope_angle)
     every = np.arange(x.size)

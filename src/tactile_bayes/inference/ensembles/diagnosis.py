@@ -112,9 +112,7 @@ class Mode:
 def modes_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> tuple[Mode, ...]:
     """Return the modes of the ensembles, from samples (chain, step, walker, parameter) and log-probabilities.
 
-    The result is empty if there is only one mode, or if an ensemble is not stationary: only if the early and late steps
-    of each ensemble agree, and its walkers have forgotten their positions, does disagreement between ensembles mean
-    several modes rather than a slow run.
+    Only if each ensemble is stationary, disagreement means several modes rather than a slow run; else there are none.
     """
     if not _are_stationary(samples):
         return ()
@@ -152,19 +150,12 @@ def modes_message(modes: Sequence[Mode]) -> str:
 
 
 def _are_stationary(samples: Floats) -> bool:
-    _, steps, walkers, parameters = samples.shape
-    half = steps // 2
-    if half < 4:
+    """Return True if early and late steps of each ensemble agree, and its walkers have forgotten their positions."""
+    if samples.shape[1] < 8:
         return False
-    for ensemble in samples:
-        swapped = ensemble.swapaxes(0, 1)  # (walker, step, parameter)
-        halves = np.stack([swapped[:, :half], swapped[:, half : 2 * half]]).reshape(2, -1, parameters)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            r_hat = array_stats.rhat(halves, chain_axis=0, draw_axis=1, method="rank")
-            ess = array_stats.ess(swapped.reshape(1, -1, parameters), chain_axis=0, draw_axis=1, method="bulk")
-        if not (np.all(r_hat < _MAX_R_HAT) and np.all(ess >= _MIN_DRAWS_PER_WALKER * walkers)):
-            return False
-    return True
+    least = _MIN_DRAWS_PER_WALKER * samples.shape[2]
+    each = [Diagnosis(ensemble[None]) for ensemble in samples]
+    return all(bool(np.all(one.r_hat < _MAX_R_HAT) and np.all(one.ess_bulk >= least)) for one in each)
 
 
 def _connected(near: Flags) -> list[tuple[int, ...]]:
