@@ -12,8 +12,8 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour_evidence import contour_evidence
 from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.evidence import contour_evidence
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.streams import particles
 from tactile_bayes.inference.streams.e_value import surprise_after

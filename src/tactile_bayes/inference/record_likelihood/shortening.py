@@ -72,7 +72,7 @@ def _averages(record: xr.Dataset, cell: LoadCell) -> bool:
 
 
 def thinned(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
-    """Return every so many samples of a long record, with corners of carried ways, and the cell that drifts between."""
+    """Return every so many samples of a long record, and all corners of carried ways, and the cell of these samples."""
     if not is_long(record):
         return record, cell
     samples = record.sizes["sample"]

@@ -103,7 +103,7 @@ class NormalApproximation:
         return self._radius.log_radius(linear[:, 0], scales[:, 0], scales[:, 1], linear[:, 1 : 1 + self._count])
 
     def bent(self, scales: Floats, linear: Floats, *, back: bool = False) -> Floats:
-        """Return linear parameters, (n, d), with the vertex where the anchor is as a linear map has it, or back."""
+        """Return linear parameters, (n, d), with the vertex such that the anchor is where the map has it; or back."""
         beyond = self._anchor.beyond_line(self._log_radius(scales, linear))
         bent = linear.copy()
         bent[:, self._vertex] += beyond if back else -beyond
@@ -120,7 +120,7 @@ class NormalApproximation:
         return np.swapaxes(through, 1, 2), certainty
 
     def nearest(self, scales: Floats) -> Floats:
-        """Return the linear parameters, (d,), that observe most like the centre at other scales, (scales,)."""
+        """Return the linear parameters, (d,), with which a contour of other scales, (k,), is nearest the centre."""
         (through,), (certainty,) = self._information(scales[None])
         each = np.eye(self.prior.mean.size)
         radii = self._log_radius(np.tile(scales, (len(each), 1)), each).T
@@ -159,8 +159,7 @@ class NormalApproximation:
     def damped(self, scales: Floats, start: Floats, damping: Floats) -> Floats:
         """Return linear parameters, (n, d), after Levenberg–Marquardt steps from a start, (d,), with dampings (n,).
 
-        A damping adds to the prior's precision, around the start: large ones hold all that a record hardly determines.
-        Parameters that may vanish keep at least half of their values.
+        Large dampings hold all that a record hardly determines. What may vanish keeps at least half of its value.
         """
         (through,), (certainty,) = self._information(scales[None])
         root = np.sqrt(self.prior.precision)

@@ -71,7 +71,7 @@ class Brackets(NamedTuple):
 
 
 def event_brackets(model: ContourModel) -> Brackets:
-    """Return the drive angles between which contact begins and ends: loads alone do not say how far one is off."""
+    """Return the drive angles between which contact begins and ends; loads alone do not show how far events are off."""
     segments = model.likelihood.segments
     angle, of_sample = segments.angles_in_sweep_frame, segments.of_sample
     rows = []
