@@ -409,11 +409,10 @@ def test_what_is_hardly_ever_a_contour_is_given_up_with_the_familys_own_words():
         generate_records(read_specification({**FAR, "contours": [contour]}), 0, 2)
 
 
-def test_sweeps_that_friction_would_hold_at_first_are_no_records():
-    """In one of two directions the rod is curved toward the object, and slides outward until it is straightened."""
+def test_rods_that_slide_outward_and_stick_are_records_too():
+    """In one of two directions the rod is curved toward the object."""
     spec = drawn_from("circle", unknown={**NOTHING, "friction": 0.3}, rod={"rest_curvature": {"uniform": [0.2, 0.4]}})
-    with refused(SpecificationError, "1000 times", "held by friction", "friction = 0"):
-        generate_records(read_specification(spec), 0, 1)
+    assert len(generate_records(read_specification(spec), 0, 3)) == 3
 
 
 def test_the_reasons_of_a_record_that_is_given_up_are_its_own():

@@ -93,7 +93,7 @@ _CORRECTIONS = {
     "still touched at its other end": _WIDER,
     "touched twice": "give rods that are less curved, or contours that are more so where rods touch them",
     "touched at the beginning": "begin the translations farther from the contours",
-    "held by friction": "take friction = 0 under [unknown], straight rods, or another heading or drive angle",
+    "met head-on": "take friction = 0 under [unknown], or another heading or drive angle",
     "slips off at once": "give rods that are less curved, or bring contours and pivots closer to one another",
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the unloaded rod would still cut the object",

@@ -33,8 +33,8 @@ class Reachability(IntEnum):
     """At first contact the tip is turned beyond the normal of the contour, so that any force pushes it off."""
     BEGINS_INSIDE = 9
     """A rod that is carried touches the contour already at the beginning of its drive."""
-    STICKS = 10
-    """Friction lets the contact neither slide nor stick at first, as where it is carried head-on, or both."""
+    HEAD_ON = 10
+    """Friction lets the contact neither slide nor stick at first, or both: a straight rod is pushed along itself."""
     FOLDS_OVER = 11
     """The tip would turn over until the other side of the rod lies along the contour."""
 
@@ -55,7 +55,7 @@ _MESSAGES = {
     Reachability.TOUCHES_TWICE: "touched twice",
     Reachability.SLIPS_OFF: "slips off at once",
     Reachability.BEGINS_INSIDE: "touched at the beginning",
-    Reachability.STICKS: "held by friction",
+    Reachability.HEAD_ON: "met head-on",
     Reachability.FOLDS_OVER: "folded over at its tip",
 }
 

@@ -181,7 +181,7 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 f"{sweep} the rod does not touch the contour: bring them closer together, or carry the rod farther "
                 "(are contour, drive and rod in one unit?)"
             )
-        case Reachability.STICKS:
+        case Reachability.HEAD_ON:
             raise ReachError(
                 f"{sweep} friction lets the rod neither slide nor yield at {_point(paths)}, where it meets the object "
                 "head-on, as a strut that buckles to either side; "

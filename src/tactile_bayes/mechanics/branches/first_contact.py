@@ -56,7 +56,7 @@ class _Sought(IntEnum):
 _TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reachability.TOUCHES), int(Reachability.TOO_FAR), int(Reachability.CUTS_PIVOT)
 _ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reachability.ENDS), int(Reachability.TOO_CLOSE), int(Reachability.RUNS_OUT)
 _BEGINS_INSIDE, _SLIPS_OFF = int(Reachability.BEGINS_INSIDE), int(Reachability.SLIPS_OFF)
-_TOUCHES_TWICE, _STICKS = int(Reachability.TOUCHES_TWICE), int(Reachability.STICKS)
+_TOUCHES_TWICE, _HEAD_ON = int(Reachability.TOUCHES_TWICE), int(Reachability.HEAD_ON)
 _CLEARANCE = CLEARANCE
 
 _MOST_MOVES = 50
@@ -412,7 +412,7 @@ def _first_state(scene: Scene, lines: Floats | None, seen: Outline, near: Approa
     slides, slides_back, sticks = _opposes(scene, begin), _opposes(other, at_other), held.anchor.arclength > 0.0
     if slides + slides_back + sticks != 1:
         slips_off = not _is_pushed(begin) and not _is_pushed(at_other) and not _is_head_on(begin)
-        return _SLIPS_OFF if slips_off else _STICKS, scene, begin
+        return _SLIPS_OFF if slips_off else _HEAD_ON, scene, begin
     if sticks:
         return _TOUCHES, held, at_held
     return (_TOUCHES, scene, begin) if slides else (_TOUCHES, other, at_other)
