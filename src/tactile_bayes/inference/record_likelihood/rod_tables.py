@@ -22,6 +22,7 @@ __all__ = ["RodTables"]
 # default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and
 # for uneven curvature that of the rest curvature.
 _TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
+_SHAPE = 4.5  # amplitudes of the modes of a traced rod: one of 6000 draws from the prior is beyond
 _LENGTHS = 0.9, 1.1  # over the stated one, in tables of a cone: ten deviations of the default prior
 # Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where the base is
 # carried.
@@ -77,4 +78,4 @@ class RodTables:
         tapers = max(surface.taper - width, 0.0), min(surface.taper + width, STEEPEST_TAPER)
         cones = zip(tapers, reversed(lengths), strict=True)
         least, most = (Surface(surface.radius / length, taper).half_angle for taper, length in cones)
-        return Box(tapers, (-bend, bend), (low - most, high - least))
+        return Box(tapers, (-bend, bend), (low - most, high - least), _SHAPE if self._rod.rest_shape_modes else 0.0)
