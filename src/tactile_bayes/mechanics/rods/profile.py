@@ -22,7 +22,7 @@ STEEPEST_TAPER = 0.95
 """Largest taper: the rod bends 1.6e5 times as easily at its tip as at its base."""
 
 MOST_MODES = 3
-"""Modes of the rest curvature: three hold 99.9 % of how far traced rods deflect otherwise than their mean."""
+"""Modes of the rest curvature: three hold 99.8 % of how far traced rods deflect otherwise than their mean."""
 
 _SAME = 1e-9
 """Difference of the rigidity at the base from one that counts as zero."""
