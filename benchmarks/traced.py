@@ -17,6 +17,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from scipy.integrate import cumulative_simpson
 
 import tactile_bayes as tb
@@ -123,7 +124,8 @@ def records(count: int, noise: str) -> None:
         rig, out = tb.Rig(traced, cell), OUT / noise / str(number)
         one = tb.calibrate("parabola", rig, truth=tb.Rig(true, cell), replicates=1, rng=number, out=out)
         found.append(one)
-        shares = [f"{name} {np.nanmean([each.coverage.sel(claim=name) for each in found]):.0%}" for name in CLAIMS]
+        every = xr.concat([each.coverage.reindex(claim=list(CLAIMS)) for each in found], "record").mean("record")
+        shares = [f"{name} {float(every.sel(claim=name)):.0%}" for name in CLAIMS]
         print(f"{number + 1} records: {', '.join(shares)}; {one.attrs['verdict']}", flush=True)
 
 

@@ -118,6 +118,12 @@ def text_of(tables: Mapping[str, Any]) -> str:
     )
 
 
+def _table_of_rod(rod: Rod) -> dict[str, Any]:
+    usual = {"length": 1.0, "flexural_rigidity": 1.0} if rod.is_dimensionless else {}
+    given = {name: getattr(rod, name) for name in TABLES["rod"] if hasattr(rod, name)}
+    return {n: text_along(v) for n, v in given.items() if v not in (None, ()) and v != usual.get(n, 0.0)}
+
+
 def tables_of(
     rod: Rod | None,
     load_cell: LoadCell | None,
@@ -128,13 +134,7 @@ def tables_of(
     """Return the tables that state the arguments of `Rig`; the inverse of `stated_in`."""
     tables: dict[str, Any] = {}
     if rod is not None:
-        usual = {"length": 1.0, "flexural_rigidity": 1.0} if rod.is_dimensionless else {}
-        given = {name: getattr(rod, name) for name in TABLES["rod"] if hasattr(rod, name)}
-        tables["rod"] = {
-            name: text_along(value)
-            for name, value in given.items()
-            if value not in (None, ()) and value != usual.get(name, 0.0)
-        }
+        tables["rod"] = _table_of_rod(rod)
     if load_cell is not None:
         tables["load_cell"] = load_cell.entries()
     if file.table:

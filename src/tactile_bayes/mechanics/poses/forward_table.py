@@ -296,29 +296,42 @@ def _is_prepared(table: ForwardTable, profile: Profile, friction_angle: float, o
 
 
 @compiled
-def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet: NDArray[np.void]) -> bool:
-    """Write the coefficients of one rod, unless they are there, and return False if the table does not hold it."""
-    own, box, values = sheet[0], table.box, (profile.taper, profile.bend, friction_angle)
-    if _is_prepared(table, profile, friction_angle, own):
-        return True
-    for c in range(3):
-        if not box[c, 0] - _ROUNDING <= values[c] <= box[c, 1] + _ROUNDING:
-            return False
+def _holds(table: ForwardTable, values: tuple[float, float, float], shape: Floats) -> bool:
+    """True if a table holds a rod of this taper, bend, friction angle and shape."""
     square = 0.0
     for k in range(MOST_MODES):
-        square += profile.shape[k] * profile.shape[k]
-    if square > table.shape * table.shape:
-        return False
+        square += shape[k] * shape[k]
+    for c in range(3):
+        if not table.box[c, 0] - _ROUNDING <= values[c] <= table.box[c, 1] + _ROUNDING:
+            return False
+    return square <= table.shape * table.shape
+
+
+@compiled
+def _write_outer(table: ForwardTable, values: tuple[float, float, float], shape: Floats, outer: Floats) -> None:
+    """Write polynomials in taper, bend and friction angle, and in the amplitudes of modes."""
+    box = table.box
     for c in range(3):
         x = (2.0 * values[c] - box[c, 0] - box[c, 1]) / (box[c, 1] - box[c, 0]) if box[c, 1] > box[c, 0] else 0.0
-        own.outer[c, 0], own.outer[c, 1] = 1.0, x
+        outer[c, 0], outer[c, 1] = 1.0, x
         for k in range(2, MOST_NODES):
-            own.outer[c, k] = 2.0 * x * own.outer[c, k - 1] - own.outer[c, k - 2]
+            outer[c, k] = 2.0 * x * outer[c, k - 1] - outer[c, k - 2]
     for r in range(_POWERS.shape[0]):
-        own.outer[3, r] = 1.0
+        outer[3, r] = 1.0
         for k in range(MOST_MODES):
             for _ in range(_POWERS[r, k] if table.shape > 0.0 else 0):
-                own.outer[3, r] *= profile.shape[k] / table.shape
+                outer[3, r] *= shape[k] / table.shape
+
+
+@compiled
+def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet: NDArray[np.void]) -> bool:
+    """Write the coefficients of one rod, unless they are there, and return False if the table does not hold it."""
+    own, values = sheet[0], (profile.taper, profile.bend, friction_angle)
+    if _is_prepared(table, profile, friction_angle, own):
+        return True
+    if not _holds(table, values, profile.shape):
+        return False
+    _write_outer(table, values, profile.shape, own.outer)
     for k in range(MOST_MODES):
         own.shape[k] = profile.shape[k]
     own.least_psi1, own.most_psi1 = table.psi1

@@ -139,9 +139,10 @@ def along(name: str, given: Any, length: float, positive: bool = False, miss: fl
 def modes_along(name: str, given: Any, length: float, most: int) -> tuple[Along, ...]:
     """Return so many properties of a rod, or fewer, as polynomials; a text is that of `text_along`."""
     if isinstance(given, str):
-        found = read_json(given, name)
-        given = found.get("modes") if isinstance(found, dict) else None
-        given = [_read(name, json.dumps(each)) for each in given] if isinstance(given, list) else None
+        try:
+            given = [_read(name, json.dumps(each)) for each in read_json(given, name)["modes"]]
+        except (TypeError, KeyError) as error:
+            raise ParameterError(f"{name} is {given[:40]!r}: give modes as JSON, each with polynomials") from error
     if not isinstance(given, list | tuple) or len(given) > most or any(as_number(each) is not None for each in given):
         raise refused(name, given, f"give at most {most}, each as a function of s, or as arrays (s, values)")
     return tuple(along(name, each, length) for each in given)  # type: ignore[misc]
