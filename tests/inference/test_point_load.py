@@ -180,11 +180,11 @@ def test_predictions_and_likelihood_belong_to_the_draws(in_brief):
 
 def test_the_sensor_is_integrated_out_exactly():
     """Differences of log-probability against the density of a multivariate normal."""
-    from tactile_bayes.inference import point_load
+    from tactile_bayes.inference.point_load_model import PointLoadModel
 
     axial, lateral, reading = made_up_readings(3)
     priors = default_priors(axial, lateral, full_scale=1e3)
-    model = point_load._Model(axial, lateral, reading, 0.075, 50.0, priors, {}, False)
+    model = PointLoadModel(axial, lateral, reading, 0.075, 50.0, priors, {}, False)
     points = np.array([[-3.0, 0.4, 0.05, 4.0, 3.0], [-2.0, 0.5, 0.02, 5.0, 30.0], [-2.5, 0.5, 0.03, 4.5, 10.0]])
     expected = []
     for point in points:

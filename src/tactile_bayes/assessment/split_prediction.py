@@ -86,13 +86,13 @@ def parts_of(model: ContourModel) -> dict[str, Flags]:
     likelihood = model.likelihood
     of_sample, count = likelihood.segments.of_sample, len(likelihood.segments)
     parts = {f"sweep {k + 1}": of_sample == k for k in range(count)} if count > 1 else {}
-    bases = list(dict.fromkeys(segment.base for segment in likelihood.segments))
+    places = list(map(tuple, likelihood.segments.bases.tolist()))
+    bases = list(dict.fromkeys(places))
     if 1 < len(bases) < count:
-        at = np.array([bases.index(segment.base) for segment in likelihood.segments])[of_sample]
+        at = np.array([bases.index(place) for place in places])[of_sample]
         parts |= {f"pivot {k + 1}": at == k for k in range(len(bases))}
     loaded, early = ~model.found["unloaded"].values, np.zeros(of_sample.size, dtype=bool)
-    for segment in likelihood.segments:
-        samples = np.sort(segment.samples)
+    for samples in likelihood.segments.samples:
         inside = samples[loaded[samples]] if loaded[samples].any() else samples
         early[samples[samples < inside[inside.size // 2]]] = True
     return parts | {"earlier half": early, "later half": ~early}

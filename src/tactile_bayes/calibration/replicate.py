@@ -294,8 +294,8 @@ def contact_coverage(
     """Return the share of the chosen contacts that lie in their region."""
     true = contacts_of(likelihood, simulation.contour, simulation.rig, true_angles)
     chosen: list[int] = []
-    for segment in likelihood.segments:
-        in_contact = segment.samples[np.isfinite(true["contact_x"][0, segment.samples])]
+    for samples_of_segment in likelihood.segments.samples:
+        in_contact = samples_of_segment[np.isfinite(true["contact_x"][0, samples_of_segment])]
         if in_contact.size:
             chosen += [int(in_contact[round(share * (in_contact.size - 1))]) for share in _CONTACTS]
     if not chosen:

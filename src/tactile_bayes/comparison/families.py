@@ -22,10 +22,10 @@ from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, settings_of
-from tactile_bayes.inference.evidence import WIDTHS, ContourEvidence, contour_evidence
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.parameters.priors import matched_priors
@@ -39,33 +39,27 @@ from tactile_bayes.uncertainty.rod_reach import reach_attributes
 
 __all__ = ["GIVEN_UP", "SHAPES", "checked_families", "compare_families", "matched", "with_known"]
 
+# Families that are compared by default; the last but one has flanks of two shapes.
 SHAPES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
-"""Families that are compared by default; the last but one has flanks of two shapes."""
-
 _USUAL = WIDTHS.index(1.0)
 
+# Distance of a family's largest log-likelihood below the best log-evidence from which the family is not sampled.
 GIVEN_UP = 100.0
-"""Distance of a family's largest log-likelihood below the best log-evidence from which the family is not sampled."""
-
+# Distance of the largest log-likelihood of a family without evidence below the best log-evidence from which the
+# family's probability is zero.
 _HOPELESS = 20.0
-"""Distance of the largest log-likelihood of a family without evidence below the best log-evidence from which the
-family's probability is zero."""
 
 
-_KEPT_DRAWS = 2000
-"""Largest number of draws of a contour that are kept of each family."""
-
+_KEPT_DRAWS = 2000  # largest number of draws of a contour that are kept of each family
 _BY_DRAW = ("family", "contour_draw", "contour_parameter")
 
 
 class _Tried(NamedTuple):
     """Result of one family; a family that is not sampled has the first entry alone."""
 
-    ceiling: float
-    """Largest log-likelihood found, which the evidence cannot exceed unless a better contour was missed."""
+    ceiling: float  # largest log-likelihood found, which the evidence cannot exceed unless a better contour was missed
     draws: Draws | None = None
-    evidence: ContourEvidence | None = None
-    """None also where it cannot be computed from the draws."""
+    evidence: ContourEvidence | None = None  # None also where it cannot be computed from the draws
     predicted: PredictedSamples | None = None
     p_value: float = np.nan
     passed: bool = False
@@ -259,6 +253,7 @@ def with_known(family: Family, points: Floats) -> Floats:
 
 
 def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Dataset:
+    """Return the comparison of families; `asked` are further attributes."""
     evidences = np.full((len(tried), len(WIDTHS)), np.nan)
     errors = np.full(len(tried), np.nan)
     for i, one in enumerate(tried.values()):
@@ -269,7 +264,6 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
     counted = np.where(hopeless[:, None], -np.inf, evidences)
     complete = not np.isnan(counted).any()
     by_width = np.exp(counted - logsumexp(counted, axis=0)) if complete else np.full(evidences.shape, np.nan)
-    runs = [one.draws for one in tried.values()]
     variables = {
         "probability": ("family", by_width[:, _USUAL]),
         "log_evidence": ("family", evidences[:, _USUAL]),
@@ -278,10 +272,7 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
         "probability_by_width": (("prior_width", "family"), by_width.T),
         "p_value": ("family", [one.p_value for one in tried.values()]),
         "fits": ("family", [one.passed for one in tried.values()]),
-        "sampled": ("family", [run is not None for run in runs]),
-        "converged": ("family", [run is not None and run.converged for run in runs]),
-        "steps": ("family", [0 if run is None else run.steps_run for run in runs]),
-        "seconds": ("family", [0.0 if run is None else run.seconds for run in runs]),
+        **_runs([one.draws for one in tried.values()]),
     }
     predicted = [one.predicted for one in tried.values()]
     if any(of_family is not None for of_family in predicted):
@@ -293,6 +284,15 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
         "most_probable": str(result.family.values[np.argmax(result.probability.values)]) if complete else "",
     }
     return result
+
+
+def _runs(runs: Sequence[Draws | None]) -> dict[str, Any]:
+    """Return whether and how families were sampled."""
+    made = [
+        (False, False, 0, 0.0) if run is None else (True, run.converged, run.steps_run, run.seconds) for run in runs
+    ]
+    names = ("sampled", "converged", "steps", "seconds")
+    return {name: ("family", list(values)) for name, values in zip(names, zip(*made, strict=True), strict=True)}
 
 
 def _contour_draws(drawn: Sequence[tuple[Family, Draws | None]]) -> Floats:

@@ -1,9 +1,8 @@
 """Leave-one-out cross-validation: predictive density of each sample given all the others.
 
-If a model treats samples as independent, log-densities are log p(y_i | θ), as in `LoadCell.log_likelihood`; if samples
-are correlated, they are log p(y_i | all other y, θ), as in `LoadCell.log_density_left_out` (Bürkner, Gabry & Vehtari
-2021, doi 10.1007/s00180-020-01045-4). In both cases a posterior draw has the weight 1 / p(y_i | θ) under the posterior
-without sample i.
+Log-densities are log p(y_i | θ) of independent samples, or log p(y_i | all other y, θ) of correlated ones (Bürkner,
+Gabry & Vehtari 2021, doi 10.1007/s00180-020-01045-4); a draw has the weight 1 / p(y_i | θ) under the posterior without
+sample i.
 """
 
 from __future__ import annotations
@@ -33,49 +32,38 @@ __all__ = [
     "stacking_weights",
 ]
 
-_LEAST_DRAWS = 25
-"""Smallest number of draws; a fifth of them, the tail, suffices to fit two parameters."""
-
-_LEAST_EFFECTIVE = 10.0
-"""Number of effective draws below which their scatter does not estimate the error of their mean."""
-
-_SAME = 1e-12
-"""Difference of logarithms below which weights are equal."""
-
-_OFF = 1e-5
-"""Largest loss of log-density per sample of the stacking weights relative to the best."""
+_LEAST_DRAWS = 25  # smallest number of draws; a fifth of them, the tail, suffices to fit two parameters
+_LEAST_EFFECTIVE = 10.0  # number of effective draws below which their scatter does not estimate the error of their mean
+_SAME = 1e-12  # difference of logarithms below which weights are equal
+_OFF = 1e-5  # largest loss of log-density per sample of the stacking weights relative to the best
 
 
 class LeftOut(NamedTuple):
     """Predictive log-density of each sample given all the others."""
 
-    log_density: Floats
-    """Shape (samples,)."""
+    log_density: Floats  # shape (samples,)
+    # Monte-Carlo error of each, allowing for autocorrelation; too small, maybe several times, where k̂ is above 0.5,
+    # and infinite where it is above `largest_k`.
     standard_error: Floats
-    """Monte-Carlo error of each, allowing for autocorrelation; too small, maybe several times, where k̂ is above 0.5,
-    and infinite where it is above `largest_k`."""
+    # Shape of the weights' tail, k̂; −∞ where the largest weights are all the same, ∞ where no tail can be fitted.
     pareto_k: Floats
-    """Shape of the weights' tail, k̂; −∞ where the largest weights are all the same, ∞ where no tail can be fitted."""
 
 
 class FromWider(NamedTuple):
     """Predictive log-density of one sample given all the others, from a posterior given fewer samples."""
 
-    log_density: float
-    """NaN where no draw has any weight."""
+    log_density: float  # NaN where no draw has any weight
+    # Monte-Carlo error, allowing for autocorrelation; infinite with fewer than 10 effective draws.
     standard_error: float
-    """Monte-Carlo error, allowing for autocorrelation; infinite with fewer than 10 effective draws."""
-    effective: float
-    """Effective number of draws of the weights, (Σ w)² / Σ w²; autocorrelation reduces it further."""
+    effective: float  # effective number of draws of the weights, (Σ w)² / Σ w²; autocorrelation reduces it further
 
 
 class Difference(NamedTuple):
     """Difference of two models' leave-one-out log-densities."""
 
+    # Sum over samples of the first model's log-densities less the second's; positive if the first predicts better.
     difference: float
-    """Sum over samples of the first model's log-densities less the second's; positive if the first predicts better."""
-    standard_error: float
-    """Standard error from the scatter between samples: √n standard deviations."""
+    standard_error: float  # standard error from the scatter between samples: √n standard deviations
 
 
 def largest_k(draws: int) -> float:
@@ -87,13 +75,10 @@ def largest_k(draws: int) -> float:
 
 
 def left_out(log_densities: Floats) -> LeftOut:
-    """Return leave-one-out predictive densities by Pareto-smoothed importance sampling.
+    """Return leave-one-out densities by Pareto-smoothed importance sampling, from (chains, draws, samples).
 
-    The method is that of Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4. The length of the smoothed tail
-    allows for the autocorrelation of the densities. A small k̂ is no proof where the posterior without a sample extends
-    to values that the whole posterior excludes, as beside a jump: see `left_out_from_wider`.
-
-    Shapes: log_densities (chains, draws, samples).
+    Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4. A small k̂ is no proof beside a jump: see
+    `left_out_from_wider`.
     """
     logs = _checked(log_densities)
     chains, draws, samples = logs.shape
@@ -119,13 +104,9 @@ def left_out(log_densities: Floats) -> LeftOut:
 def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
     """Return the predictive density of a sample given all the others, from a posterior without it and some more.
 
-    Importance sampling from the whole posterior does not reach values that one sample alone excludes, and its k̂ may not
-    show that: beside a jump of the predicted load, both sides of the jump are known from two samples, and without one
-    of them the jump may lie beyond it. The posterior without all of these samples, E, is wider than that without one:
-
-        p(y_i | all other y) = Σ_s w_s p(y_i | θ_s) / Σ_s w_s,   w_s = Π_{j in E, j ≠ i} p(y_j | θ_s).
-
-    Shapes: log_densities (chains, draws, events).
+    A sample beside a jump of the load excludes values alone, which draws of the whole posterior do not reach. Given
+    draws without the samples E, log-densities (chains, draws, events), it is Σ_s w_s p(y_i | θ_s) / Σ_s w_s with w_s =
+    Π_{j in E, j ≠ i} p(y_j | θ_s).
     """
     logs = _checked(log_densities)
     if not 0 <= chosen < logs.shape[-1]:
@@ -134,12 +115,9 @@ def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
 
 
 def reweighted(log_weights: Floats, log_density: Floats) -> FromWider:
-    """Return a mean density over draws from a wider distribution, weighted towards a narrower one.
+    """Return a mean density over draws, (chains, draws), from a wider distribution, weighted towards a narrower one.
 
-    It serves for correlated samples: draws of a posterior without several samples are weighted by the likelihood of all
-    samples except one over the likelihood of those that the posterior was given.
-
-    Shapes: log_weights (chains, draws), log_density (chains, draws).
+    For correlated samples, weights are the likelihood of all samples except one over that of those that were given.
     """
     weights, density = np.asarray(log_weights, dtype=np.float64), np.asarray(log_density, dtype=np.float64)
     if weights.ndim != 2 or weights.shape != density.shape or not weights.size:
@@ -162,13 +140,10 @@ def reweighted(log_weights: Floats, log_density: Floats) -> FromWider:
 
 
 def difference(one: Floats, other: Floats) -> Difference:
-    """Return the difference of two models' leave-one-out log-densities, and its standard error over samples.
+    """Return the difference of two models' leave-one-out log-densities, (samples,), and its standard error.
 
-    The standard error is √n times the standard deviation of n differences: equation 24 of Vehtari, Gelman & Gabry 2017,
-    doi 10.1007/s11222-016-9696-4. Below 4 or so a difference says little, and its standard error is too small (Sivula
-    et al. 2020, arXiv 2008.10296).
-
-    Shapes: one, other (samples,).
+    Equation 24 of Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4; below 4 or so a difference says little,
+    and its standard error is too small (Sivula et al. 2020, arXiv 2008.10296).
     """
     one, other = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
     if one.ndim != 1 or one.shape != other.shape or one.size < 2:
@@ -180,12 +155,10 @@ def difference(one: Floats, other: Floats) -> Difference:
 
 
 def stacking_weights(log_densities: Floats) -> Floats:
-    """Return the weights of the mixture of models with the best leave-one-out predictions (stacking).
+    """Return the weights, (models,), with the best leave-one-out predictions, from (models, samples): stacking.
 
-    They maximise Σ_i log Σ_k w_k p_k(y_i | all other y) over w ≥ 0 with sum one, a convex problem: Yao et al. 2018, doi
-    10.1214/17-BA1091. The result is within 1e-5 per sample of the optimum.
-
-    Shapes: log_densities (models, samples) → (models,).
+    They maximise Σ_i log Σ_k w_k p_k(y_i | all other y), a convex problem, to 1e-5 per sample (Yao et al. 2018, doi
+    10.1214/17-BA1091).
     """
     logs = np.asarray(log_densities, dtype=np.float64)
     if logs.ndim != 2 or not logs.size:

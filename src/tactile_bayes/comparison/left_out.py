@@ -17,19 +17,16 @@ from tactile_bayes.numerics.random_numbers import Seed, spawn
 
 __all__ = ["PredictedSamples", "predicted_samples"]
 
-_DRAWS = 2000
-"""Largest number of draws under which densities are computed."""
+_DRAWS = 2000  # largest number of draws under which densities are computed
 
 
 class PredictedSamples(NamedTuple):
     """Leave-one-out log-density of each sample, its channels together, in units of EI/L and EI/L²."""
 
+    # Shape (samples,); NaN next to events if the load cell drifts or has an unknown bias, or beside a discrepancy.
     log_density: Floats
-    """Shape (samples,); NaN next to events if the load cell drifts or has an unknown bias, or beside a discrepancy."""
-    standard_error: Floats
-    """Monte-Carlo error; infinite where it cannot be trusted."""
-    pareto_k: Floats
-    """NaN where the contour was inferred again without the sample."""
+    standard_error: Floats  # Monte-Carlo error; infinite where it cannot be trusted
+    pareto_k: Floats  # NaN where the contour was inferred again without the sample
 
 
 def predicted_samples(
@@ -37,10 +34,8 @@ def predicted_samples(
 ) -> PredictedSamples:
     """Return the leave-one-out predictive densities of a record.
 
-    They come from the posterior by Pareto-smoothed importance sampling, except next to first contact and snap-off.
-    There the record without a sample allows contours that would have been touched later, or let go earlier, of which
-    the posterior has none: these samples are predicted from a posterior that is inferred again without any of them,
-    weighted by the likelihood of all of them except one.
+    Next to first contact and snap-off the posterior has none of the contours that the record without a sample allows:
+    these samples are predicted from a posterior without any of them.
     """
     model = problem.model
     logs = _densities(model, sampled.draws)

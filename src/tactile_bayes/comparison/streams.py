@@ -32,11 +32,8 @@ __all__ = ["StreamComparison"]
 
 _KIND = "streams of families of tactile-bayes"
 
-_DRAWS = 4000
-"""Number of contours from which averaged heights are computed."""
-
-_KEPT_DRAWS = 1000
-"""Number of draws of a contour that are in a result, of each family."""
+_DRAWS = 4000  # number of contours from which averaged heights are computed
+_KEPT_DRAWS = 1000  # number of draws of a contour that are in a result, of each family
 
 
 class StreamComparison:

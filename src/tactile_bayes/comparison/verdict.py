@@ -10,11 +10,9 @@ from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["NONE_FITS", "verdict_on"]
 
+# Beginning of the verdict if no family passes the check.
 NONE_FITS = "None fits: with the rig as assumed, the record does not look like one of any of these shapes"
-"""Beginning of the verdict if no family passes the check."""
-
-_LIKELY = 0.05
-"""Smallest probability with which a family is named."""
+_LIKELY = 0.05  # smallest probability with which a family is named
 
 
 def verdict_on(result: xr.Dataset) -> str:

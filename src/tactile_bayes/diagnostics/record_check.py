@@ -231,8 +231,8 @@ def _loaded(posterior: xr.DataTree) -> Flags:
     along, place = travels_of(record), "travel" if carried_sweeps(record) else "drive_angle"
     loaded = np.zeros(along.size, dtype=bool)
     ends = np.sort(np.stack([events[f"first_{place}"].values, events[f"snap_off_{place}"].values]), axis=0)
-    for segment, low, high in zip(segments, *ends, strict=True):
-        loaded[segment.samples] = (along[segment.samples] >= low) & (along[segment.samples] <= high)
+    for own, low, high in zip(segments.samples, *ends, strict=True):
+        loaded[own] = (along[own] >= low) & (along[own] <= high)
     return loaded
 
 

@@ -31,7 +31,7 @@ from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import expanded
 
-__all__ = ["Sampled", "calibrate_rig", "contours_of", "infer_contour", "rig_posterior", "sampled"]
+__all__ = ["Sampled", "calibrate_rig", "contours_of", "infer_contour", "sampled"]
 
 _PRIOR_SECONDS = 3.0  # time limit for draws from the prior [s] if time is limited, since a rod may reach few contours
 
@@ -51,12 +51,11 @@ def infer_contour(
 
     The likelihood includes the unloaded samples: a contour whose first contact or snap-off is earlier or later than
     the record shows is unlikely. Contours that some sweep of the record could not reach are excluded. The walkers start
-    around a robust least-squares optimum, whose search begins at the contact points of Step 2, or, if channels are
-    missing, at the best of many draws from the prior. Of more than 2,000 samples the likelihood takes blocks of
-    neighbouring readings, or every so many samples where the noise does not allow it: the attribute `blocks` and the
-    message state it, and groups by sample are of these. The sampler is emcee (Foreman-Mackey et al. 2013, doi
-    10.1086/670067), with proposals by differential evolution (ter Braak 2006, doi 10.1007/s11222-006-8769-1) and from
-    fitted t distributions.
+    around a robust least-squares optimum, whose search begins at the contact points of Step 2 and at draws from the
+    prior. Of more than 2,000 samples the likelihood takes blocks of neighbouring readings, or every so many samples
+    where the noise does not allow it: the attribute `blocks` and the message state it, and groups by sample are of
+    these. The sampler is emcee (Foreman-Mackey et al. 2013, doi 10.1086/670067), with proposals by differential
+    evolution (ter Braak 2006, doi 10.1007/s11222-006-8769-1) and from fitted t distributions.
 
     Parameters
     ----------
@@ -109,29 +108,20 @@ def infer_contour(
     Notes
     -----
     The default priors follow from pivot and rod length L alone, not from measured values. Vertex: within a rod length
-    of the pivot sideways and in height, uniformly. Parabola's a: log-normal around 1/L, circle's r and the ellipse's
-    semi-axes a (sideways) and b: log-normal around L/2, all with standard deviation 1 of the logarithm. The power law
-    is (y − q)/w = (|x − x_c|/w)ⁿ, so that w is where the contour is as high as it is wide: log-normal around L,
-    standard deviation 1 of the logarithm; n − 1: log-normal around 1, standard deviation 0.7 of the logarithm, n from
-    1.1 to 50. Shape-free contours have a radius of curvature whose logarithm is a random function of the slope angle:
-    r, its geometric mean from −π/2 to π/2, log-normal like a circle's; amplitude, the standard deviation of that
-    logarithm, log-normal around 0.7, standard deviation 0.6 of the logarithm; length_scale, the slope angle over which
-    it changes [rad], log-normal around 0.7, standard deviation 0.4 of the logarithm, from 0.15 to 4 (Matérn's
-    covariance, ν = 5/2); z_1, z_2 …, standard normal, in the directions that make 99 % of its variance at the shortest
-    length scale. They are smooth: a sharper corner, or a radius that jumps, is smoothed. noise_scale: log-normal around
-    1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Those of
-    the rig are in the table of `tactile-bayes rig --parameters`. In addition, contours out of reach are excluded, those
-    that the rod would still cut after snap-off, and those that a rod curved toward the object would touch twice.
+    of the pivot sideways and in height, uniformly. Log-normal, with a standard deviation of 1 of the logarithm, are
+    parabola's a, around 1/L; circle's r and ellipse's semi-axes a (sideways) and b, around L/2; and w of a power law,
+    (y − q)/w = (|x − x_c|/w)ⁿ, around L. Its n − 1 is log-normal around 1 (0.7), n from 1.1 to 50. Shape-free contours
+    are smooth: the logarithm of their radius of curvature is a random function of the slope angle with Matérn's
+    covariance, ν = 5/2. r, its geometric mean, is log-normal like a circle's; amplitude, its standard deviation, around
+    0.7 (0.6); length_scale [rad] around 0.7 (0.4), from 0.15 to 4; z_1, z_2 …, its directions, are standard normal.
+    noise_scale is log-normal around 1 (0.5); unknown noises are log-uniform from 1e-6 to 10, in EI/L and EI/L². Those
+    of the rig are in the table of `tactile-bayes rig --parameters`. In addition, contours out of reach are excluded,
+    those that the rod would still cut after snap-off, and those that a rod curved toward the object would touch twice.
 
-    The discrepancy is a Gaussian process over the drive angle, or over the travel in rod lengths where the drive
-    carries the base, independent in each channel and each sweep segment, with Matérn's covariance, ν = 3/2. Its
-    standard deviation is discrepancy_scale times the largest load of the segment that contour and rig predict, of the
-    moment, or of the force in any direction; it is zero out of contact, where nothing but the sensor acts. Sweeps that
-    repeat a segment have it in common. The likelihood integrates it out exactly, by a Kalman filter, beside drift and
-    unknown biases; it is refused beside outliers, correlated noise, errors of the encoder, and readings at the end of
-    the range. Whatever is smooth may be discrepancy: bands become wider, and what both explain, like a small dent of
-    the contour, is no longer seen. It does not correct a wrong property of the rig that another contour explains as
-    well.
+    A discrepancy is a Gaussian process over the drive, ν = 3/2, of each channel and sweep segment, in proportion to the
+    largest load and zero out of contact. It is refused beside outliers, correlated noise, errors of the encoder, and
+    readings at the end of the range. It widens bands, may explain what is smooth, like a small dent of the contour, and
+    does not correct a wrong property of the rig that another contour explains as well.
 
     Examples
     --------
@@ -211,27 +201,12 @@ def calibrate_rig(
     ['rigidity_scale']
     """
     settings, rig = settings_of(settings), rig_of(rig)
-    posterior = rig_posterior(records, contour, rig, rng, settings, checkpoint, progress, keep)
-    found = rig_prior(posterior)
-    left = {name: value for name, value in expanded(rig.entries).items() if name not in found.priors}
-    return replace(rig, unknown=left, calibration=found)
-
-
-def rig_posterior(
-    records: xr.Dataset,
-    contour: Contour,
-    rig: Rig,
-    rng: Rng,
-    settings: SamplerSettings,
-    checkpoint: str | os.PathLike[str] | None = None,
-    progress: Callable[[Progress], object] | None = None,
-    keep: Callable[[xr.DataTree], object] | None = None,
-) -> xr.DataTree:
-    """Return the posterior of a rig's parameters from a record of a gauge; see `calibrate_rig`."""
     experiment = Experiment(records, rig, events=settings.events, gauge=Gauge(contour))
     if not experiment.unknowns.names:
         raise ParameterError("nothing of the rig is unknown: say that one of its parameters is, like rigidity_scale")
-    return _posterior_of(experiment, rng, settings, checkpoint, progress, keep)
+    found = rig_prior(_posterior_of(experiment, rng, settings, checkpoint, progress, keep))
+    left = {name: value for name, value in expanded(rig.entries).items() if name not in found.priors}
+    return replace(rig, unknown=left, calibration=found)
 
 
 def _posterior_of(
@@ -313,10 +288,7 @@ def sampled(
 def _likeliest(
     problem: ContourProblem, seed: np.random.SeedSequence, settings: SamplerSettings, deadline: Deadline
 ) -> tuple[ContourProblem, Walk]:
-    """Return the problem with the most evidence, of those with all sides of contact, and the start of its walkers.
-
-    Its attributes state the sides of contact and their probability.
-    """
+    """Return the problem with the most evidence of those with all sides of contact, and the start of its walkers."""
     if not problem.others:
         return problem, walk_of(problem.model, seed, settings, deadline)
     found: list[tuple[float, ContourProblem, Walk]] = []

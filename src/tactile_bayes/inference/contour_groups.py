@@ -46,10 +46,7 @@ def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
 
 
 def predicted_groups(model: ContourModel, draws: Draws, rng: np.random.Generator) -> dict[str, xr.Dataset]:
-    """Return events for `_KEPT_DRAWS` draws of each chain, and predictions for as many, or fewer if the record is long.
-
-    The attribute `stored` of the groups states a smaller number of draws.
-    """
+    """Return events of `_KEPT_DRAWS` draws of each chain, and predictions for as many, or as a long record allows."""
     kept = draws.evenly(_KEPT_DRAWS)
     chains, samples = len(draws.samples), len(model.likelihood.measured)
     affordable = _STORED_NUMBERS // (chains * samples * (len(CHANNELS) + 1))
@@ -116,7 +113,7 @@ def _labelled_events(model: ContourModel, events: Mapping[str, Floats], coords: 
         what = name.removeprefix("first_").removeprefix("snap_off_")
         column = COLUMNS["base_x" if what == "travel" else what]
         variables[name] = (("chain", "draw", "stroke"), values, {"units": column.unit_in(units)})
-    sides = ["backward" if segment.backward else "forward" for segment in model.likelihood.segments]
+    sides = np.where(model.likelihood.segments.backward, "backward", "forward")
     return xr.Dataset(variables, coords={**coords, "stroke": sides})
 
 

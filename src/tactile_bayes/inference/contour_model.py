@@ -40,10 +40,9 @@ _FEWEST_TRIALS = 1000  # draws of the prior before none within reach is an error
 class ContourModel:
     """Prior times likelihood, as a function of arrays of parameters, in the record's units.
 
-    Points, shape (n, d), have the parameters of the contour first, then those of the rig (`forward_parameters`), then
-    those of the noise, then those of a discrepancy; together they are `names`, with their bounds `low` and `high`.
-    `of_path` are the places of those that change the path, or where along it the samples lie; `found` is the result of
-    `zero_load`; `zero` (NaN if unknown) and `deviation` are those of each channel [EI/L, EI/L²].
+    Points, (n, d), have the parameters `names`: of the contour, the rig (both are `forward_parameters`), the noise, and
+    a discrepancy. `of_path` are the columns of those that move samples along the path; `zero` (NaN if unknown) and
+    `deviation` are those of each channel [EI/L, EI/L²].
     """
 
     def __init__(
@@ -168,10 +167,7 @@ class ContourModel:
         return self.unknowns.sensed(loads, self.values(points), self.likelihood.load_cell)
 
     def loads_and_events(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return `loads`, and drive angles of events as from `RecordLikelihood.predict_with_events`.
-
-        Points that differ only in what the load cell senses, as many do in differences, share one path.
-        """
+        """Return `loads`, and events as `RecordLikelihood.predict_with_events`; points of the same path share it."""
         _, first, path = np.unique(points[:, self.of_path], axis=0, return_index=True, return_inverse=True)
         different = points[first]
         loads, _, events = self.likelihood.predict_with_events(self.contours(different), self.rig(different))
@@ -179,10 +175,7 @@ class ContourModel:
         return sensed, events[path]
 
     def felt(self, points: Floats) -> tuple[Floats, Flags]:
-        """Return the loads of contour and rig alone for every encoder error, and which points are usable.
-
-        Shapes are (n, errors, samples, 3) and (n,).
-        """
+        """Return loads of contour and rig alone, (n, errors of the encoder, samples, 3), and what is usable."""
         return self.likelihood.predict_with_errors(self.contours(points), self.rig(points))
 
     def sensed(self, points: Floats, felt: Floats) -> tuple[Floats, Discrepancy | None]:
@@ -198,16 +191,18 @@ class ContourModel:
         return scale
 
     def discrepancy(self, points: Floats, loads: Floats) -> Discrepancy | None:
-        """Return the discrepancy of points, for the loads (n, samples, 3) of contour and rig alone; None without.
-
-        It is one of readings: with the gain of the cell.
-        """
+        """Return the discrepancy of readings, for loads (n, samples, 3) of contour and rig alone; None without."""
         if not self.noise.of_discrepancy:
             return None
         scale, length = points[:, [self.names.index(name) for name in self.noise.of_discrepancy]].T
         course = self.likelihood.segments.course
         read = course.load_in_contact(loads) * self.likelihood.load_cell.own_gains
         return Discrepancy(course, scale[:, None, None] * read, length)
+
+    def load_in_contact(self, point: Floats) -> Floats:
+        """Return the largest load of each sample's segment if it is in contact, (samples, 3), at a point, (d,)."""
+        loads, _ = self.likelihood.predict(self.contours(point[None]), self.rig(point[None]))
+        return self.likelihood.segments.course.load_in_contact(loads[0])
 
     def discrepancy_at(self, point: Floats) -> Discrepancy | None:
         """Return the discrepancy of one point, shape (d,), for a single record; None without."""
@@ -248,10 +243,7 @@ class ContourModel:
         return Ends(self.low, self.high).hold(points)
 
     def log_probability(self, points: Floats) -> Floats:
-        """Return the logarithm of prior times likelihood, shape (n,); −inf outside support or reach.
-
-        It lacks the prior's normalisation over contours within reach.
-        """
+        """Return the log of prior times likelihood, (n,), without the normalisation over reach; −inf outside either."""
         values = self.log_prior(points)
         for which in self.possible(values):
             values[which] += self.log_likelihood(points[which])
@@ -266,8 +258,7 @@ class ContourModel:
     def prior_points(
         self, rng: np.random.Generator, count: int, others: Mapping[str, Distribution] = MappingProxyType({})
     ) -> Floats:
-        """Draw from the prior of all contours, within reach or not, with other priors of some parameters; shape
-        (count, d)."""
+        """Draw (count, d) from the prior of all contours, within reach or not, with some other priors."""
         priors = {**self.priors, **others}
         points = np.stack([priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
         if self.unknowns.joint is not None:

@@ -43,10 +43,7 @@ class Deadline:
     def least_squares(
         self, residuals: Callable[..., Floats], start: Floats, jacobian: Callable[..., Floats], **options: Any
     ) -> OptimizeResult:
-        """Apply `scipy.optimize.least_squares`, and return the result at the best point so far if the deadline passes.
-
-        The deadline is exceeded by at most two calls of the residuals and of the Jacobian.
-        """
+        """Apply `scipy.optimize.least_squares`; after the deadline, return the result at the best point so far."""
         best = start
 
         def watched(point: Floats, *args: Any) -> Floats:

@@ -122,9 +122,9 @@ class Proposal(_Density):
 
     @classmethod
     def fitted(cls, points: Floats, weights: Floats | None = None, ends: Ends = ANYTHING) -> Proposal:
-        """Fit a proposal to points, shape (n, parameters), with weights of sum one, in any units of the parameters.
+        """Fit a proposal to points, (n, parameters), with weights of sum one, in any units of the parameters.
 
-        The points are assumed to come from a normal distribution that is truncated at the lower bounds.
+        The points are taken for draws of a normal distribution that is truncated at the lower bounds.
         """
         weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
         mean = weights @ points
@@ -183,11 +183,10 @@ class Mixture(_Density):
 
     @classmethod
     def fitted(cls, points: Floats, bent: Sequence[int], parts: int, ends: Ends = ANYTHING) -> Mixture:
-        """Fit a mixture to points, shape (n, parameters), that lie along a bent ridge.
+        """Fit a mixture to points, (n, parameters), along a bent ridge, by expectation and maximisation.
 
-        Its parts are normal distributions of the columns `bent`, found by expectation and maximisation; given these,
-        the other columns are the same normal distribution everywhere, with a mean that is linear in them. Parts begin
-        as slices of equal numbers along the longest direction.
+        Its parts are normal in the columns `bent`; given these, the others are the same normal distribution everywhere,
+        with a mean that is linear in them.
         """
         deviation = points.std(axis=0)
         _refuse_constant(deviation, np.abs(points).max(axis=0))
@@ -242,10 +241,7 @@ def _refuse_constant(deviation: Floats, size: Floats) -> None:
 
 
 def _untruncated(above: float, variance: float) -> tuple[float, float]:
-    """Return the changes of mean and variance that undo the truncation of a normal distribution.
-
-    Its lower bound lies `above` below the truncated mean; all numbers are in truncated standard deviations.
-    """
+    """Return changes of mean and variance that undo truncation at a bound `above` below the mean, in deviations."""
     mills = np.exp(-0.5 * _CUTS**2) / (np.sqrt(2.0 * np.pi) * ndtr(-_CUTS))
     narrow = np.sqrt(1.0 - mills * (mills - _CUTS))
     cut = np.interp(-above, -(mills - _CUTS) / narrow, _CUTS)
@@ -254,10 +250,7 @@ def _untruncated(above: float, variance: float) -> tuple[float, float]:
 
 
 def _pieces(points: Floats, count: int) -> tuple[Floats, Floats, Floats]:
-    """Return shares, (count,), means, (count, k), and covariances, (count, k, k), of a mixture of normal distributions.
-
-    A covariance is drawn toward that of all points, made narrower, by as many points as the prior weighs.
-    """
+    """Return shares, (count,), means, (count, k), and covariances of a mixture of normal distributions of points."""
     whole = np.cov(points.T).reshape(2 * points.shape[1:])
     along = points @ np.linalg.eigh(whole)[1][:, -1]
     shares = np.eye(count)[np.argsort(np.argsort(along, kind="stable"), kind="stable") * count // len(points)].T

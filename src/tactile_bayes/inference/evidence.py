@@ -1,4 +1,4 @@
-"""The evidence of a model: the integral of prior times likelihood, from draws, by bridge sampling."""
+"""The integral of a density, as of prior times likelihood, from draws, by bridge sampling."""
 
 from __future__ import annotations
 
@@ -12,14 +12,9 @@ from scipy.special import expit, log_expit, ndtr
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.contour import Sampled
-from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.coordinates.base import in_coordinates
 from tactile_bayes.inference.densities import Proposal, effective_number, normalised
-from tactile_bayes.inference.importance import weighed
-from tactile_bayes.inference.parameters.priors import widened
 
-__all__ = ["WIDTHS", "ContourEvidence", "Evidence", "bridge_evidence", "contour_evidence"]
+__all__ = ["Evidence", "bridge_evidence"]
 
 _KNOTS = np.linspace(-2.0, 2.0, 7)  # of normal scores: more would follow noise, fewer would not resolve hard bounds
 _PROPOSALS = 4000  # for a standard error of 0.01 to 0.04
@@ -29,9 +24,6 @@ _LEAST_PER_PARAMETER = 5  # draws in a half, for an estimate of the covariance
 _FLAT = 1e-13  # smallest over largest variance of standardised parameters below which the variance is due to rounding
 _LEAST_TERMS = 5.0  # effective number of draws, and of proposals, for an estimate
 _ROUNDS = 2  # for the effective number of draws, which hardly depends on the threshold, and vice versa
-WIDTHS = (0.5, 1.0, 2.0)  # factors on the widths of the priors of sizes, exponents, amplitude and length scale
-_POSTERIOR_DRAWS = 8000  # that are used, evenly spread, since neighbours add little
-_PRIOR_DRAWS, _OTHER_DRAWS = 4000, 1000  # for the share within reach, with the prior and with one of another width
 
 
 class Evidence(NamedTuple):
@@ -52,28 +44,19 @@ def bridge_evidence(
     *,
     proposals: int = _PROPOSALS,
 ) -> Evidence:
-    """Return the logarithm of the integral of a density, from draws of it.
+    """Return the logarithm of the integral of a density, from draws (chains, n, d), walker-major, and their values.
 
     With density f = Z p and draws of p and of a normalised density q like it,
 
         Z = E_q[f h]/E_p[q h],  h = 1/(s f/Z + (1 − s) q),  s = n/(n + m),
 
-    for n effective draws of p and m draws of q; this h has the least error (Meng & Wong 1996, Statistica Sinica 6, 831;
-    Gronau et al. 2017, doi 10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and compared with the
-    other, since a comparison with the fitted draws is biased (Overstall & Forster 2010, doi
-    10.1016/j.csda.2010.03.008). The result is the mean over both assignments of the halves. Its standard error has both
-    terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with the autocorrelation of the terms.
-    The errors due to the fits are common to both results and do not average out; only the error that is independent of
-    the fit does, whose share is estimated by the correlation of the terms under both fits. In tens of dimensions that
-    is slightly too small, and makes the standard error up to a quarter too large.
-
-    q is a normal distribution of normal scores, each piecewise linear in one parameter, to account for hard bounds and
-    skewness of single parameters; or in one of the uncorrelated axes nearest to the parameters, if the draws are more
-    probable under that fit. For normal densities in 40 dimensions and 500 independent draws in each half the error is a
-    sixth larger than with a plain normal fit; with 15 half-normal parameters among them it is half as large. A t
-    distribution and a symmetrised density (Warp-III of Meng & Schilling 2002, at equal evaluations) gained nothing.
-
-    Shapes: draws (chains, n, d), walker-major, log_densities (chains, n).
+    for n effective draws of p and m of q (Meng & Wong 1996, Statistica Sinica 6, 831; Gronau et al. 2017, doi
+    10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and compared with the other, and vice versa: a
+    comparison with the fitted draws is biased (Overstall & Forster 2010, doi 10.1016/j.csda.2010.03.008). The error has
+    both terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with autocorrelation; only what does
+    not depend on the fit averages out. In tens of dimensions it is up to a quarter too large. q is normal in scores
+    that are piecewise linear in one parameter, for hard bounds and skewness, or in one of the uncorrelated axes nearest
+    to the parameters. Neither t distributions nor a symmetrised density (Warp-III) gained anything.
     """
     count = proposals // 2
     _refuse_few(draws)
@@ -99,56 +82,8 @@ def bridge_evidence(
     )
 
 
-class ContourEvidence(NamedTuple):
-    """Evidence of one family."""
-
-    log_evidence: Floats  # for each of `WIDTHS`, (3,)
-    standard_error: float
-    overlap: float  # as of `Evidence`
-
-
-def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Generator) -> ContourEvidence:
-    """Return the evidence of a model by bridge sampling, in the coordinates of the sampler.
-
-    The prior is restricted to contours within reach, as in the generator, so that the integral over all contours is
-    divided by their share. With priors of other widths, the evidence follows from the same draws by importance weights.
-    """
-    coordinates, (chains, _, size) = sampled.coordinates, sampled.draws.samples.shape
-    kept = sampled.draws.evenly(_POSTERIOR_DRAWS // chains)
-    points = sampled.draws.samples[:, kept].reshape(-1, size)
-    transformed = coordinates.of(points)
-    _, growth = coordinates.parameters(transformed)
-    bridge = bridge_evidence(
-        in_coordinates(model.log_probability, coordinates),
-        transformed.reshape(chains, -1, size),
-        sampled.draws.log_probability[:, kept] + growth.reshape(chains, -1),
-        rng,
-    )
-    own = {name: model.priors[name] for name in model.family.parameters}
-    logs, share = [], 0.0
-    for width in WIDTHS:
-        others = widened(own, width)
-        change = np.zeros(len(points))
-        for name, prior in others.items():
-            if prior is not own[name]:
-                values = points[:, model.names.index(name)]
-                change += prior.logpdf(values) - own[name].logpdf(values)
-        reached = model.share_within_reach(rng, _PRIOR_DRAWS if width == 1.0 else _OTHER_DRAWS, others)
-        share = reached if width == 1.0 else share
-        logs.append(bridge.log_evidence + weighed(change)[1] - np.log(reached))
-    error = np.hypot(bridge.standard_error, np.sqrt((1.0 - share) / (share * _PRIOR_DRAWS)))
-    return ContourEvidence(np.array(logs), float(error), bridge.overlap)
-
-
-# ---- bridge sampling
-
-
 def _fitted(points: Floats) -> _Fit:
-    """Return the fit to points, shape (n, d), along the axes that make them more probable.
-
-    Axes along the parameters resolve hard bounds. If the parameters are so strongly correlated that errors of their
-    scores exceed the remaining variance, the nearest uncorrelated axes are better.
-    """
+    """Return the fit to points, (n, d), along parameters, which resolves bounds, or uncorrelated axes: the likelier."""
     deviation = points.std(axis=0)
     same = np.flatnonzero(deviation <= 0.0)
     if same.size:
@@ -235,8 +170,8 @@ class _Bridge(NamedTuple):
 def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
     """Return the bridge estimate from log f − log q at draws of f, shape (chains, n), and of q, shape (m,).
 
-    Draws and proposals enter by logistic functions, whose sums over both are equal at the threshold log Z + log(m/n);
-    one increases with the threshold and the other decreases (Bennett 1976, doi 10.1016/0021-9991(76)90078-4).
+    The sums of logistic functions over both are equal at the threshold log Z + log(m/n) (Bennett 1976, doi
+    10.1016/0021-9991(76)90078-4).
     """
     if not np.any(np.isfinite(proposed)):
         raise InferenceError(

@@ -36,13 +36,6 @@ class Experiment:
     """A record, or a template, its rig and the family of its contour, with priors of all unknown parameters.
 
     With a `gauge`, the contour is known. `events` says whether unloaded samples count, as in `SamplerSettings`.
-
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> from tactile_bayes.rig import NOTHING
-    >>> record = scan(paper_profile("II", q=0.5)).record
-    >>> Experiment(record, Rig(unknown={**NOTHING, "friction": "default"})).model.names
-    ('a', 'q', 'x_c', 'friction', 'moment_noise', 'force_noise')
     """
 
     record: xr.Dataset

@@ -32,10 +32,7 @@ _MIN_EFFECTIVE = 5  # effective draws per parameter for a covariance; weights ar
 
 
 def weighed(logs: Floats) -> tuple[Floats, Floats]:
-    """Return log-weights of sum one along the first axis, and the log of the mean of the given ones.
-
-    That is the evidence, if these are the log-densities of a target over those of its proposal.
-    """
+    """Return log-weights of sum one along the first axis, and the log of the given ones' mean, the evidence."""
     with np.errstate(invalid="ignore"):
         total = logsumexp(logs, axis=0)
         return np.asarray(logs - total), np.asarray(total - np.log(len(logs)))
@@ -57,11 +54,8 @@ def approximate(
 ) -> Proposal:
     """Approximate a target by rounds of adaptive importance sampling, from a guess at mean and covariance.
 
-    The proposal of a round is fitted to the draws of the round before, weighted by the target; the most efficient round
-    gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin & Robert 2004, doi
-    10.1198/106186004X12803). After the deadline there is no further round.
-
-    Shapes: centre (parameters,), covariance (parameters, parameters).
+    The most efficient round gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin &
+    Robert 2004, doi 10.1198/106186004X12803). After the deadline there is no further round.
     """
     best = proposal = Proposal(centre, WIDENING * np.asarray(np.linalg.cholesky(covariance)), ends=ends)
     for _ in range(_ROUNDS):

@@ -49,12 +49,9 @@ def optima(
     high: Floats | float = np.inf,
     deadline: Deadline = NEVER,
 ) -> Iterator[Optimum]:
-    """Yield robust least-squares optima, one from each candidate.
+    """Yield robust least-squares optima, one from each candidate, (d,).
 
-    A search may pass through points that are a priori impossible; if it ends at one, it is repeated within the bounds
-    from the nearest possible point.
-
-    Shapes: candidates (d,), middle, spread (d,), low, high (d,).
+    A search may pass through points that are a priori impossible; if it ends at one, it is repeated within the bounds.
     """
     for candidate in candidates:
         found = descend(residuals, candidate, middle, spread, deadline=deadline)
@@ -83,11 +80,9 @@ def descend(
     high: Floats | float = np.inf,
     deadline: Deadline = NEVER,
 ) -> Optimum:
-    """Return the robust least-squares optimum from one starting point.
+    """Return the robust least-squares optimum from one starting point, in units of `spread`.
 
-    Arguments are those of `optima`. The search is in units of `spread`, so that it does not depend on those of the
-    record. The loss is 2 (√(1 + z) − 1) of squared residuals z in units of the threshold (pseudo-Huber, `soft_l1` of
-    `scipy.optimize.least_squares`), and quadratic for the priors.
+    Of the record's squared residuals z in units of the threshold the loss is 2 (√(1 + z) − 1); of the priors' it is z.
     """
 
     def one(point: Floats) -> Floats:

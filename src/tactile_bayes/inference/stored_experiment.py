@@ -13,15 +13,17 @@ from tactile_bayes.distributions import in_words
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
+from tactile_bayes.inference.parameters.unknowns import Unknowns, belongs
+from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import contour_draws, known_of, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contacts_of
-from tactile_bayes.record import CHANNELS, present_channels
+from tactile_bayes.record import CHANNELS, present_channels, rod_of
 from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["contact_points", "experiment_of", "found_rig", "points_of", "predicted_points"]
+__all__ = ["contact_points", "experiment_of", "found_rig", "likelihood_of", "points_of", "predicted_points"]
 
 
 def experiment_of(posterior: xr.DataTree, family: Family | None = None, rig: Rig | None = None) -> Experiment:
@@ -52,6 +54,17 @@ def predicted_points(posterior: xr.DataTree, names: tuple[str, ...]) -> Floats:
     predicted = posterior["posterior_predictive"].to_dataset()
     draws = contour_draws(posterior).sel(chain=predicted["chain"], draw=predicted["draw"])
     return np.stack([draws[name].transpose("chain", "draw").values.ravel() for name in names], axis=-1)
+
+
+def likelihood_of(posterior: xr.DataTree, record: xr.Dataset) -> tuple[RecordLikelihood, Unknowns]:
+    """Return the likelihood of a posterior's record, of which the paths are, and the unknowns of its rig."""
+    inferred = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
+    names = tuple(name for name in inferred if not belongs(name, "discrepancy"))
+    unknowns = Unknowns(names, {}, rod_of(record), known_of(posterior.attrs))
+    # `infer_contour` gives a cell whose noise it infers a noise of 1.
+    noises: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in posterior["posterior"]}
+    cell = replace(LoadCell.from_record(record) or LoadCell(), **noises)
+    return RecordLikelihood(record, cell, unknowns.friction), unknowns
 
 
 def found_rig(measured: xr.Dataset, posterior: xr.DataTree, load_cell: LoadCell | None = None) -> Corrected:

@@ -20,16 +20,14 @@ from tactile_bayes.reconstruction.samples import Samples
 
 __all__ = ["AXIAL_ALARM", "axial_score"]
 
-AXIAL_ALARM = 6.0
-"""Size of the axial score above which the force along the rod is reported to disagree with the moment."""
+AXIAL_ALARM = 6.0  # size of the axial score above which the force along the rod is reported to disagree with the moment
 
 
 def axial_score(samples: Samples, friction: float) -> float:
-    """Mean difference, over tangential contacts, of the force along the rod at the pivot and its value from the moment,
-    over its standard error; NaN if there is no usable contact.
+    """Return the mean difference of the force along the rod from its value by the moment, over its standard error.
 
-    For rods that vary along their length, which have no first integral, it is the difference of f sin ψ1 at the contact
-    from its value −f sin δ.
+    For rods that vary along their length, it is that of f sin ψ1 at the contact from −f sin δ; NaN without a usable
+    contact.
     """
     if samples.rods.profile is None:
         surplus, variance = _of_arcs(samples, friction)
@@ -66,12 +64,10 @@ def _of_arcs(samples: Samples, friction: float) -> tuple[Floats, Floats]:
 
 
 def _of_varied_rods(samples: Samples, delta: Floats) -> tuple[Floats, Floats]:
-    """Difference D = f (sin ψ1 + sin δ) by Step 2, to first order about the best tangential contact, and its variance.
+    """Return D = f (sin ψ1 + sin δ) by Step 2, to first order about the best tangential contact, and its variance.
 
-    D is zero for all tangential contacts, so that its derivatives there follow from those of the loads, without Step 2
-    of the noisy readings, which may have no contact. The curvature of the sheet of tangential contacts gives the first
-    order an expectation of second order, which is subtracted. Samples without neighbours one standard deviation aside
-    are left out.
+    D is zero for all tangential contacts, so that its derivatives there follow from the loads. The expectation of
+    second order is subtracted; samples without neighbours one deviation aside are left out.
     """
     reading, rods = samples.reading, samples.rods
     fit = fit_sheet(reading, delta, TANGENTIAL, rods)

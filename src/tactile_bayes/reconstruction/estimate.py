@@ -32,6 +32,7 @@ __all__ = [
 
 NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE, EITHER_PHASE, NO_FIT, AMBIGUOUS = range(10)
 
+# Statuses of a sample, by code.
 STATUSES = (
     "no contact",
     "cut off",
@@ -44,36 +45,23 @@ STATUSES = (
     "does not fit",
     "ambiguous",
 )
-"""Statuses of a sample, by code."""
-
-MOST_BEND = 0.5
-"""Shift by curvature, in standard deviations, above which a covariance of first order is not valid."""
-
-RIVAL = 6.0
-"""Difference of sums of squares below which another contact is not negligible: a likelihood ratio of 20."""
-
-_WEAK = 10.0
-"""Standard deviations of the noise below which a force is weak, so that its direction is uncertain."""
-
+MOST_BEND = 0.5  # shift by curvature, in standard deviations, above which a covariance of first order is not valid
+RIVAL = 6.0  # difference of sums of squares below which another contact is not negligible: a likelihood ratio of 20
+_WEAK = 10.0  # standard deviations of the noise below which a force is weak, so that its direction is uncertain
 _ROUNDING = 1e-9
 
 
 class Estimate(NamedTuple):
     """Contacts, dimensionless and mirrored to forward ones; NaN where there is none."""
 
-    place: Floats
-    """Contact point, slope angle and arc length, shape (n, 4)."""
-    covariance: Floats | None
-    """Covariance of the place, shape (n, 4, 4); None without any noise level."""
+    place: Floats  # contact point, slope angle and arc length, shape (n, 4)
+    covariance: Floats | None  # covariance of the place, shape (n, 4, 4); None without any noise level
     phase: NDArray[np.int8]
-    status: NDArray[np.int8]
-    """Code in `STATUSES`."""
-    other: Floats
-    """Place of the other contact that is likely, shape (n, 4); NaN where there is none."""
-    misfit: Floats | None = None
-    """Residual sum of squared deviations, shape (n,)."""
+    status: NDArray[np.int8]  # code in `STATUSES`
+    other: Floats  # place of the other contact that is likely, shape (n, 4); NaN where there is none
+    misfit: Floats | None = None  # residual sum of squared deviations, shape (n,)
+    # Distance from the change between tip and tangential contact, in standard deviations, shape (n,).
     edge_distance: Floats | None = None
-    """Distance from the change between tip and tangential contact, in standard deviations, shape (n,)."""
 
 
 def unanswered(loaded: Flags, cut_off: Flags) -> NDArray[np.int8]:

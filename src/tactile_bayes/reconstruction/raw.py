@@ -25,8 +25,8 @@ __all__ = ["raw_estimate"]
 
 _ROUNDING = 1e-9
 
+# Distance from which two points are different contacts, in standard deviations, or in L without noise.
 _APART = 2.0, 1e-6
-"""Distance from which two points are different contacts, in standard deviations, or in L without noise."""
 
 
 def raw_estimate(samples: Samples, delta: Floats) -> Estimate:

@@ -20,30 +20,21 @@ from tactile_bayes.record.frame import to_fixed_axes
 
 __all__ = ["FALSE_ALARM", "Samples", "loaded_samples", "samples_of"]
 
-FALSE_ALARM = 1e-3
-"""Share of unloaded samples that count as loaded because of noise."""
-
-_MIRROR = np.array([-1.0, -1.0, 1.0])
-"""Signs of the loads of a backward contact that is mirrored to a forward one."""
+FALSE_ALARM = 1e-3  # share of unloaded samples that count as loaded because of noise
+_MIRROR = np.array([-1.0, -1.0, 1.0])  # signs of the loads of a backward contact that is mirrored to a forward one
 
 
 class Samples(NamedTuple):
     """Samples of a record as arrays, dimensionless, with backward contacts mirrored to forward ones."""
 
     rod: Rod
-    reading: Reading
-    """Readings corrected for known errors, with forces along the axes of the laboratory."""
-    side: Floats
-    """+1, or −1 where a sample is mirrored, shape (n,)."""
-    rods: Rods
-    """Their rods, mirrored with them."""
+    reading: Reading  # readings corrected for known errors, with forces along the axes of the laboratory
+    side: Floats  # +1, or −1 where a sample is mirrored, shape (n,)
+    rods: Rods  # their rods, mirrored with them
     loaded: Flags
-    cut_off: Flags
-    """True if a channel is at the end of its range."""
-    has_noise: bool
-    """True if any noise level is known."""
-    sense: Floats
-    """+1, or −1 where the contact slides the other way than on the side of a rotation, shape (n,)."""
+    cut_off: Flags  # true if a channel is at the end of its range
+    has_noise: bool  # true if any noise level is known
+    sense: Floats  # +1, or −1 where the contact slides the other way than on the side of a rotation, shape (n,)
 
     def friction_angles(self, friction: float) -> Floats:
         """Return the friction angles with which the centreline touches, shape (n,)."""
@@ -62,11 +53,7 @@ class Samples(NamedTuple):
 
 
 def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: float = 0.0) -> Samples:
-    """Samples of a valid record with all load channels.
-
-    With a compliant suspension the pivot turns under the moment, so that the rod's slope differs from the drive angle,
-    with which the load cell may turn.
-    """
+    """Return the samples of a valid record with all load channels, on a suspension that may turn under the moment."""
     absent = [name for name in CHANNELS if name not in present_channels(measured)]
     if absent:
         raise RecordError(

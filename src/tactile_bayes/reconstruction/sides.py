@@ -27,42 +27,30 @@ __all__ = [
     "with_sides",
 ]
 
+# Attribute of a record: a JSON object that maps a sweep to the direction in which a sweep touches the same side.
 CONTACT_SIDES = "contact_sides"
-"""Attribute of a record: a JSON object that maps a sweep to the direction in which a sweep touches the same side."""
-
 OTHER_SIDE = {"forward": "backward", "backward": "forward"}
 
+# Mean moment in contact, with the sign of the direction, in standard errors, below which the direction is rejected, and
+# below which it is doubtful.
 _CONTRADICTED, _DOUBTED = -6.0, -2.0
-"""Mean moment in contact, with the sign of the direction, in standard errors, below which the direction is rejected,
-and below which it is doubtful."""
-
+# Limits of an unknown zero, in standard deviations: a correct direction with a zero within the first is doubtful at
+# most; beyond the second the value is a load and not a zero, unless it stands both before and after contact.
 _UNLIKELY, _IMPOSSIBLE = 3.0, 5.0
-"""Limits of an unknown zero, in standard deviations: a correct direction with a zero within the first is doubtful at
-most; beyond the second the value is a load and not a zero, unless it stands both before and after contact."""
-
-_ZERO = 0.1
-"""Standard deviation of an unknown zero [EI/L]."""
-
+_ZERO = 0.1  # standard deviation of an unknown zero [EI/L]
+# Standard deviation of a shift of the zero between contact and the unloaded samples, over that of the noise.
 _WANDER = 0.2
-"""Standard deviation of a shift of the zero between contact and the unloaded samples, over that of the noise."""
-
-_ROUNDING = 4.0 * float(np.finfo(float).eps)
-"""Noise of a reading without noise, over the largest reading."""
-
+_ROUNDING = 4.0 * float(np.finfo(float).eps)  # noise of a reading without noise, over the largest reading
 _FALSE_ALARM = 1e-3
 _ALL_BUT_OUTLIERS = 0.98
 
 
 def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floats:
-    """Side of contact of every sample: +1 as in a forward sweep, −1 as in a backward one, shape (samples,).
+    """Return the side of contact of every sample: +1 as in a forward sweep, −1 as in a backward one, (samples,).
 
-    It is the side of the sweep's direction unless the moment contradicts it, since a drive may also turn back in
-    contact: then the moment in contact has the opposite sign by more than six standard errors. Its zero is the mean of
-    the unloaded samples of the sweep, or else of the record, as `zero_load` finds them, or else 0 with a standard
-    deviation of 0.1 EI/L. A zero beyond five of these deviations is accepted only if it stands both before and after
-    contact; otherwise it is a load. Since seemingly unloaded samples may have a constant load, the moment must also
-    have the opposite sign for all zeros within three of these deviations. A record may state the sides of its sweeps
-    (`with_sides`).
+    It is the side of the sweep's direction unless the moment in contact contradicts it by more than six standard
+    errors, for its zero before or after contact, as `zero_load` finds it, and for all zeros that are likely: seemingly
+    unloaded samples may have a constant load. A record may state the sides (`with_sides`).
     """
     sides, _ = sides_and_doubts(record, load_cell)
     side = np.ones(record.sizes["sample"])
@@ -114,10 +102,8 @@ class _Judged(NamedTuple):
 
     sweep: int
     rows: Index
-    score: float
-    """Mean moment in contact less the zero, with the sign of the direction, in standard errors."""
-    absolute: float
-    """Score for an unknown zero."""
+    score: float  # mean moment in contact less the zero, with the sign of the direction, in standard errors
+    absolute: float  # score for an unknown zero
 
     @property
     def is_contradicted(self) -> bool:

@@ -32,18 +32,13 @@ __all__ = ["contacts_of", "reconstruct"]
 
 _METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")
-_PHYSICAL = ("m", "N", "N m", "1/m")
-"""Units of what is dimensionless in a dimensionless record."""
-
-_NO_CONTACT = 25.0
-"""Bound on the misfit of a loaded sample; the value for a sample without a contact."""
-_TWENTY_TO_ONE = 6.0
-"""Difference of misfits at which one of two sides is twenty times as likely."""
+_PHYSICAL = ("m", "N", "N m", "1/m")  # units of what is dimensionless in a dimensionless record
+_NO_CONTACT = 25.0  # bound on the misfit of a loaded sample; the value for a sample without a contact
+_TWENTY_TO_ONE = 6.0  # difference of misfits at which one of two sides is twenty times as likely
+# Signs by which backward contacts are mirrored: contact point, slope angle and arc length.
 _MIRROR = np.array([-1.0, 1.0, -1.0, 1.0])
-"""Signs by which backward contacts are mirrored: contact point, slope angle and arc length."""
-
+# Standard deviations from the edge between the phases at which the misfit is χ² with one degree of freedom.
 _CLEAR = 3.0
-"""Standard deviations from the edge between the phases at which the misfit is χ² with one degree of freedom."""
 
 
 def reconstruct(
@@ -193,8 +188,7 @@ def _with_likelier_sides(
 ) -> tuple[xr.Dataset, dict[int, str]]:
     """Return the record with the sides of its sweeps stated, and the sides of doubtful sweeps.
 
-    A doubtful sweep takes the side of its direction or, if the misfit is clearly smaller, the other. Without a noise
-    level there is no misfit, and it takes the side of its direction.
+    A doubtful sweep takes the side of its direction unless the misfit of the other is clearly smaller.
     """
     taken: dict[int, str] = {}
     sides, doubtful = sides_and_doubts(_in_channels(measured, cell), cell)

@@ -11,16 +11,13 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.parameters.unknowns import Unknowns, belongs
-from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
-from tactile_bayes.inference.result import known_of, posterior_draws, record_of
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.result import posterior_draws, record_of
+from tactile_bayes.inference.stored_experiment import likelihood_of
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
-from tactile_bayes.record import bases_of, rod_of, rows_of_sweeps
+from tactile_bayes.record import rod_of, rows_of_sweeps
 from tactile_bayes.rig.rig import rod_with
 from tactile_bayes.sweep import ManyUnits, to_lab_frame
-from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["Motion", "motion_of"]
 
@@ -82,23 +79,16 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     best = posterior["sample_stats"]["lp"].argmax(("chain", "draw"))
     draw = posterior_draws(posterior).isel(best)
     contour = contours_of(draw, posterior.attrs["family"])
-    cell = LoadCell.from_record(record) or LoadCell()
-    names = tuple(read_json(posterior.attrs["nuisances"], "nuisances"))
-    names = tuple(name for name in names if not belongs(name, "discrepancy"))
-    unknowns = Unknowns(names, {}, rod_of(record), known_of(posterior.attrs), pivots=len(bases_of(record)))
+    likelihood, unknowns = likelihood_of(posterior, record)
     rig = unknowns.rig({name: np.atleast_1d(draw[name].values) for name in unknowns.names})
-    likelihood = RecordLikelihood(record, cell, unknowns.friction)
     paths = likelihood.paths(contour, rig)
 
     numbers = record.sweep.values
     every = max(1, -(-numbers.size // most))
     samples = np.concatenate([rows[::every] for rows in rows_of_sweeps(numbers)])
-    batch_indices = np.empty(numbers.size, dtype=np.intp)
-    for index, segment in enumerate(likelihood.segments):
-        batch_indices[segment.samples] = index
-    batch_index = batch_indices[samples]
+    batch_index = likelihood.segments.of_sample[samples]
     mirrored = paths.sweep_frame.mirrored[batch_index]
-    read = record.drive_angle.values - cell.misread(record.direction.values)
+    read = likelihood.segments.drive_angles
     angle = (read - likelihood.misread(rig)[0])[samples]
     angle_in_sweep_frame = np.where(mirrored, np.pi - angle, angle)
     states = paths.states(batch_index, likelihood.travels(read, rig)[0, samples])
@@ -114,8 +104,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rod.mirrored(sign))
     loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
     base_x, base_y = (record[name].values[samples] for name in ("base_x", "base_y"))
-    of_sample = likelihood.segments.of_sample
-    first = np.array([segment.base for segment in likelihood.segments])[of_sample[samples]]
+    first = likelihood.segments.bases[batch_index]
     base_x = paths.sweep_frame.base_x[batch_index] + base_x - first[:, 0]
     base_y = paths.sweep_frame.base_y[batch_index] + base_y - first[:, 1]
     return Motion(

@@ -272,8 +272,8 @@ def _places(findings: Findings, along: DriveAxis, events: xr.Dataset, event: str
         return travels
     segments = RecordSegments(findings.record, LoadCell.from_record(findings.record) or LoadCell())
     places = []
-    for segment, travel in zip(segments, travels, strict=True):
-        order = segment.samples[np.argsort(along.travels[segment.samples], kind="stable")]
+    for own, travel in zip(segments.samples, travels, strict=True):
+        order = own[np.argsort(along.travels[own], kind="stable")]
         places.append(float(np.interp(travel, along.travels[order], along.values[order])))
     return places
 

@@ -92,6 +92,13 @@ class SweepEvents:
     touches_again: float
     largest_strain: float
 
+    def __eq__(self, other: object) -> bool:
+        """Return True for the same events, though a NaN is no number: Python 3.13 compares fields one by one."""
+        return isinstance(other, SweepEvents) and repr(self) == repr(other)
+
+    def __hash__(self) -> int:
+        return hash(repr(self))
+
 
 def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> SweepEvents:
     phases = ["tip" if tip else "tangential" for tip in paths.changes_to_tip()[0]]

@@ -25,8 +25,7 @@ __all__ = ["contour_band", "contour_heights", "contours_drawn", "grid_points", "
 
 _DRAWS = 4000
 
-_NUMBERS_PER_HEIGHT = 12
-"""Numbers that a shape-free contour reads for one of its heights."""
+_NUMBERS_PER_HEIGHT = 12  # numbers that a shape-free contour reads for one of its heights
 
 
 def contour_band(

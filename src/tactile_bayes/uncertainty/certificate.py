@@ -22,10 +22,9 @@ class Triangle(NamedTuple):
     right: Locus
     apex_x: Floats
     apex_y: Floats
+    # Distance of the apex from the chord, the largest distance that the contour can have from it; shape (n,).
     height: Floats
-    """Distance of the apex from the chord, the largest distance that the contour can have from it; shape (n,)."""
-    width: Floats
-    """Largest extent of the triangle in y; shape (n,)."""
+    width: Floats  # largest extent of the triangle in y; shape (n,)
 
     def between(self, x: Floats) -> tuple[Floats, Floats]:
         """Return the lowest and highest y of the contour at x, each of shape (triangles, x); NaN beyond the ends."""

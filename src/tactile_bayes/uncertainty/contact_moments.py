@@ -15,8 +15,7 @@ from tactile_bayes.reconstruction.estimate import spread_across
 __all__ = ["LEAST_DRAWS", "contact_moments"]
 
 _DRAWS = ("chain", "draw")
-LEAST_DRAWS = 10
-"""Smallest number of draws in contact from which a standard deviation is computed."""
+LEAST_DRAWS = 10  # smallest number of draws in contact from which a standard deviation is computed
 
 
 def contact_moments(posterior: xr.DataTree | xr.Dataset) -> xr.Dataset:

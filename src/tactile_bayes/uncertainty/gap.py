@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws, contour_events
 from tactile_bayes.uncertainty.band import contour_band, length_unit
-from tactile_bayes.uncertainty.certificate import triangle
+from tactile_bayes.uncertainty.certificate import Triangle, triangle
 from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["gap", "has_gap"]
 
-_GRID_POINTS = 101
-"""Number of grid points of x across the gap."""
+_GRID_POINTS = 101  # number of grid points of x across the gap
 
 
 def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr.DataTree | None = None) -> xr.Dataset:
@@ -93,16 +94,7 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     levels = central_levels(probability)
     draws = contour_draws(posterior)
     events = contour_events(posterior).transpose("chain", "draw", "stroke", ...)
-    missing = [name for name in ("forward", "backward") if name not in events.stroke.values]
-    if not has_gap(events):
-        if "first_travel" in events:
-            first, last = (float(events[f"{event}_contact_x"].median()) for event in ("first", "snap_off"))
-            raise InferenceError(
-                f"the one sweep touches an arc without a gap, from first contact at x = {first:.4g} to its last "
-                f"contact at x = {last:.4g}: what lies beyond these ends no sweep has touched, and contour_band gives "
-                "there what family and prior imply"
-            )
-        raise InferenceError(f"a gap lies between sweeps of both directions, and there is no {missing[0]} one here")
+    _refuse_no_gap(events)
     ends = np.stack([_rows(events["first_contact_x"]), _rows(events["snap_off_contact_x"])])
     touched = np.flatnonzero(np.isfinite(ends).all(axis=(0, 2)))
     if not touched.size:
@@ -111,60 +103,79 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     draws = draws.sel(chain=events["chain"], draw=events["draw"])
     contours = contours_of(draws, posterior.attrs["family"]).take(touched)
     left, right = (contours.locate(contours.parameter_of_x(x)) for x in (left_x, right_x))
-    certificate = triangle(left, right)
+    certificate, is_open = triangle(left, right), right_x > left_x
+    some = is_open if is_open.any() else np.full_like(is_open, True)  # all are NaN if none leaves a gap
     vertex_x, vertex_y = contours.point(0.0)
     length, angle = length_unit(posterior), {"units": "rad"}
-
-    def bounds(values: Floats) -> Floats:
-        return np.quantile(values, levels, axis=0)
-
-    is_open = right_x > left_x
-    some = is_open if is_open.any() else np.full_like(is_open, True)  # all are NaN if none leaves a gap
-    variables: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {
-        "left": (("bound",), bounds(left_x), length),
-        "right": (("bound",), bounds(right_x), length),
-        "width": (("bound",), bounds(right_x - left_x), length),
-        "left_y": (("bound",), bounds(left.y), length),
-        "right_y": (("bound",), bounds(right.y), length),
-        "left_slope_angle": (("bound",), bounds(left.slope_angle), angle),
-        "right_slope_angle": (("bound",), bounds(right.slope_angle), angle),
-        "vertex_x": (("bound",), bounds(np.broadcast_to(vertex_x, left_x.shape)), length),
-        "vertex_y": (("bound",), bounds(np.broadcast_to(vertex_y, left_x.shape)), length),
-        "apex_x": (("bound",), bounds(certificate.apex_x[some]), length),
-        "apex_y": (("bound",), bounds(certificate.apex_y[some]), length),
-        "triangle_height": (("bound",), bounds(certificate.height[some]), length),
-        "triangle_width": (("bound",), bounds(certificate.width[some]), length),
-        "snap_off_drive_angle": (("bound", "stroke"), bounds(_rows(events["snap_off_drive_angle"])[touched]), angle),
+    of_draws = {
+        "left": (left_x, length),
+        "right": (right_x, length),
+        "width": (right_x - left_x, length),
+        "left_y": (left.y, length),
+        "right_y": (right.y, length),
+        "left_slope_angle": (left.slope_angle, angle),
+        "right_slope_angle": (right.slope_angle, angle),
+        "vertex_x": (np.broadcast_to(vertex_x, left_x.shape), length),
+        "vertex_y": (np.broadcast_to(vertex_y, left_x.shape), length),
+        "apex_x": (certificate.apex_x[some], length),
+        "apex_y": (certificate.apex_y[some], length),
+        "triangle_height": (certificate.height[some], length),
+        "triangle_width": (certificate.width[some], length),
+        "snap_off_drive_angle": (_rows(events["snap_off_drive_angle"])[touched], angle),
+    }
+    variables: dict[str, Any] = {
+        name: (("bound", "stroke")[: values.ndim], np.quantile(values, levels, axis=0), unit)
+        for name, (values, unit) in of_draws.items()
     }
     begin, end = (float(np.median(x)) for x in (left_x, right_x))
-    x = np.linspace(begin, end, _GRID_POINTS)
-    heights = np.broadcast_to(contours.take(np.arange(left_x.size)[:, None]).height(x), (left_x.size, _GRID_POINTS))
-    lower, upper = (np.where(np.isnan(edge), heights, edge) for edge in certificate.between(x))
     known = end > begin
-    if_open = 0.0 if known else np.nan
-    variables |= {
-        "triangle_lower": (("x",), np.quantile(lower, levels[0], axis=0) + if_open, length),
-        "triangle_upper": (("x",), np.quantile(upper, levels[2], axis=0) + if_open, length),
-    }
-    cut_short = False
+    x = np.linspace(begin, end, _GRID_POINTS)
     trees = {"band": posterior} | ({} if without_events is None else {"band_without_events": without_events})
+    across = _triangles(contours, certificate, x, levels) | _bands(trees, x, probability)
+    for name, values in across.items():
+        variables[name] = (("x",) if values.ndim else (), values + (0.0 if known else np.nan), length)
+    cut_short = any(np.isnan(across[name.replace("band", "band_width")]) for name in trees)
+    share = float(is_open.mean())
+    variables["share_open"] = ((), share, {"units": "1"})
+    variables["status"] = ((), _status(share, known, cut_short, touched.size < ends.shape[1]))
+    coords = {"bound": ["lower", "median", "upper"], "x": ("x", x, length), "stroke": events.stroke.values}
+    return xr.Dataset(variables, coords=coords, attrs={"probability": probability, "gaps": gaps})
+
+
+def _refuse_no_gap(events: xr.Dataset) -> None:
+    """Refuse events of sweeps between which no gap lies."""
+    if has_gap(events):
+        return
+    if "first_travel" in events:
+        first, last = (float(events[f"{event}_contact_x"].median()) for event in ("first", "snap_off"))
+        raise InferenceError(
+            f"the one sweep touches an arc without a gap, from first contact at x = {first:.4g} to its last contact at "
+            f"x = {last:.4g}: what lies beyond these ends no sweep has touched, and contour_band gives there what "
+            "family and prior imply"
+        )
+    missing = [name for name in ("forward", "backward") if name not in events.stroke.values]
+    raise InferenceError(f"a gap lies between sweeps of both directions, and there is no {missing[0]} one here")
+
+
+def _triangles(contours: Contour, certificate: Triangle, x: Floats, levels: tuple[float, ...]) -> dict[str, Floats]:
+    """Return the curves at x between which the triangles lie; beyond its own gap a contour is known by contact."""
+    count = contours.shape[0]
+    heights = np.broadcast_to(contours.take(np.arange(count)[:, None]).height(x), (count, x.size))
+    lower, upper = (np.where(np.isnan(edge), heights, edge) for edge in certificate.between(x))
+    return {
+        "triangle_lower": np.quantile(lower, levels[0], axis=0),
+        "triangle_upper": np.quantile(upper, levels[2], axis=0),
+    }
+
+
+def _bands(trees: Mapping[str, xr.DataTree], x: Floats, probability: float) -> dict[str, Floats]:
+    """Return the edges of the bands of posteriors at x, by their names, and their largest widths."""
+    found: dict[str, Floats] = {}
     for name, tree in trees.items():
         band = contour_band(tree, x, probability)
-        for edge in ("lower", "median", "upper"):
-            variables[f"{name}_{edge}"] = (("x",), band[edge].values + if_open, length)
-        width = float(np.max(band["upper"].values - band["lower"].values))
-        variables[name.replace("band", "band_width")] = ((), width + if_open, length)
-        cut_short |= bool(np.isnan(width))
-    share = float(is_open.mean())
-    return xr.Dataset(
-        {
-            **variables,
-            "share_open": ((), share, {"units": "1"}),
-            "status": ((), _status(share, known, cut_short, touched.size < ends.shape[1])),
-        },
-        coords={"bound": ["lower", "median", "upper"], "x": ("x", x, length), "stroke": events.stroke.values},
-        attrs={"probability": probability, "gaps": gaps},
-    )
+        found |= {f"{name}_{edge}": band[edge].values for edge in ("lower", "median", "upper")}
+        found[name.replace("band", "band_width")] = np.asarray(np.max(band["upper"].values - band["lower"].values))
+    return found
 
 
 def has_gap(events: xr.Dataset) -> bool:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,25 +12,22 @@ from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.parameters.unknowns import Unknowns
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
-from tactile_bayes.inference.result import contour_draws, known_of, posterior_draws, record_of
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
+from tactile_bayes.inference.stored_experiment import likelihood_of
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.record import CHANNELS, record_hash, rod_of, validate
+from tactile_bayes.record import CHANNELS, record_hash, validate
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.sweep import to_lab_frame
-from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["contacts_of", "implied_contacts"]
 
-_BLOCK = 200
-"""Number of contours whose paths are traced at a time."""
-
+_BLOCK = 200  # number of contours whose paths are traced at a time
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
+# Attributes of the posterior that hold for the contacts, too.
 _KEPT = (
     "sampler",
     "seed",
@@ -45,11 +40,8 @@ _KEPT = (
     "converged",
     "approximations",
 )
-"""Attributes of the posterior that hold for the contacts, too."""
-
+# Unknowns of the rig by which the rod's slope at the pivot differs from the reading, draw by draw.
 _ANGLE_UNKNOWNS = ("drive_angle_offset", "backlash", "suspension_compliance")
-"""Unknowns of the rig by which the rod's slope at the pivot differs from the reading, draw by draw."""
-
 _DIMS = ("chain", "draw", "sample")
 
 
@@ -155,13 +147,8 @@ def _checked_record(posterior: xr.DataTree) -> xr.Dataset:
 
 def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> dict[str, Floats]:
     """Return the variables of the contacts by name, each of shape (chains, draws, samples)."""
-    inferred = read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
-    unknowns = Unknowns(tuple(inferred), {}, rod_of(record), known_of(posterior.attrs))
-    # `infer_contour` gives a cell whose noise it infers a noise of 1.
-    unknown: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in picked}
-    cell = replace(LoadCell.from_record(record) or LoadCell(), **unknown)
-    likelihood = RecordLikelihood(record, cell, unknowns.friction)
-    angle = record["drive_angle"].values - cell.misread(record["direction"].values)
+    likelihood, unknowns = likelihood_of(posterior, record)
+    inferred, angle = unknowns.names, likelihood.segments.drive_angles
     contours = contours_of(picked, posterior.attrs["family"])
     values = {name: picked[name].values.ravel() for name in inferred}
     every = np.arange(contours.shape[0])
@@ -184,14 +171,14 @@ def contacts_of(
     Drive angles, shape (samples,), are readings corrected by the data sheet; NaN where no contact is sought. With
     ``exact=False`` the events are found to 1e-6 rad, at a quarter of the cost.
     """
-    count, segments = contours.shape[0], likelihood.segments
+    count, segments = contours.shape[0], likelihood.segments.samples
     travels = np.broadcast_to(likelihood.travels(angle, rig), (count, angle.size))
-    shape = (len(segments), max(segment.samples.size for segment in segments))
+    shape = (len(segments), max(own.size for own in segments))
     samples = np.zeros(shape, dtype=np.intp)
     in_sweep_frame = np.full((shape[0], count, shape[1]), np.nan)
-    for which, of_segment, segment in zip(samples, in_sweep_frame, segments, strict=True):
-        which[: segment.samples.size] = segment.samples
-        of_segment[:, : segment.samples.size] = travels[:, segment.samples]
+    for which, of_segment, own in zip(samples, in_sweep_frame, segments, strict=True):
+        which[: own.size] = own
+        of_segment[:, : own.size] = travels[:, own]
     paths = likelihood.paths(contours, rig, exact=exact, drive_angles=in_sweep_frame.reshape(-1, shape[1]))
     batch_index, rank, states = paths.loaded_states()
     columns = to_lab_frame(paths.sweep_frame, batch_index, states, likelihood.rod)

@@ -16,14 +16,11 @@ from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
 
 __all__ = ["normal_band", "normal_offsets"]
 
-_BLOCK = 100_000
-"""Number of normals that are searched at once."""
-
+_BLOCK = 100_000  # number of normals that are searched at once
+# Lower bound of the rate: where the contour's parameter does not move the point, the root stays as it is.
 _SLOWEST = float(np.finfo(float).tiny)
-"""Lower bound of the rate: where the contour's parameter does not move the point, the root stays as it is."""
-
+# Distance of a point from a normal, relative to the lengths involved, beyond which the normal misses the contour.
 _MISSED = 1e-9
-"""Distance of a point from a normal, relative to the lengths involved, beyond which the normal misses the contour."""
 
 
 def normal_band(
@@ -135,8 +132,8 @@ def normal_offsets(contours: Contour, x: Floats, y: Floats, slope_angle: Floats)
 def _offsets(many: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats:
     """Return the signed distance of each contour from its own point along the normal there.
 
-    While the contour's tangent turns by less than a right angle from that at the normal's foot, the coordinate along
-    the foot's tangent grows along the contour: it has at most one root, where the normal enters the object.
+    Until its tangent turns by a right angle from the foot's, a contour meets the normal at most once, going into the
+    object.
     """
     sin, cos = np.sin(slope_angle), np.cos(slope_angle)
     every = np.arange(x.size)

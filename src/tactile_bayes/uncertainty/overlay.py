@@ -72,13 +72,10 @@ class Overlay:
 class Distance(NamedTuple):
     """Distance of the median of a band from another contour, over the stretch that both cover; NaN if there is none."""
 
-    rms: float
-    """Root mean square, over x, of the distance normal to the other contour [length]."""
+    rms: float  # root mean square, over x, of the distance normal to the other contour [length]
     largest: float
-    at: float
-    """x of the largest [length]."""
-    share_inside: float
-    """Share of positions x at which the other contour is inside the band."""
+    at: float  # x of the largest [length]
+    share_inside: float  # share of positions x at which the other contour is inside the band
     left: float
     right: float
 

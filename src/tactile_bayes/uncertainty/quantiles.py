@@ -9,8 +9,7 @@ from tactile_bayes.checks import check_probability, check_switch
 
 __all__ = ["central_levels", "quantile_band"]
 
-_ROUNDING = 1e-9
-"""Share of its largest width below which a band is so narrow that its draws differ only by rounding."""
+_ROUNDING = 1e-9  # share of its largest width below which a band is so narrow that its draws differ only by rounding
 
 
 def central_levels(probability: float) -> tuple[float, float, float]:

@@ -12,9 +12,8 @@ from tactile_bayes.record import rod_of
 
 __all__ = ["BEYOND_REACH", "beyond_reach", "reach_attributes"]
 
+# Status of a band at grid points where only the family and the prior determine it.
 BEYOND_REACH = "beyond the reach of the rod"
-"""Status of a band at grid points where only the family and the prior determine it."""
-
 _ENDS = ("reach_left", "reach_right")
 
 

@@ -43,11 +43,7 @@ def gap_if_any(posterior: xr.DataTree, probability: float) -> xr.Dataset | None:
 
 
 def reach(posterior: xr.DataTree) -> Floats:
-    """Return grid points of x over the touched stretch, on which a run computes its band; shape (201,).
-
-    The stretch reaches from the 5 % quantile to the 95 % quantile of the events' x. Draws without an event do not
-    count.
-    """
+    """Return grid points, (201,), from the 5 % to the 95 % quantile of the events' x, for the band of a run."""
     events = _events(posterior)
     x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
     if not np.isfinite(x).any():

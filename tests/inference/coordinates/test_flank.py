@@ -8,7 +8,7 @@ from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Ellipse, PowerLaw
 from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.coordinates.flank import FlankCoordinates
-from tactile_bayes.inference.starts.contour_start import flank_at_contacts
+from tactile_bayes.inference.starts.modes import flank_at_contacts
 
 PLACE = 0.1
 BASES = {

@@ -400,7 +400,7 @@ def exact_sensed(model, point):
     likelihood, rig = model.likelihood, model.rig(point)
     paths = likelihood.paths(model.contours(point), rig)
     segment = likelihood.segments.of_sample
-    signs = np.array([-1.0 if each.backward else 1.0 for each in likelihood.segments])[segment]
+    signs = likelihood.segments.signs[segment]
     found = paths.states(segment, likelihood.segments.angles_in_sweep_frame - signs * likelihood.misread(rig)[0]).wrench
     loads = np.stack([signs * found.holding_moment, signs * found.force_x, found.force_y], axis=-1)
     scaled = np.atleast_1d(rig.rigidity_scale)[:, None, None] * np.nan_to_num(loads)[None]

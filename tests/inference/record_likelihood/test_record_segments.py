@@ -23,7 +23,8 @@ def test_events_lie_where_most_samples_say():
     mistaken[[events[0, 3] + 3, events[1, 0] - 2, events[0, 1] + 4]] ^= True
     np.testing.assert_array_equal(likelihood.segments.event_samples(mistaken), events)
     angles = likelihood.segments.event_angles(loaded)
-    snap_offs = likelihood.snap_offs(Parabola(np.array([0.5]), np.array([0.5]), np.array([0.0])))[0]
+    contours = Parabola(np.array([0.5]), np.array([0.5]), np.array([0.0]))
+    snap_offs = likelihood.predict_with_events(contours)[2][0, :, 1]
     assert np.all((angles[:, 2] < snap_offs) & (snap_offs < angles[:, 3]))
 
 

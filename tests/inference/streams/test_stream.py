@@ -12,11 +12,11 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour_evidence import contour_evidence
 from tactile_bayes.inference.contour_problem import contour_problem
-from tactile_bayes.inference.evidence import contour_evidence
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.streams import particles
-from tactile_bayes.inference.streams.stream import surprise_after
+from tactile_bayes.inference.streams.e_value import surprise_after
 from tactile_bayes.rig import Rig
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)

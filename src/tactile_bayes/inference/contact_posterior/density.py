@@ -41,9 +41,9 @@ class Evaluated(NamedTuple):
 class ContactDensity:
     """Log-density of contacts, given one sample each.
 
-    The prior is a density over contact point and slope angle. A phase is a sheet in the space of (force, ψ1, s1, drive
-    angle), with three coordinates of its own; there the prior is multiplied by the volume that they span. The
-    covariance of `samples` serves for proposals only; `base` are the pivots, (n, 2), in the record's unit of length.
+    The prior is a density over contact point and slope angle; on a phase's sheet of (force, ψ1, s1, drive angle) it is
+    multiplied by the volume that the sheet's coordinates span. `base` are the pivots, (n, 2), in the record's unit of
+    length.
     """
 
     def __init__(
@@ -68,11 +68,7 @@ class ContactDensity:
 
     @property
     def ways(self) -> Floats:
-        """Ranges of the way on the branches, shape (branches, 2).
-
-        They are tip contact, tangential contact and, unless all rods are straight and uniform, contact of a tip that is
-        turned beyond the normal of the contour.
-        """
+        """Ranges of the way: tip, tangential and, unless rods are straight, over-turned tip, (branches, 2)."""
         normal = 0.5 * np.pi + self.delta
         branches = [(0.0, normal), (-1.0, 0.0), (normal, np.pi)]
         return np.array(branches[:2] if self.samples.rods.are_straight else branches)
@@ -83,10 +79,7 @@ class ContactDensity:
         return ContactDensity(some, readings, base, turning=self._turning, delta=self.delta, prior=self._prior)
 
     def at(self, coordinates: Floats, phase: NDArray[np.int8]) -> Evaluated:
-        """Evaluate contacts from coordinates, shape (..., n, 4), and phase, shape (..., n); −inf if impossible.
-
-        The density is that of the coordinates that are free in the phase.
-        """
+        """Evaluate contacts from coordinates, shape (..., n, 4), and phase, shape (..., n); −inf if impossible."""
         shape = coordinates.shape[:-1]
         flat = coordinates.reshape(-1, 4)
         tip = phase.reshape(-1) == TIP
@@ -154,7 +147,7 @@ class ContactDensity:
     def unfold(self, points: Floats) -> tuple[Floats, NDArray[np.int8]]:
         """Return coordinates and phase from points (way, force[, drive angle]), shape (..., n, 2 or 3).
 
-        The way is one coordinate for both sheets: ψ1 + δ ≥ 0 in tip contact, s1 − 1 < 0 in tangential contact.
+        The way is ψ1 + δ ≥ 0 in tip contact, and s1 − 1 < 0 in tangential contact.
         """
         way = points[..., 0]
         z = np.empty((*points.shape[:-1], 4))

@@ -98,11 +98,10 @@ def _drawn(weights: ContactWeights, draws: int, rng: np.random.Generator) -> Con
 
 
 def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequence) -> ContactWeights:
-    """Return proposals and their importance weights.
+    """Return proposals, from normal approximations, and their importance weights.
 
-    The first ones are from normal approximations. Where their weights are not certified, the edge between the phases
-    cuts off a narrow layer of the posterior, or it is bent: kernels about the draws of most weight then propose others
-    (population Monte Carlo; Cappé, Guillin, Marin & Robert 2004, doi 10.1198/106186004X12803).
+    Where weights are not certified, kernels about the draws of most weight propose others (population Monte Carlo;
+    Cappé, Guillin, Marin & Robert 2004, doi 10.1198/106186004X12803).
     """
     rng = np.random.default_rng(seed)
     found = _weighed(density, *ContactProposal(*_approximation(density), density.ways).draw(draws, rng))

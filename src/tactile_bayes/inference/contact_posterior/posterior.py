@@ -100,20 +100,18 @@ def infer_contacts(
 
     Notes
     -----
-    "flat" is uniform in contact_x, contact_y and slope_angle: no point within reach and no slope is preferred a priori.
-    One sample determines all three, and if the load is at least ten standard deviations of its noise, the posterior
-    moves by less than a tenth of a standard deviation between this prior and "polar", which is uniform in distance from
-    the pivot, direction and slope. The choice matters near first contact: contacts with loads near zero lie within a
-    thin shell at the end of the rod's reach, a flat prior gives that shell little mass, and the posterior of a weak
-    contact shifts to larger loads, that is inwards. Give your own density there if you know more.
+    "flat" is uniform in contact_x, contact_y and slope_angle, "polar" in distance from the pivot, direction and slope.
+    If the load is at least ten standard deviations of its noise, the posterior moves by less than a tenth of a standard
+    deviation between them. Near first contact the choice matters: contacts with loads near zero lie within a thin shell
+    at the end of the rod's reach, to which a flat prior gives little mass, and the posterior of a weak contact shifts
+    inwards. Give your own density there if you know more.
 
     tangential_probability is the posterior probability of each sample under that prior, not a frequency along a sweep:
     if a rod dwells in tip contact, as it does along parabolas, most of the samples that leave the phase open are in
     tip contact, whatever their probabilities. The regions of contact points hold nevertheless.
 
-    The densities are those of coordinates on the two branches (force and direction of the tip; force and arc length)
-    times the volume in (contact_x, contact_y, slope_angle) that they span. If the drive angle is exact, the posterior
-    is a density on a surface, with the flat prior as the limit of small encoder errors.
+    If the drive angle is exact, the posterior is a density on a surface, with the prior as the limit of small encoder
+    errors.
 
     Examples
     --------

@@ -15,10 +15,10 @@ _MAX_DISTANCE = 30.0  # of a mean beyond the edge, in standard deviations, so th
 
 
 class ContactProposal:
-    """A mixture distribution for each of n samples, of normal densities on each branch.
+    """Mixture of normal densities on each branch, for each of n samples.
 
-    Shapes: mean (branches, n, k) of way, force and, if k is 3, drive angle, covariance (branches, n, k, k), share
-    (branches, n), 0 without an approximation, ways (branches, 2), the least and the largest.
+    Shapes: mean (branches, n, k) of way, force and drive angle, if it is free; share (branches, n), 0 without an
+    approximation; ways (branches, 2).
     """
 
     def __init__(self, mean: Floats, covariance: Floats, share: Floats, ways: Floats) -> None:
@@ -29,10 +29,7 @@ class ContactProposal:
         self._mean[..., 0] = np.clip(mean[..., 0], ways[:, :1] - farthest, ways[:, 1:] + farthest)
 
     def draw(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        """Draw `count` points for every sample, (count, n, k), in the shares of branches, with log-densities.
-
-        Coordinates are drawn one after the other, each given those before, between its bounds.
-        """
+        """Draw `count` points for every sample, (count, n, k), in the shares of branches, with log-densities."""
         size, k = self._share.shape[1], self._mean.shape[-1]
         # The draws are stratified: shares are exact to one draw.
         order = (np.arange(count)[:, None] + rng.random((count, size))) / count

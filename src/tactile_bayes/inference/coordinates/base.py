@@ -38,7 +38,7 @@ class Coordinates:
 
 @dataclass(frozen=True, eq=False)
 class Logarithms(Coordinates):
-    """The logarithms of some positive parameters, and the other parameters themselves.
+    """The logarithms of some positive parameters, and the others themselves.
 
     If a record determines a ratio of powers of two sizes, but hardly the sizes, their logarithms lie along a line.
     """

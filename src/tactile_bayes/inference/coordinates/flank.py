@@ -62,12 +62,10 @@ _FLANKS = {"power-law": (_power_law_at, _power_law_of), "ellipse": (_ellipse_at,
 class FlankCoordinates(Coordinates):
     """Slope, shape, height and slope ratio of a contour at one x, instead of its two sizes, q and x_c.
 
-    A record of one flank determines height, slope and curvature at the contacts, but hardly the vertex: the posterior
-    of w, n, q and x_c of a power law, or of a, b, q and x_c of an ellipse, is then a bent ridge, thousands of times as
-    long as wide. The coordinates are log t of the slope t, the logarithm of a shape, the height y and log(t/t′), where
-    t′ is the derivative of t. With u = |x − x_c|, for a power law t = n (u/w)^(n − 1), the shape is n − 1,
-    y = q + t u/n and t/t′ = u/(n − 1); for an ellipse with u = a sin τ, t = (b/a) tan τ, the shape is tan τ,
-    y = q + b (1 − cos τ) and t/t′ = u cos² τ. They determine the contour on either side of the vertex.
+    A record of one flank hardly determines the vertex: sizes and vertex then lie along a bent ridge. With the slope t,
+    the coordinates are log t, the logarithm of a shape, the height y and log(t/t′). With u = |x − x_c|, for a power law
+    t = n (u/w)^(n − 1), the shape is n − 1, y = q + t u/n and t/t′ = u/(n − 1); for an ellipse with u = a sin τ, t =
+    (b/a) tan τ, the shape is tan τ, y = q + b (1 − cos τ) and t/t′ = u cos² τ.
     """
 
     flank: str  # "power-law" or "ellipse"
@@ -86,10 +84,7 @@ class FlankCoordinates(Coordinates):
     def at(
         cls, family: str, names: Sequence[str], base: Logarithms, point: Floats, x: float
     ) -> FlankCoordinates | None:
-        """Return coordinates at x around a point, shape (parameters,).
-
-        There are none at the vertex, nor for flanks other than those of a power law or an ellipse.
-        """
+        """Return coordinates at x around a point, (parameters,); None at the vertex and on other kinds of flanks."""
         sides = sides_of(family)
         side = float(np.sign(x - point[names.index("x_c")]))
         prefix = "" if len(sides) == 1 else "right_" if side > 0.0 else "left_"

@@ -18,11 +18,9 @@ _LOST_BELOW = 10.0  # distance of a lost walker's largest log-probability below 
 
 
 def lost_walkers(values: Floats) -> Flags:
-    """Return True for walkers far less probable than the rest, shape (chain, walker), from their log-probabilities.
+    """Return True for walkers far less probable than the rest, (chain, walker), from their log-probabilities.
 
-    R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails of the
-    result. Fewer than one in thousands of draws from a posterior is so improbable, and practically never the most
-    probable of a walker's many draws.
+    R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails.
     """
     if not values.shape[1]:
         return np.zeros((len(values), values.shape[2]), dtype=bool)
@@ -83,10 +81,7 @@ def walker_major(samples: Floats) -> Floats:
 
 
 def autocorrelation_time(samples: Floats) -> Floats:
-    """Return emcee's τ [steps] of samples (chain, step, walker, parameter), averaged over chains.
-
-    All walkers are computed at once: `emcee.autocorr.integrated_time` takes them one by one, as slow as a short run.
-    """
+    """Return emcee's τ [steps] of samples (chain, step, walker, parameter), all walkers at once, mean over chains."""
     chains, steps, _, parameters = samples.shape
     if steps < 2:
         return np.full(parameters, np.nan)
@@ -117,9 +112,7 @@ class Mode:
 def modes_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> tuple[Mode, ...]:
     """Return the modes of the ensembles, from samples (chain, step, walker, parameter) and log-probabilities.
 
-    The result is empty if there is only one mode, or if an ensemble is not stationary: only if the early and late steps
-    of each ensemble agree, and its walkers have forgotten their positions, does disagreement between ensembles mean
-    several modes rather than a slow run.
+    Only if each ensemble is stationary, disagreement means several modes rather than a slow run; else there are none.
     """
     if not _are_stationary(samples):
         return ()
@@ -157,19 +150,12 @@ def modes_message(modes: Sequence[Mode]) -> str:
 
 
 def _are_stationary(samples: Floats) -> bool:
-    _, steps, walkers, parameters = samples.shape
-    half = steps // 2
-    if half < 4:
+    """Return True if early and late steps of each ensemble agree, and its walkers have forgotten their positions."""
+    if samples.shape[1] < 8:
         return False
-    for ensemble in samples:
-        swapped = ensemble.swapaxes(0, 1)  # (walker, step, parameter)
-        halves = np.stack([swapped[:, :half], swapped[:, half : 2 * half]]).reshape(2, -1, parameters)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            r_hat = array_stats.rhat(halves, chain_axis=0, draw_axis=1, method="rank")
-            ess = array_stats.ess(swapped.reshape(1, -1, parameters), chain_axis=0, draw_axis=1, method="bulk")
-        if not (np.all(r_hat < _MAX_R_HAT) and np.all(ess >= _MIN_DRAWS_PER_WALKER * walkers)):
-            return False
-    return True
+    least = _MIN_DRAWS_PER_WALKER * samples.shape[2]
+    each = [Diagnosis(ensemble[None]) for ensemble in samples]
+    return all(bool(np.all(one.r_hat < _MAX_R_HAT) and np.all(one.ess_bulk >= least)) for one in each)
 
 
 def _connected(near: Flags) -> list[tuple[int, ...]]:

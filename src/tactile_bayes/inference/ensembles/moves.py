@@ -33,8 +33,8 @@ def step_ensembles(
 ) -> tuple[Floats, Floats]:
     """Return points, (chain, walker, parameter), and their log-density, (chain, walker), after a step of all ensembles.
 
-    Each ensemble moves by halves, as emcee's moves do (Foreman-Mackey et al. 2013, doi 10.1086/670067), with random
-    numbers of its own, as if it were alone; but the target, efficient for many points, is evaluated for all at once.
+    Each moves by halves with its own random numbers, as if it were alone (Foreman-Mackey et al. 2013, doi
+    10.1086/670067), while the target is evaluated for all at once.
     """
     points, values = points.copy(), values.copy()
     shares = np.array([share for _, share in moves])
@@ -60,11 +60,10 @@ def step_ensembles(
 
 
 class FittedMove(emcee.moves.RedBlueMove):
-    """Proposals from a distribution that is fitted to the half of the ensemble that does not move meanwhile.
+    """Proposals from a distribution, Student's t by default, fitted to the half of the ensemble that does not move.
 
-    By default it is Student's t. The proposal does not depend on the moving half, so that the target stays invariant
-    however bad the fit is; a `fit` may also return a given distribution. If the other half lies in a plane, no walker
-    moves. Boehl (2022), doi 10.2139/ssrn.4250395, adapts such proposals to the whole run instead.
+    They do not depend on the moving half, so that the target stays invariant however bad the fit is. Boehl (2022), doi
+    10.2139/ssrn.4250395, adapts such proposals to the whole run instead.
     """
 
     def __init__(
@@ -92,9 +91,8 @@ class FittedMove(emcee.moves.RedBlueMove):
 class NormalMove(emcee.moves.RedBlueMove):
     """Steps that leave a standard normal distribution invariant, for coordinates with nearly that distribution.
 
-    A step of random length combines a share of the walker's position with a new normal draw (Neal 1999; Cotter,
-    Roberts, Stuart & White 2013, doi 10.1214/13-STS421); the acceptance depends only on the target relative to that
-    normal. Half of the steps are new draws, after which nothing is left of the position if the target is that normal.
+    A step combines a random share of the position with a new normal draw (Neal 1999; Cotter, Roberts, Stuart & White
+    2013, doi 10.1214/13-STS421); half of the steps are new draws.
     """
 
     def __init__(self, columns: slice) -> None:
@@ -123,8 +121,7 @@ def moves_in(coordinates: Coordinates) -> Moves:
 def standard_moves(proposal: Mixture | None = None) -> Moves:
     """Return the moves of an ensemble, with their shares.
 
-    Fitted proposals suit a nearly normal posterior, differences of two other walkers, scaled and now and then unscaled,
-    suit others. A given proposal is used the more the more efficient it is; short differences reach what it misses.
+    A given proposal is used the more the more efficient it is; short differences reach what it misses.
     """
     if proposal is None:
         return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]

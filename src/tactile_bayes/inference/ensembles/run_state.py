@@ -36,10 +36,7 @@ class Block:
 
 
 def make_block(target: LogProbability, moves: Moves, last: Block, steps: int, deadline: Deadline = NEVER) -> Block:
-    """Make the steps after a block, which are determined by its last one.
-
-    The block has at least one step, but fewer than asked for after the deadline or an interrupt.
-    """
+    """Make the steps after a block, which its last one determines: at least one, fewer after deadline or interrupt."""
     points, values = last.samples[:, -1], last.log_probability[:, -1]
     randoms = [generator_at(state) for state in last.random_states]
     states = last.random_states
@@ -137,10 +134,7 @@ class RunState:
         return lost_walkers(self.half.values[:, :middle]), lost_walkers(self.half.values[:, middle:])
 
     def recovered(self) -> RunState:
-        """Return the state with lost walkers where others of their ensemble were in the first of the steps kept.
-
-        Where many are lost, they stay: that may be a mode.
-        """
+        """Return the state with few lost walkers taken back to where others were; many that are lost may be a mode."""
         _, lost = self.lost()
         few = lost & (lost.mean(axis=1, keepdims=True) <= _MAX_LOST)
         if not few.any():

@@ -23,9 +23,8 @@ class SamplerSettings:
         Number of independent ensembles, the chains of the result.
     walkers : int, optional
         Number of walkers of each ensemble, even and at least twice the number of parameters. By default the larger of
-        48 and six times the number of parameters: the effective draws per evaluation hardly depend on it (Gaussian
-        targets of 2 to 14 dimensions, 2 to 12 walkers per dimension), and a vectorised target and emcee itself are
-        faster with more of them, but each of them has to forget its start.
+        48 and six times the number of parameters: the effective draws per evaluation hardly depend on it, and more of
+        them are faster, but each has to forget its start.
     block_steps : int
         Number of steps before the first diagnosis, and the smallest number between later ones, which come when the
         steps have grown by a quarter.
@@ -38,12 +37,9 @@ class SamplerSettings:
         Number of steps after which each ensemble stops, converged or not.
     max_seconds : float, optional
         Time limit of a posterior [s], counted from the call: the search for a start ends with its present step, and so
-        do the ensembles, which make at least one step. These steps exceed the limit, and so do the approximation around
-        the start (some 60 points for each parameter) and the last diagnosis: by a few seconds in all, whatever the
-        length of the record, and by more for the first posterior after an installation, which waits for compilers.
-        Predictions from the draws, files and figures come after it. A run that ends by it is not reproducible from its
-        seed. A run that resumes from a checkpoint has the whole time again; its search for a start, which must have the
-        same result each time, is counted, but not cut short.
+        do the ensembles, which make at least one step. A few seconds may come on top, more at the first posterior after
+        an installation, and predictions, files and figures do. A run that ends by it is not reproducible from its seed.
+        A run that resumes from a checkpoint has the whole time again; its search for a start is counted, not cut short.
     events : bool
         Whether unloaded samples count, which show where contact begins and ends. Otherwise only samples count whose
         load exceeds the noise, as in methods that use contacts alone.

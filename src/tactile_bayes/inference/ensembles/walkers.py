@@ -22,7 +22,7 @@ __all__ = [
     "state_of",
 ]
 
-
+_MAX_ROUNDS = 100  # of draws, as many in each as there are walkers
 RandomState = tuple[Any, ...]  # of NumPy's Mersenne Twister, which emcee's moves use, as from `get_state`
 
 
@@ -70,12 +70,9 @@ def scatter_walkers(
     parameters: int,
     seed: Seed,
     settings: SamplerSettings | None = None,
-    max_rounds: int = 100,
+    floor: Callable[[], float] = lambda: -np.inf,
 ) -> Floats:
-    """Return starting points for `sample`: random points, redrawn until each has a finite log-probability.
-
-    Returns shape (ensembles, walkers, parameters).
-    """
+    """Return random starting points, (ensembles, walkers, parameters), of a log-probability above a floor."""
     settings = SamplerSettings() if settings is None else settings
     walkers = settings.walkers_for(parameters)
     # The second half, so that the streams differ from those that the same seed gives to the ensembles themselves.
@@ -85,13 +82,13 @@ def scatter_walkers(
         rng = np.random.default_rng(each)
         found, drawn = 0, 0
         while found < walkers:
-            if drawn >= max_rounds * walkers:
+            if drawn >= _MAX_ROUNDS * walkers:
                 raise InferenceError(
                     f"only {found} of {drawn} random starting points have a finite log-probability and {walkers} are "
                     "needed: draw them closer to a point that is known to be possible"
                 )
             points = np.asarray(draw(rng, walkers), dtype=float)
-            points = points[np.isfinite(log_probability(points))][: walkers - found]
+            points = points[log_probability(points) > floor()][: walkers - found]
             start[k, found : found + len(points)] = points
             found, drawn = found + len(points), drawn + walkers
     return start

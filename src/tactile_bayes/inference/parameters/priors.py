@@ -19,10 +19,7 @@ __all__ = ["default_priors", "matched_priors", "mean_log_radius", "own_priors", 
 
 
 def own_priors(family: ContourFamily, length: float) -> dict[str, Distribution]:
-    """Return the default priors of a family's parameters, except the vertex, from the rod's length alone.
-
-    Parameters with the same entry of the table share one prior object, so that their densities come from one call.
-    """
+    """Return the default priors of a family's parameters, except the vertex; those of one entry share one object."""
     entries = {name: entry for name, entry in family.table.items() if entry.prior is not None}
     made = {id(entry): _prior(entry, length) for entry in entries.values()}
     return {name: made[id(entry)] for name, entry in entries.items()}
@@ -38,10 +35,7 @@ def _prior(entry: FamilyParameter, length: float) -> Distribution:
 
 
 def default_priors(family: ContourFamily, base: tuple[float, float], length: float) -> dict[str, Distribution]:
-    """Return the default priors of a family's parameters by name, from pivot (x, y) and rod length alone [length].
-
-    The vertex is uniformly distributed within a rod length of the pivot, sideways and in height.
-    """
+    """Return the default priors of a family's parameters by name, from pivot (x, y) and rod length alone [length]."""
     x, y = base
     vertex = {"q": stats.uniform(y - length, 2.0 * length), "x_c": stats.uniform(x - length, 2.0 * length)}
     return own_priors(family, length) | {name: prior for name, prior in vertex.items() if name in family.parameters}
@@ -58,10 +52,8 @@ _NARROWEST, _WIDEST = 0.05, 3.0  # range of factors on standard deviations in wh
 def matched_priors(family: str, length: float) -> dict[str, Distribution]:
     """Return priors of a family's own parameters under which a flank is as curved as in all other families.
 
-    The default priors are the same for all parameters of a kind, so that an ellipse, which has two sizes, is expected
-    to be wider and rounder than a circle. Here, sizes have priors for which the geometric mean of the radius of
-    curvature between slopes of 0° and 45° on one side has its median at half the rod's length, and its logarithm a
-    standard deviation of 1.
+    The geometric mean of its radius of curvature between slopes of 0° and 45° has its median at half the rod's length,
+    and its logarithm a standard deviation of 1.
     """
     return {
         f"{side}{parameter}": prior

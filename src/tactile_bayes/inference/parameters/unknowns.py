@@ -105,10 +105,7 @@ class Unknowns:
         return RigValues(base_shifts=self._base_shifts(values), **off)
 
     def _base_shifts(self, values: Mapping[str, Floats]) -> Floats | None:
-        """Return the shifts of pivots, shape (n, pivots, 2), up to the last one that is inferred; None without any.
-
-        A shift of the gauge is one of all pivots to the other side.
-        """
+        """Return the shifts of pivots, (n, pivots, 2), up to the last inferred one; a gauge shifts all back."""
         shifted = [(name, BASE.fullmatch(name)) for name in values]
         off = [(name, int(found[1]) - 1, "xy".index(found[2])) for name, found in shifted if found]
         gauge = [name for name in GROUPS["gauge"] if name in values]
@@ -125,7 +122,7 @@ class Unknowns:
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
         """Apply unknown gains, levers and zeros, and the curve, to loads, shape (n, ..., 3) [EI/L, EI/L²], in place.
 
-        Zeros are given as readings, and enter as the loads that the cell reads as such if its own curve is left out.
+        Zeros are given as readings, and enter as the loads that the cell reads as such without its own curve.
         """
         values = self._with_known(values)
         curve = [
@@ -181,8 +178,7 @@ def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
 def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool = False) -> Unknowns:
     """Return the parameters of a rig that are unknown and that the record shows, with their priors.
 
-    A bias with a bias_uncertainty of the load cell is not among them: the likelihood integrates it out already. The
-    parameters of the noise and of a discrepancy are not among them either.
+    A bias that the likelihood integrates out, the noise and the discrepancy are not among them.
     """
     present = [_SHORT[name] for name in present_channels(measured)]
     rod, pivots, joint = rod_of(measured), len(bases_of(measured)), rig.calibration
@@ -260,10 +256,7 @@ def deviating(known: Mapping[str, float], unknown: Collection[str], rod: Rod, ce
 
 
 def _refuse_shifted_stem(measured: xr.Dataset, names: Sequence[str], gauge: bool) -> None:
-    """Refuse a stem where it only shifts the place of the object and the point of the moment's reference.
-
-    A rod that keeps its direction, on a pivot that does not yield, has its beginning at a constant distance from it.
-    """
+    """Refuse a stem where, as the rod keeps its direction, it only shifts the object and the moment's reference."""
     turned = not np.all(np.isin(measured.sweep.values, carried_sweeps(measured)))
     placed = gauge and not set(GROUPS["gauge"]) <= set(names)
     angles = measured.drive_angle.values

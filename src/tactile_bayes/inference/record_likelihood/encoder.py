@@ -18,10 +18,7 @@ _STEEP = np.array([10.0, 30.0, 30.0])  # change of loads close to snap-off [EI/L
 class EncoderErrors:
     """Quadrature nodes (reading less true angle [rad]) and weights over errors of the encoder of a dimensionless cell.
 
-    The sum is accurate if loads are smooth functions of the drive angle, and valid at first contact and at snap-off,
-    where the rod is in contact at some nodes and not at others; the event is then resolved to the distance of nodes.
-    Compared with a fine integral the error of the logarithm of a sample's probability is 0.001, and 0.8 at worst next
-    to an event.
+    A sample's log-probability errs by 0.001, and by 0.8 at worst next to an event, which is resolved to the nodes.
     """
 
     def __init__(self, cell: LoadCell) -> None:

@@ -46,11 +46,9 @@ _LENGTHS_OF_LINE = [0, 1, 3, 4]  # columns of a line that are lengths, or change
 class RecordLikelihood:
     """Likelihood of a record as a function of contour, rig and noise.
 
-    Contours are in the record's unit of length, loads inside in EI/L and EI/L². Because loads drop to zero at snap-off,
-    the likelihood distinguishes contours that release the rod earlier or later than the record shows. Predicted forces
-    are turned into the record's frame, since measured ones may lack a component. With `exact`, paths are so to
-    rounding; otherwise they are as accurate as the noise requires, at a fifth of the cost. Unless `is_always_clear`,
-    contours that the unloaded rod is not clear of after snap-off are excluded.
+    Contours are in the record's unit of length, loads inside in EI/L and EI/L², forces in the record's frame. With
+    `exact`, paths are so to rounding; otherwise as the noise requires, at a fifth of the cost. Unless
+    `is_always_clear`, contours that the unloaded rod is not clear of after snap-off are excluded.
     """
 
     def __init__(
@@ -99,10 +97,7 @@ class RecordLikelihood:
     def paths(
         self, contours: Contour, rig: RigValues | None = None, *, exact: bool = True, drive_angles: Floats | None = None
     ) -> Paths:
-        """Return the paths of every contour in every segment; batch index k·n + i is contour i in segment k.
-
-        Shapes: drive_angles (segments · n, k).
-        """
+        """Return the paths of every contour in every segment; batch index k·n + i is contour i in segment k."""
         rig, lines = self._rig_of(rig, contours.shape[0]), None
         sweeps = self._sweeps(rig)
         if self.segments.lines is not None:
@@ -145,13 +140,7 @@ class RecordLikelihood:
 
     def _bases(self, rig: RigValues) -> Floats:
         """Return the pivots, shape (segments, n, 2)."""
-        stated = np.array([segment.base for segment in self.segments])
-        return np.asarray(stated[:, None] + rig.base_shifts[:, self.segments.pivots].swapaxes(0, 1))
-
-    def snap_offs(self, contours: Contour, rig: RigValues | None = None) -> Floats:
-        """Return the readings of the drive angle at snap-off, in the sweep frame [rad], shape (n, segments)."""
-        rig = self._rig_of(rig, contours.shape[0])
-        return self._events(self._solutions(contours, rig), rig)[..., 1]
+        return np.asarray(self.segments.bases[:, None] + rig.base_shifts[:, self.segments.pivots].swapaxes(0, 1))
 
     def travels(self, drive_angles: Floats, rig: RigValues) -> Floats:
         """Return travels of samples as `paths` takes them, shape (n or 1, samples): drive angles [rad], or ways [L]."""
@@ -177,10 +166,7 @@ class RecordLikelihood:
         return self._usable(self._solutions(contours, self._rig_of(rig, contours.shape[0])))
 
     def predict(self, contours: Contour, rig: RigValues | None = None) -> tuple[Floats, Flags]:
-        """Return noise-free loads, shape (n, samples, 3), and which contours are usable, shape (n,).
-
-        Forces are in the record's frame, loads in EI/L and EI/L² of the stated rod, at the drive angles read.
-        """
+        """Return noise-free loads [stated EI/L, EI/L²], (n, samples, 3), and which contours are usable, (n,)."""
         return self.predict_with_events(contours, rig)[:2]
 
     def predict_with_errors(self, contours: Contour, rig: RigValues | None = None) -> tuple[Floats, Flags]:
@@ -188,9 +174,9 @@ class RecordLikelihood:
         return self._predict(contours, rig, self.encoder.errors)[:2]
 
     def predict_with_events(self, contours: Contour, rig: RigValues | None = None) -> tuple[Floats, Flags, Floats]:
-        """Return the results of `predict`, and the drive angles of first contact and snap-off.
+        """Return the results of `predict`, and drive angles read at first contact and snap-off, (n, segments, 2).
 
-        The angles are readings in the sweep frame [rad], shape (n, segments, 2); NaN if there is no such event.
+        They are in the sweep frame [rad]; NaN if there is no such event.
         """
         loads, reached, events = self._predict(contours, rig, np.zeros(1))
         return loads[:, 0], reached, events
@@ -320,10 +306,7 @@ class RecordLikelihood:
 def events_of(
     likelihood: RecordLikelihood, contours: Contour, rig: RigValues | None = None, *, exact: bool = True
 ) -> dict[str, Floats]:
-    """Return drive angle and contact point of first contact and snap-off in every sweep segment.
-
-    Returns shape (n, segments).
-    """
+    """Return drive angle and contact point of first contact and snap-off in every sweep segment, (n, segments)."""
     count = contours.shape[0]
     paths = likelihood.paths(contours, rig, exact=exact)
     batch = np.arange(paths.sweep_frame.size)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +15,7 @@ from tactile_bayes.mechanics.branches.sweeps import Segments
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, base_of_sample, carried_sweeps, present_channels, rod_of
 
-__all__ = ["RecordSegments", "Segment", "without_errors"]
+__all__ = ["RecordSegments", "without_errors"]
 
 _OFF = 1e-6  # distance of recorded poses from a line [L and rad] that is rounding of the record
 _SCATTER = 10.0  # range of drive angles, over the noise of their readings, of a rod that is clamped at one
@@ -25,71 +23,50 @@ _SCATTER = 10.0  # range of drive angles, over the noise of their readings, of a
 _TURNS = np.array([[0.0, 0.0, -0.5 * np.pi, 0.0, 0.0, 1.0, -0.5 * np.pi, 1.5 * np.pi]])
 
 
-@dataclass(frozen=True)
-class Segment:
-    """Sweep segment: samples with one pivot, one side of contact and one direction of the drive, or those of sweeps
-    in which the drive carries the base through the same poses."""
-
-    pivot: int  # index of the pivot, in the order of the record
-    base: tuple[float, float]  # the pivot, or where the drive begins [length]
-    backward: bool  # True if the side of contact is that of a backward sweep
-    # Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 if it carries the base, which
-    # turns no encoder.
-    sense: float
-    samples: Index  # indices of the samples, shape (samples of the segment,)
-
-
 class RecordSegments:
-    """Sweep segments of a record; a sequence of `Segment`.
+    """Sweep segments: samples with one pivot, side of contact and direction of the drive, or carried along one way.
 
     Drive angles are corrected by the data sheet of the load cell. In the frame of a sweep they grow in forward contact;
-    where the drive carries the base, its travel takes their place. `pivots`, `signs` (−1 for contact as in a backward
-    sweep) and `senses` are by segment; `lines`, (segments, lines, `LINE_COLUMNS`), are those of all drives, NaN after
-    the last, a rotation being a line along the drive angle; None if no drive carries the base.
+    where the drive carries the base, its travel [L] takes their place, in `angles_in_sweep_frame` too.
     """
 
     def __init__(self, measured: xr.Dataset, load_cell: LoadCell) -> None:
         angle = measured.drive_angle.values - load_cell.misread(measured.direction.values)
         backward = contact_sides(without_errors(measured, load_cell), load_cell) < 0.0
-        bases, of_sample = base_of_sample(measured)
+        bases, pivot = base_of_sample(measured)
         poses = np.column_stack([measured.base_x.values, measured.base_y.values, angle])
         carried = _repeated(measured, poses)
         sense = np.where(carried > 0, 0.0, np.where(measured.direction.values == "backward", -1.0, 1.0))
-        places = np.array(bases)[of_sample]
+        places = np.array(bases)[pivot]
         kinds, which = np.unique(np.column_stack([places, backward, sense, carried]), axis=0, return_inverse=True)
-        rows = [np.flatnonzero(which == k) for k in range(len(kinds))]
-        self._segments = [
-            Segment(int(of_sample[own[0]]), bases[of_sample[own[0]]], bool(kind[2]), float(kind[3]), own)
-            for kind, own in zip(kinds, rows, strict=True)
-        ]
         self.drive_angles = angle
-        self.pivots = np.array([segment.pivot for segment in self])
-        self.signs = np.array([-1.0 if segment.backward else 1.0 for segment in self])
-        self.senses = np.array([segment.sense for segment in self])
-        self._angles = np.full((len(self), max(segment.samples.size for segment in self)), np.nan)
-        for row, segment in zip(self._angles, self, strict=True):
-            read = angle[segment.samples]
-            row[: read.size] = np.pi - read if segment.backward else read
+        self.of_sample: Index = which  # segment of each sample, shape (samples,)
+        self.samples: list[Index] = [np.flatnonzero(which == k) for k in range(len(kinds))]  # of each segment
+        self.pivots: Index = pivot[
+            [own[0] for own in self.samples]
+        ]  # numbers of the pivots, in the order of the record
+        self.bases = kinds[:, :2]  # pivots, or where drives begin [length], shape (segments, 2)
+        self.backward = kinds[:, 2] > 0.0  # True for contact on the side of a backward sweep
+        self.signs = np.where(self.backward, -1.0, 1.0)
+        # Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 if it carries the base, which
+        # turns no encoder.
+        self.senses = kinds[:, 3]
+        self.angles_in_sweep_frame = np.where(self.backward[which], np.pi - angle, angle)
         self._samples_by_errors: dict[bytes, Segments] = {}
         self._ways: dict[int, Floats] = {}
+        # Lines of all drives, (segments, lines, LINE_COLUMNS), NaN after the last; None if no drive carries the base.
         self.lines: Floats | None = None
         if np.any(carried):
             noise = max(load_cell.drive_angle_noise, load_cell.drive_angle_resolution)
             self.lines = self._drives(measured.sweep.values, poses, rod_of(measured).length, noise)
 
     def __len__(self) -> int:
-        return len(self._segments)
-
-    def __iter__(self) -> Iterator[Segment]:
-        return iter(self._segments)
-
-    def __getitem__(self, k: int) -> Segment:
-        return self._segments[k]
+        return len(self.samples)
 
     @property
-    def contacts(self) -> list[tuple[tuple[float, float], bool, float]]:
-        """Pivot [length], whether contact is on the side of a backward sweep, and sense of the drive, by segment."""
-        return [(segment.base, segment.backward, segment.sense) for segment in self]
+    def contacts(self) -> Floats:
+        """Pivot [length], side of contact and sense of the drive of each segment, shape (segments, 4)."""
+        return np.column_stack([self.bases, self.signs, self.senses])
 
     @property
     def is_carried(self) -> bool:
@@ -99,16 +76,15 @@ class RecordSegments:
     def _drives(self, sweep: Index, poses: Floats, length: float, noise: float) -> Floats:
         """Return `lines`, and write the travels of the sweeps that carry the base, for a noise of the encoder."""
         drives = []
-        for k, (row, segment) in enumerate(zip(self._angles, self, strict=True)):
-            if segment.sense:
+        for k, own in enumerate(self.samples):
+            if self.senses[k]:
                 drives.append(_TURNS)
                 continue
-            own = segment.samples
             once = poses[own[sweep[own] == sweep[own[0]]]]
             if np.ptp(once[:, 2]) <= _SCATTER * noise:
                 once[:, 2] = once[:, 2].mean()
-            path = lines_through(once, length, backward=segment.backward, off=max(_OFF, 3.0 * noise))
-            row[: own.size] = np.tile(path.travels, own.size // len(once))
+            path = lines_through(once, length, backward=bool(self.backward[k]), off=max(_OFF, 3.0 * noise))
+            self.angles_in_sweep_frame[own] = np.tile(path.travels, own.size // len(once))
             self._ways[k] = np.append(0.0, np.cumsum(np.hypot(*np.diff(once[:, :2], axis=0).T)))
             drives.append(path.lines)
         lines = np.full((len(drives), max(map(len, drives)), LINE_COLUMNS), np.nan)
@@ -122,13 +98,13 @@ class RecordSegments:
         They are the last before contact, the first and the last in contact, and the next after it; −1 if there is none.
         """
         out = np.full((len(self), 4), -1)
-        for row, segment, angles in zip(out, self, self._angles, strict=True):
-            order = np.argsort(angles[: segment.samples.size], kind="stable")
-            first, last = _longest(loaded[segment.samples[order]])
+        for row, own in zip(out, self.samples, strict=True):
+            ordered = own[np.argsort(self.angles_in_sweep_frame[own], kind="stable")]
+            first, last = _longest(loaded[ordered])
             if first <= last:
                 ranks = np.array([first - 1, first, last, last + 1])
-                known = (ranks >= 0) & (ranks < order.size)
-                row[known] = segment.samples[order[ranks[known]]]
+                known = (ranks >= 0) & (ranks < ordered.size)
+                row[known] = ordered[ranks[known]]
         return out
 
     def event_angles(self, loaded: Flags) -> Floats:
@@ -136,49 +112,22 @@ class RecordSegments:
         samples = self.event_samples(loaded)
         return np.where(samples >= 0, self.angles_in_sweep_frame[samples], np.nan)
 
-    @cached_property
-    def angles_in_sweep_frame(self) -> Floats:
-        """Reading of the drive angle of each sample in the sweep frame [rad], shape (samples,); where the base is
-        carried, its travel [L]."""
-        angles = np.empty(self.drive_angles.size)
-        for segment, row in zip(self, self._angles, strict=True):
-            angles[segment.samples] = row[: segment.samples.size]
-        return angles
-
-    @cached_property
-    def of_sample(self) -> Index:
-        """Index of the segment of each sample, shape (samples,)."""
-        which = np.empty(self.drive_angles.size, dtype=np.intp)
-        for k, segment in enumerate(self):
-            which[segment.samples] = k
-        return which
-
     @property
     def signs_of_samples(self) -> Floats:
-        """−1 for the samples of segments with contact as in a backward sweep, else 1, shape (samples,)."""
+        """`signs` of the segments of samples, shape (samples,)."""
         return np.asarray(self.signs[self.of_sample])
 
     @cached_property
     def course(self) -> Course:
-        """Order in which a discrepancy passes through the samples: by drive angle, in the direction of the drive, or by
-        travel where the drive carries the base.
-
-        Sweeps from one pivot in one direction, or carried through the same poses, repeat each other, and have one
-        discrepancy in common.
-        """
+        """Order in which a discrepancy passes through the samples: along the drive, with one course for repeats."""
         direction = np.where(self.senses == 0.0, 1.0, self.senses * self.signs)
-        coordinate = direction[self.of_sample] * self.angles_in_sweep_frame
-        return Course.along(coordinate, [segment.samples for segment in self])
+        return Course.along(direction[self.of_sample] * self.angles_in_sweep_frame, self.samples)
 
     def ways(self, travels: Floats) -> Floats:
-        """Convert travels in the sweep frame, shape (n, segments), to ways of the base [length] where it is carried,
-        and to drive angles as read [rad] elsewhere."""
-        ways = np.array(travels)
-        for k, segment in enumerate(self):
-            if segment.sense:
-                ways[:, k] = np.pi - ways[:, k] if segment.backward else ways[:, k]
-            else:
-                ways[:, k] = np.interp(ways[:, k], self._angles[k, : self._ways[k].size], self._ways[k])
+        """Convert travels in the sweep frame, (n, segments), to ways of the base [length], or angles as read [rad]."""
+        ways = np.where(self.backward, np.pi - travels, travels)
+        for k, own in self._ways.items():
+            ways[:, k] = np.interp(travels[:, k], self.angles_in_sweep_frame[self.samples[k][: own.size]], own)
         return ways
 
     def samples_with(self, errors: Floats) -> Segments:
@@ -186,15 +135,12 @@ class RecordSegments:
         key = errors.tobytes()
         if key not in self._samples_by_errors:
             samples, angles = [], []
-            for row, segment in zip(self._angles, self, strict=True):
-                shifts = errors if segment.backward else -errors
-                if not segment.sense:
-                    shifts = np.zeros_like(errors)
-                shifted = (row[: segment.samples.size] + shifts[:, None]).ravel()
+            for own, sign, sense in zip(self.samples, self.signs, self.senses, strict=True):
+                shifts = -sign * np.abs(sense) * errors
+                shifted = (self.angles_in_sweep_frame[own] + shifts[:, None]).ravel()
                 order = np.argsort(shifted, kind="stable")
                 angles.append(shifted[order])
-                rows = segment.samples + self.drive_angles.size * np.arange(errors.size)[:, None]
-                samples.append(rows.ravel()[order])
+                samples.append((own + self.drive_angles.size * np.arange(errors.size)[:, None]).ravel()[order])
             first = np.cumsum([0, *(part.size for part in samples)])
             self._samples_by_errors[key] = Segments(first, np.concatenate(samples), np.concatenate(angles), self.lines)
         return self._samples_by_errors[key]

@@ -30,10 +30,7 @@ _FRICTION_ANGLES = (0.0, 0.5), (0.5, MAX_FRICTION_ANGLE)
 
 
 class RodTables:
-    """Tables of the stated rod, each made for the first rig that needs it, and kept.
-
-    Where a drive carries the base, first contact decides in which sense friction acts.
-    """
+    """Tables of the stated rod, each made for the first rig that needs it, and kept."""
 
     def __init__(self, rod: Rod, friction: float, is_carried: bool) -> None:
         self._rod, self._friction, self._is_carried = rod, friction, is_carried
@@ -42,10 +39,7 @@ class RodTables:
         differ from what is stated, and whether friction is strong."""
 
     def known(self, profile: Profile, taper: Floats, bend: Floats, friction: Floats, length: Floats) -> Tables:
-        """Return the tables for rods of a profile; the second is for friction beyond that of the first.
-
-        Shapes: taper, bend (n,), friction (n,), length (n,).
-        """
+        """Return the tables for rods of a profile; the second is for friction beyond that of the first."""
         from tactile_bayes.mechanics.poses.forward_table import NO_TABLE  # numba takes a second to load
 
         slides = bool(np.any(friction != self._friction))

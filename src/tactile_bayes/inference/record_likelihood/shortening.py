@@ -11,12 +11,12 @@ import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.errors import DriftWarning
-from tactile_bayes.inference.record_likelihood.record_segments import without_errors
+from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
 from tactile_bayes.load_cell import LoadCell, RandomWalk, zero_load
 from tactile_bayes.load_cell.blocks import AFTER_CONTACT, BEFORE_ONSET, IN_CONTACT
 from tactile_bayes.numerics.scatter import rough_noise
-from tactile_bayes.reconstruction import contact_sides, with_sides
-from tactile_bayes.record import CHANNELS, base_of_sample, carried_sweeps, present_channels, rows_of_sweeps
+from tactile_bayes.reconstruction import with_sides
+from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels, rows_of_sweeps
 
 __all__ = ["MOST_SAMPLES", "is_long", "shortened", "thinned"]
 
@@ -41,12 +41,10 @@ def is_long(record: xr.Dataset) -> bool:
 def shortened(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
     """Return a record as the likelihood takes it, and the load cell of its samples; `blocks` of the record states how.
 
-    A record of more than `MOST_SAMPLES` is put in blocks of readings at neighbouring drive angles, narrow enough that
-    loads are smooth in them, each of which two points of its straight line stand for; readings next to a snap-off stay
-    single. The points have the noise of a reading over the root of their number of readings, and what scatters about
-    the line states the noise. For noise whose means have no such distribution (outliers, drift, correlated channels, an
-    encoder with noise or steps, steps above the noise, readings at the end of the range), and where a drive carries the
-    base, every so many readings are taken instead; the drift is then that between them.
+    Of more than `MOST_SAMPLES`, blocks of readings at neighbouring drive angles are taken, two points on a straight
+    line for each; readings next to a snap-off stay single. For noise whose means are not normal (outliers, drift,
+    correlation, an uncertain encoder, coarse steps, the end of the range) and carried bases, every so many readings
+    are.
     """
     if not is_long(record):
         return record, cell
@@ -74,10 +72,7 @@ def _averages(record: xr.Dataset, cell: LoadCell) -> bool:
 
 
 def thinned(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
-    """Return every so many samples, and the cell that drifts from one to the next as the given one does between them.
-
-    Corners of the way along which a drive carries the base remain. A record that is not long is returned as it is.
-    """
+    """Return every so many samples of a long record, and all corners of carried ways, and the cell of these samples."""
     if not is_long(record):
         return record, cell
     samples = record.sizes["sample"]
@@ -134,26 +129,19 @@ class _Readings:
         self.present = [CHANNELS.index(name) for name in present_channels(record)]
         self.values = np.stack([record[name].values for name in CHANNELS], axis=-1)
         self.angle = record["drive_angle"].values.astype(float)
-        self.groups = self._groups(contact_sides(without_errors(record, cell), cell))
+        self.groups = self._groups(RecordSegments(record, cell))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DriftWarning)
             self.found = zero_load(record)
 
-    def _groups(self, side: Floats) -> list[_Group]:
-        sweep, direction = self.record["sweep"].values, self.record["direction"].values
-        _, pivot = base_of_sample(self.record)
-        members: dict[tuple[int, str, float], list[Index]] = {}
-        for rows in rows_of_sweeps(sweep):
-            key = (int(pivot[rows[0]]), str(direction[rows[0]]), float(side[rows[0]]))
-            members.setdefault(key, []).append(rows)
-        groups = []
-        for (_, sense, sign), of_sweeps in members.items():
-            of_sweeps.sort(key=lambda rows: int(rows[0]))
-            samples = np.concatenate(of_sweeps)
-            which = np.repeat(np.arange(len(of_sweeps)), [len(rows) for rows in of_sweeps])
-            order = np.argsort(self.angle[samples], kind="stable")
-            numbers = np.array([int(sweep[rows[0]]) for rows in of_sweeps])
-            groups.append(_Group(samples[order], which[order], numbers, sense, "backward" if sign < 0.0 else "forward"))
+    def _groups(self, segments: RecordSegments) -> list[_Group]:
+        sweep, groups = self.record["sweep"].values, []
+        for own, backward in zip(segments.samples, segments.backward, strict=True):
+            samples = own[np.argsort(self.angle[own], kind="stable")]
+            places = {number: place for place, number in enumerate(dict.fromkeys(sweep[own].tolist()))}
+            which = np.array([places[number] for number in sweep[samples].tolist()])
+            direction, side = str(self.record["direction"].values[own[0]]), "backward" if backward else "forward"
+            groups.append(_Group(samples, which, np.array(list(places)), direction, side))
         return groups
 
     def in_blocks(self) -> xr.Dataset:

@@ -21,9 +21,8 @@ _LARGEST = 50.0  # bound of the change of the logarithm of a radius, far beyond 
 class Anchor:
     """The point of a contour at one slope angle, and how far it is from where a linear map of the radii has it.
 
-    A record that touches a contour beside its vertex determines an arc. The vertex is as far from it as the integral of
-    the unknown radii between them says, which is linear in their logarithms only near a centre. Farther away an arc
-    that should stay where it is moves, unless the vertex moves as well.
+    The vertex is as far from an arc that was touched as the integral of the radii between them says, which is linear in
+    their logarithms only near a centre: farther away the arc moves unless the vertex does.
     """
 
     slope_angle: float

@@ -10,66 +10,16 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, ndtri_exp
 
-from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.contours import Smooth
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
-from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.shape_free_posterior.anchor import Anchor
-from tactile_bayes.inference.shape_free_posterior.observer import HUBER_THRESHOLD, Observer
-from tactile_bayes.numerics.scatter import robust_deviation
-from tactile_bayes.rig.parameters import MAY_VANISH
+from tactile_bayes.inference.shape_free_posterior.columns import joined, white_scales
+from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, linearised
+from tactile_bayes.inference.shape_free_posterior.observer import Observer
 
-__all__ = ["LinearPrior", "NormalApproximation", "joined", "linear_names", "scale_names", "split"]
+__all__ = ["NormalApproximation"]
 
-_OF_ROUGHNESS = ("amplitude", "length_scale")
-# Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
-# of the further ones.
-_STEP, _LARGEST_STEP = 1e-5, 0.01
-_FURTHER_DIFFERENCES = 2  # number of times that differences are taken again
-_MIN_CHANGE = 0.03  # least singular value of residuals that counts, in deviations per prior scale
 _FAR_DOWN = -35.0  # standard normal number of which, and of all below, a truncation at less changes nothing
-
-
-class LinearPrior(NamedTuple):
-    """Means and precisions, shape (d,) each, of log r, the directions' weights, the vertex and the rig."""
-
-    mean: Floats
-    precision: Floats
-
-
-def scale_names(model: ContourModel) -> tuple[str, ...]:
-    """Return the parameters in which loads are not linearised."""
-    return (*_OF_ROUGHNESS, *model.noise.names)
-
-
-def linear_names(model: ContourModel) -> tuple[str, ...]:
-    """Return the parameters in which loads are linearised, r by its logarithm: all but those of `scale_names`.
-
-    Those that may vanish come last.
-    """
-    rough = [name for name in model.family.parameters if name not in _OF_ROUGHNESS]
-    return (*rough, *sorted(model.unknowns.names, key=MAY_VANISH.__contains__))
-
-
-def _white_scales(model: ContourModel) -> slice:
-    """Return the place of the white noise among the scales."""
-    return slice(len(_OF_ROUGHNESS), len(_OF_ROUGHNESS) + len(model.noise.of_white))
-
-
-def split(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
-    """Return scales (amplitude, length scale, noise), (n, scales), and linear parameters, (n, d), of points."""
-    values = model.values(points)
-    linear = np.stack([values[name] for name in linear_names(model)], axis=1)
-    linear[:, 0] = np.log(linear[:, 0])
-    return np.stack([values[name] for name in scale_names(model)], axis=1), linear
-
-
-def joined(model: ContourModel, scales: Floats, linear: Floats) -> Floats:
-    """Return the model's parameters, (n, parameters), from scales and linear parameters."""
-    names = (*scale_names(model), *linear_names(model))
-    points = np.empty((len(linear), len(names)))
-    points[:, [model.names.index(name) for name in names]] = np.hstack([scales, np.exp(linear[:, :1]), linear[:, 1:]])
-    return points
 
 
 class _SmoothNoise(NamedTuple):
@@ -81,14 +31,13 @@ class _SmoothNoise(NamedTuple):
 
     @classmethod
     def at(cls, observer: Observer, point: Floats) -> _SmoothNoise:
-        """Return the noise for the loads of a point, shape (1, parameters)."""
+        """Return the noise for the loads of a point, shape (parameters,)."""
         model = observer.model
         nothing = cls(np.zeros(len(model.noise.channels)), 1.0, 1.0)
         if not model.noise.of_discrepancy:
             return nothing
-        loads, _ = model.likelihood.predict(model.contours(point), model.rig(point))
         course = model.likelihood.segments.course
-        largest = course.load_in_contact(loads[0]) / observer.noise
+        largest = model.load_in_contact(point) / observer.noise
         in_contact = largest.any(axis=1)
         if not in_contact.any():
             return nothing
@@ -107,38 +56,26 @@ class _SmoothNoise(NamedTuple):
         return np.asarray(np.hypot(white, scale * np.sqrt(np.maximum(alike, 1.0)) * self.size))
 
 
-class _Observations(NamedTuple):
-    """Linearised observations: as few combinations of readings and snap-offs as carry all information."""
-
-    slopes: Floats  # over the log-radii at the nodes and the other parameters, shape (observations, k)
-    values: Floats  # at zero parameters, with the noise of the scales, shape (observations,)
-    kinds: Index  # kinds of noise, the last of which is that of snap-offs, shape (observations,)
-    readings: Floats  # number of readings of each other kind
-    scatter: Floats  # robust standard deviation of these readings from those at the centre
-
-
 class NormalApproximation:
-    """Normal distribution of the linear parameters, given amplitude and length scale of the random radius, and noise.
+    """Normal distribution of the linear parameters, given amplitude, length scale and noise, `scales` of the model.
 
-    It is exact if loads and snap-offs are linear in the logarithms of the radii and in the rig, and priors are normal.
-    Loads are linearised at a point, `scales` and `linear`; they are rather linear in parameters with the vertex moved
-    by `bent`, if what the record touches is beside it. The dependence on the length scale is tabulated at those of the
-    random radius, and interpolated. Parameters that may vanish, like friction, have the positive part of the
-    distribution alone.
+    It is exact if loads and snap-offs are linear in the log-radii and in the rig, with the vertex moved by `bent`, and
+    priors are normal. Loads are linearised at a point; over the length scale, the map is interpolated. Parameters that
+    may vanish, like friction, have the positive part of the distribution alone.
     """
 
     def __init__(self, observer: Observer, prior: LinearPrior, scales: Floats, linear: Floats) -> None:
         self.prior, self.model = prior, observer.model
         family = observer.model.family
         assert isinstance(family, ShapeFreeFamily)
-        self.white = _white_scales(observer.model)
-        self._smooth = _SmoothNoise.at(observer, joined(observer.model, scales[None], linear[None]))
+        self.white = white_scales(observer.model)
+        self._smooth = _SmoothNoise.at(observer, joined(observer.model, scales[None], linear[None])[0])
         known, self._count = family.radius.directions, family.radius.count
         self.vanishing = int(np.count_nonzero(observer.model.may_vanish))
         self._radius = family.radius
         log_radius = self._log_radius(scales[None], linear[None])[0]
         self._centre = np.append(log_radius, linear[1 + self._count :])
-        self._observations = _linearised(observer, prior, scales, self._centre)
+        self._observations = linearised(observer, prior, scales, self._centre)
         slopes = self._observations.slopes
         # The map from linear parameters to observations, at every length scale of the tabulated directions.
         nodes = known.values.shape[1]
@@ -166,10 +103,7 @@ class NormalApproximation:
         return self._radius.log_radius(linear[:, 0], scales[:, 0], scales[:, 1], linear[:, 1 : 1 + self._count])
 
     def bent(self, scales: Floats, linear: Floats, *, back: bool = False) -> Floats:
-        """Return linear parameters, (n, d), with the vertex where the contour's anchor is as a linear map has it.
-
-        With `back`, return those of which this makes the given ones.
-        """
+        """Return linear parameters, (n, d), with the vertex such that the anchor is where the map has it; or back."""
         beyond = self._anchor.beyond_line(self._log_radius(scales, linear))
         bent = linear.copy()
         bent[:, self._vertex] += beyond if back else -beyond
@@ -186,8 +120,7 @@ class NormalApproximation:
         return np.swapaxes(through, 1, 2), certainty
 
     def nearest(self, scales: Floats) -> Floats:
-        """Return the linear parameters, (d,), with which a contour of other scales, (scales,), is nearest the centre:
-        first of all in what is observed, then in the logarithms of the radii."""
+        """Return the linear parameters, (d,), with which a contour of other scales, (k,), is nearest the centre."""
         (through,), (certainty,) = self._information(scales[None])
         each = np.eye(self.prior.mean.size)
         radii = self._log_radius(np.tile(scales, (len(each), 1)), each).T
@@ -202,7 +135,7 @@ class NormalApproximation:
         return upper[:, :-1, -1], np.swapaxes(upper[:, :-1, :-1], 1, 2)
 
     def _triangular(self, scales: Floats) -> Floats:
-        """Return Lᵀ with L⁻¹b as its last column, and below that the root of the least sum of squares, up to its sign.
+        """Return Lᵀ with L⁻¹b as last column, and below that the root of the least squares, up to sign.
 
         Orthogonal transformations keep the digits that squares lose, as precisions differ by factors of up to 1e15.
         """
@@ -226,8 +159,7 @@ class NormalApproximation:
     def damped(self, scales: Floats, start: Floats, damping: Floats) -> Floats:
         """Return linear parameters, (n, d), after Levenberg–Marquardt steps from a start, (d,), with dampings (n,).
 
-        A damping adds to the prior's precision, around the start: large ones hold all that a record hardly determines.
-        Parameters that may vanish keep at least half of their values.
+        Large dampings hold all that a record hardly determines. What may vanish keeps at least half of its value.
         """
         (through,), (certainty,) = self._information(scales[None])
         root = np.sqrt(self.prior.precision)
@@ -242,10 +174,9 @@ class NormalApproximation:
         return np.asarray(there)
 
     def truncated(self, pulled: Floats, root: Floats, normal: Floats) -> tuple[Floats, Floats]:
-        """Return standard normal numbers, (n, d), as those by which parameters that may vanish are positive, and the
-        log of the determinant of that map, (n,); `conditional` gives the other arguments.
+        """Return numbers, (n, d), for which parameters that may vanish are positive, and the log-determinant, (n,).
 
-        Since these parameters come last and Lᵀ is upper triangular, each depends on its own number and later ones only.
+        These come last and Lᵀ is upper triangular, so that each depends on its own number and later ones only.
         """
         normal, growth = normal.copy(), np.zeros(len(normal))
         for k, least in self._least(pulled, root, normal):
@@ -279,74 +210,3 @@ class NormalApproximation:
         upper, noise = self._triangular(known[None])[0], scales[self.white]
         volume = np.sum(self._observations.readings * np.log(noise)) + np.log(np.diag(upper)[:-1]).sum()
         return float(-0.5 * upper[-1, -1] ** 2 - volume)
-
-
-def _linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> _Observations:
-    """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
-
-    Differences along the parameters give rough slopes: loads may exceed the noise so far that a step which is small for
-    one direction leaves another one to rounding errors. Their singular vectors are directions in which steps of about
-    a standard deviation give better ones.
-    """
-    model = observer.model
-    rig = linear_names(model)[prior.mean.size - len(model.unknowns.names) :]
-    nodes = centre.size - 2 - len(rig)
-    units = np.append(np.ones(nodes), prior.precision[-2 - len(rig) :] ** -0.5)
-    noises = scales[_white_scales(model)]
-
-    def differences(axes: Floats, steps: Floats) -> tuple[list[_Lines], list[float]]:
-        """Return the lines along axes, for each kind of noise and for snap-offs, and the scatter of each kind."""
-        moves = steps[:, None] * axes * units
-        points = np.concatenate([centre + moves, centre - moves, centre[None]])
-        contours = Smooth(points[:, :nodes], q=points[:, nodes], x_c=points[:, nodes + 1])
-        residual, agree, late = observer(contours, dict(zip(rig, points[:, nodes + 2 :].T, strict=True)))
-        # A sample that is loaded on one side of a difference only has no slope.
-        smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
-        lines, scatter = [], []
-        for chosen, noise in zip(model.noise_columns, noises, strict=True):
-            of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
-            scatter.append(robust_deviation(of_kind[-1]))
-            of_kind *= np.minimum(1.0, HUBER_THRESHOLD * noise / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
-            lines.append(_Lines.of(of_kind, steps, axes))
-        return [*lines, _Lines.of(late, steps, axes)], scatter
-
-    axes = np.eye(centre.size)
-    lines, scatter = differences(axes, np.full(centre.size, _STEP))
-    for _ in range(_FURTHER_DIFFERENCES):
-        every = [line.slopes / noise for line, noise in zip(lines, (*noises, 1.0), strict=True)]
-        upper = np.linalg.qr(np.concatenate([*every, np.zeros(axes.shape)]), mode="r")
-        _, sizes, axes = np.linalg.svd(upper)
-        lines, scatter = differences(axes, 1.0 / np.maximum(sizes, 1.0 / _LARGEST_STEP))
-    observed = [line.condensed() for line in lines]
-    kinds = np.repeat(np.arange(len(observed)), [len(line.values) for line in observed])
-    slopes = np.concatenate([line.slopes for line in observed]) / units
-    values = slopes @ centre + np.concatenate([line.values for line in observed])
-    counts = [float(line.values.size) for line in lines[:-1]]
-    return _Observations(slopes, values, kinds, np.array(counts), np.array(scatter))
-
-
-class _Lines(NamedTuple):
-    """Linearised residuals with unit noise, whose signs are those of measured less expected values."""
-
-    slopes: Floats  # slopes of the expected values, over changes of the parameters in prior scales, shape (n, k)
-    values: Floats  # at the centre, shape (n,)
-
-    @classmethod
-    def of(cls, residual: Floats, steps: Floats, axes: Floats) -> _Lines:
-        """Return the lines through residuals, (2 k + 1, n), at points a step along each axis to either side of the
-        centre, and at the centre. Those that are not finite at one of the points, like a snap-off that the rod does not
-        reach, are zero."""
-        size = steps.size
-        finite = np.isfinite(residual).all(axis=0)
-        change = np.where(finite, residual[:size] - residual[size:-1], 0.0) / (2.0 * steps[:, None])
-        return cls(change.T @ axes, -np.where(finite, residual[-1], 0.0))
-
-    def condensed(self) -> _Lines:
-        """Return combinations that carry all information, by singular value decomposition."""
-        axes, sizes, across = np.linalg.svd(self.slopes, full_matrices=False)
-        significant = sizes > _MIN_CHANGE
-        explained = axes[:, significant].T @ self.values
-        # The norm of the unexplained residual, with slopes of zero, informs the noise scale.
-        rest = np.sqrt(max(float(self.values @ self.values - explained @ explained), 0.0))
-        combined = sizes[significant, None] * across[significant]
-        return _Lines(np.vstack([combined, np.zeros(across.shape[1])]), np.append(explained, rest))

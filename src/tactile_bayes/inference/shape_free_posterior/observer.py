@@ -32,17 +32,16 @@ class Observer:
         self._width = self._within / np.sqrt(3.0)
 
     def __call__(self, contours: Contour, values: dict[str, Floats]) -> tuple[Floats, Flags, Floats]:
-        """Return residuals of readings, over `noise`; True for samples loaded as measured; and residuals of snap-offs.
+        """Return residuals of readings over `noise`, samples loaded as measured, and residuals of snap-offs.
 
-        Residuals are expected less measured values, those of snap-offs in standard deviations. Shapes are
-        (n, samples, 3), (n, samples) and (n, sweep segments that end).
+        They are expected less measured; shapes (n, samples, 3), (n, samples) and (n, sweep segments that end).
         """
         model, rig = self.model, self.model.unknowns.rig(values)
-        loads, _ = model.likelihood.predict(contours, rig)
+        loads, _, events = model.likelihood.predict_with_events(contours, rig)
         agree = (loads != 0.0).any(axis=2) == self.loaded
         cell = model.likelihood.load_cell
         beyond = cell.expected(model.unknowns.sensed(loads, values, cell)) - model.likelihood.measured
-        late = (model.likelihood.snap_offs(contours, rig) - self._end) / self._width
+        late = (events[..., 1] - self._end) / self._width
         beyond /= self.noise
         return beyond, agree, late[:, self.ends]
 
@@ -56,10 +55,7 @@ class Observer:
         return bool(off.any())
 
     def log_density(self, points: Floats) -> Floats:
-        """Return a coarse log-likelihood, shape (n,), for a search, with Huber's loss of the readings.
-
-        Samples that are loaded unlike the record's have a constant loss, since the snap-offs account for them.
-        """
+        """Return a coarse log-likelihood, (n,), with Huber's loss, constant for samples loaded unlike the record's."""
         model = self.model
         residual, agree, late = self(model.contours(points), model.values(points))
         scale = model.noise_scale(points)

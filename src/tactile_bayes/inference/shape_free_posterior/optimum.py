@@ -8,14 +8,9 @@ from scipy.optimize import minimize
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.shape_free_posterior.normal_approximation import (
-    LinearPrior,
-    NormalApproximation,
-    joined,
-    linear_names,
-    scale_names,
-    split,
-)
+from tactile_bayes.inference.shape_free_posterior.columns import joined, linear_names, scale_names, split
+from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation
+from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior
 from tactile_bayes.inference.shape_free_posterior.observer import Observer
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
@@ -32,9 +27,7 @@ _DRAWS = 4000  # number of draws from a prior for its mean and standard deviatio
 def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, deadline: Deadline = NEVER) -> Whitening:
     """Return whitening coordinates at the posterior's mode, which is sought from a point, shape (parameters,).
 
-    Gauss–Newton steps, damped until the density rises, alternate with the most probable scales, whose evidence has a
-    closed form for linearised loads. The widths of snap-offs that the point misses are reduced. After the deadline, the
-    best point so far is taken.
+    Damped Gauss–Newton steps alternate with the most probable scales, and snap-offs that are missed become sharper.
     """
     observer, prior = Observer(model), _linear_prior(model, rng)
     (scales,), (linear,) = split(model, point[None])
@@ -63,10 +56,9 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
 
 
 def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: Floats) -> Floats:
-    """Return the most probable scales in the vicinity of the given ones.
+    """Return the most probable scales near the given ones.
 
-    White noise is at least half the scatter of the readings: far from the mode, less would stop a search at the first
-    bend of the ridge that it follows.
+    White noise is at least half the scatter: less would stop a search far from the mode at the first bend of its ridge.
     """
     names = scale_names(model)
     columns = [model.names.index(name) for name in names]

@@ -9,7 +9,8 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.coordinates.base import Coordinates
-from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation, joined, split
+from tactile_bayes.inference.shape_free_posterior.columns import joined, split
+from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation
 
 __all__ = ["Whitening"]
 
@@ -21,11 +22,8 @@ _LARGEST = 50.0  # bound of the logarithm of a radius, far beyond any prior
 class Whitening(Coordinates):
     """A change of variables by a normal approximation, whose quality affects efficiency, not exactness.
 
-    Given the scales (amplitude and length scale of the random radius, and the noise), the approximation gives mean and
-    covariance of all other parameters. The coordinates are the logarithms of the scales, and the other parameters
-    standardised by that mean and covariance, which makes them nearly independent and standard normal; of those that may
-    vanish by the positive part of that distribution, so that no coordinate ends at a wall. Where mean and covariance of
-    the posterior are known to differ from those of the approximation, they are standardised by these.
+    The coordinates are the logarithms of the scales, and the other parameters, standardised by the mean and covariance
+    that the approximation gives at these scales; of those that may vanish by the positive part of that distribution.
     """
 
     approximation: NormalApproximation

@@ -54,10 +54,8 @@ def gather(
 ) -> Cloud:
     """Return a distribution of starting points that is wider than the posterior and mostly of comparable probability.
 
-    A walker that starts where a sample of the record is impossible, as just beyond a snap-off, inflates the noise to
-    explain it, and takes thousands of steps to return. Points are therefore drawn around the centre, and while most of
-    them are far less probable than the best, centre and covariance are estimated from the best fifth (cross-entropy
-    method). The covariance is halved, since the best fifth of points that are twice as wide would not be narrower.
+    While most points drawn around the centre are far less probable than the best, as just beyond a snap-off, where a
+    walker would be lost, centre and covariance are estimated from the best fifth (cross-entropy method).
     """
     size = centre.size
     top = float(log_probability(centre[None])[0])

@@ -71,10 +71,7 @@ class Brackets(NamedTuple):
 
 
 def event_brackets(model: ContourModel) -> Brackets:
-    """Return the drive angles between which contact begins and ends, from the loads alone.
-
-    Residuals of loads do not depend on the angle of snap-off until a sample changes sides; residuals of brackets do.
-    """
+    """Return the drive angles between which contact begins and ends; loads alone do not show how far events are off."""
     segments = model.likelihood.segments
     angle, of_sample = segments.angles_in_sweep_frame, segments.of_sample
     rows = []
@@ -114,10 +111,7 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
 
 
 class _Search:
-    """Least squares over the forward-model parameters, positive ones by their logarithms.
-
-    The noise follows from the residuals.
-    """
+    """Least squares over the forward-model parameters, positive ones by their logarithms; noise from residuals."""
 
     def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
         self.model = model
@@ -144,10 +138,7 @@ class _Search:
         return self.coordinates.parameters(coordinates)[0]
 
     def residuals(self, coordinates: Floats) -> Floats:
-        """Return residuals of loads and events in standard deviations, shape (n, loads + events).
-
-        They are defined beyond the ends of priors too, since the way to an optimum may lead through there.
-        """
+        """Return residuals of loads and events in deviations, (n, loads + events), beyond the ends of priors, too."""
         model, points, size = self.model, self.points(coordinates), self.middle.size
         least = np.where(model.may_vanish, -model.high, model.low)[:size]
         allowed = ((points > least) & (points < model.high[:size])).all(axis=1)
@@ -184,10 +175,7 @@ class _Search:
                 yield place
 
     def refine(self, found: Optimum) -> Optimum:
-        """Return an optimum, refined by searches from Step 2's contacts while it does not explain the record.
-
-        The rig often converges long before a distant contour; with that rig, Step 2 locates the contour.
-        """
+        """Return an optimum refined by searches from contacts of Step 2 with its rig, which often converges first."""
         while not found.fits and not self.deadline.has_passed:
             point = self.points(found.point[None])[0]
             point = np.where(self.model.may_vanish[: point.size], np.maximum(point, 0.0), point)
@@ -230,10 +218,7 @@ class _Search:
 
 
 def _continued(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
-    """Return loads and events, continued antisymmetrically to negative values of parameters that may vanish.
-
-    A search would otherwise stop at a wall if the record favours negative values.
-    """
+    """Return loads and events, continued antisymmetrically to negative values of parameters that may vanish."""
     vanishing = np.flatnonzero(model.may_vanish)
     below = (points[:, vanishing] < 0.0).any(axis=1)
     if not below.any():
@@ -248,10 +233,7 @@ def _continued(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
 
 
 def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
-    """Return parameters of the white noise that fit residuals, shape (samples, present channels), robustly.
-
-    Beside a discrepancy the noise is that of unloaded or neighbouring samples.
-    """
+    """Return the white noise that fits residuals, (samples, present channels); beside a discrepancy that of scatter."""
     known = model.likelihood.load_cell.noise
     sizes = np.maximum(DEVIATION_OVER_MEDIAN * np.median(np.abs(residuals), axis=0), 1e-3)
     fitted = model.deviation[model.present] * (1.0 if model.noise.of_discrepancy else sizes)
@@ -261,15 +243,10 @@ def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
 
 
 def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, drawn: Floats) -> Floats:
-    """Return parameters of the discrepancy, if it is inferred, that fit residuals as in `fitted_noise`.
-
-    They are the root mean square of the residuals in contact over the largest load, within the range of prior draws,
-    shape (n, 2), and the median of the drawn lengths.
-    """
+    """Return the discrepancy that fits residuals as in `fitted_noise`, from prior draws (n, 2); empty without one."""
     if not model.noise.of_discrepancy:
         return np.empty(0)
-    loads, _ = model.likelihood.predict(model.contours(point[None]), model.rig(point[None]))
-    largest = model.likelihood.segments.course.load_in_contact(loads[0])[:, model.present]
+    largest = model.load_in_contact(point)[:, model.present]
     squares = np.square(np.clip(residuals, -_MAX_RESIDUAL, _MAX_RESIDUAL) * model.deviations[:, model.present])
     least, most = np.quantile(drawn[:, 0], [0.05, 1.0])
     share = np.sqrt(squares[largest > 0.0].sum() / max(np.square(largest).sum(), np.finfo(float).tiny))
@@ -277,10 +254,9 @@ def _fitted_discrepancy(model: ContourModel, point: Floats, residuals: Floats, d
 
 
 def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:
-    """Return the contour parameters fitted to Step 2's contact points, or None if too few are usable.
+    """Return the contour parameters fitted to Step 2's contacts with a rig, None if few are usable.
 
-    Step 2 takes a given rig, by default one with the zeros of the unloaded samples. None stands also for a rig that
-    is so far from the stated one that a record corrected for it is refused.
+    The rig's default has the zeros of the unloaded samples; None stands also for a rig that is far from the stated one.
     """
     if len(present_channels(model.measured)) < len(CHANNELS):
         return None

@@ -32,10 +32,7 @@ def standardise(
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
 ) -> tuple[Whitening, Floats]:
-    """Return coordinates nearer to standard normal than the base's, and the start, (ensembles, walkers, d), in them.
-
-    Each of some pilot runs samples in those so far, which are standardised by mean and covariance of its second half.
-    """
+    """Return coordinates nearer to standard normal, by pilot runs, and the start, (ensembles, walkers, d), in them."""
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
     best, start, points = base, start.copy(), start[0]
     for steps in _STEPS:
@@ -65,9 +62,9 @@ class _Normal(NamedTuple):
     def fitted(cls, draws: Floats, independent: float) -> _Normal:
         """Return the distribution fitted to draws, (n, k), as many of which as said are independent.
 
-        Of their covariance only principal axes count whose variances differ from one by more than the number of draws
-        explains (Marchenko & Pastur 1967, doi 10.1070/SM1967v001n04ABEH001994), less the bias of their size (Baik &
-        Silverstein 2006, doi 10.1016/j.jmva.2005.08.003).
+        Only principal axes count whose variances differ from one by more than that number explains (Marchenko & Pastur
+        1967, doi 10.1070/SM1967v001n04ABEH001994), less their bias (Baik & Silverstein 2006, doi
+        10.1016/j.jmva.2005.08.003).
         """
         variances, axes = np.linalg.eigh(np.cov(draws.T))
         variances = np.maximum(variances, _MIN_VARIANCE)  # if few walkers have moved
@@ -90,10 +87,9 @@ class _Normal(NamedTuple):
 
 
 def _cross_validated(draws: Floats) -> tuple[_Normal, float]:
-    """Return a normal distribution fitted to draws of walkers, (walkers, steps, k), and its gain for others than these.
+    """Return a normal distribution fitted to draws (walkers, steps, k), and its gain for draws of other walkers.
 
-    How many of the draws are independent is the number with which a fit to each half of the walkers suits the other
-    half best.
+    How many draws are independent is the number with which a fit to each half of the walkers suits the other best.
     """
     halves = [half.reshape(-1, draws.shape[-1]) for half in np.array_split(draws, 2)]
     gains = {}

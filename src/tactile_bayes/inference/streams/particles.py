@@ -16,10 +16,11 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.coordinates.base import in_coordinates
 from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal, effective_number, normalised
 from tactile_bayes.inference.ensembles.moves import FittedMove, step_ensembles
+from tactile_bayes.inference.streams.e_value import WIDER
 from tactile_bayes.inference.streams.stream_state import StreamState
 from tactile_bayes.numerics.selection import resampled
 
-__all__ = ["DECORRELATED", "LOST_ONCE", "SETTLED", "WIDER", "Mover", "Particles"]
+__all__ = ["DECORRELATED", "LOST_ONCE", "SETTLED", "Mover", "Particles"]
 
 # Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28
 # samples of a double sweep were accepted, 0.20 of those of 4 parts, 0.29 of 12, and 0.05 of a single distribution.
@@ -38,8 +39,7 @@ _RISING = 3.0
 class Mover:
     """Moves particles by distributions fitted to half of them, now and then by differences.
 
-    `rises` says whether the mean log-density rose in the last step of a fitted distribution by more than chance
-    explains.
+    `rises`: the mean log-density rose in the last step of a fitted distribution by more than chance explains.
     """
 
     def __init__(self, model: ContourModel, random: np.random.RandomState) -> None:
@@ -81,16 +81,15 @@ DECORRELATED, _BRIDGED = 0.2, 0.35
 SETTLED = 0.4
 LOST_ONCE = 1.2  # that increase in any stage, of particles that lost the posterior: evidences were then too small by 7
 _MOST_STEPS, _BRIDGE_STEPS = 40, 10  # after these stages; up to the first one while the log-density rises
-WIDER = (1.5, 3.0, 6.0)  # factors on the noise of the alternatives with which the e-value compares the model
 _MOST_STAGES = 200  # of an update
 
 
 class Particles:
     """Weighted particles of the record so far, from those of the record before, or from the prior (None).
 
-    `log_weights` are normalised, `values` and `log_integral` are logarithms of prior times likelihood and of its
-    integral over contours within reach; `correlation`, `shift`, `rise` are as in `Stream.update`; `log_ratios` are
-    predictive densities of the new samples with wider noise, over those with the model's.
+    `log_integral` is that of prior times likelihood over contours within reach; `log_ratios` are predictive densities
+    of the new samples with wider noise, over those with the model's; `correlation`, `shift`, `rise` are as in
+    `Stream.update`.
     """
 
     def __init__(self, model: ContourModel, old: StreamState | None, count: int, random: np.random.Generator) -> None:
@@ -130,9 +129,9 @@ class Particles:
         return np.stack(columns, axis=1)
 
     def _with_wider_noise(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the log-density of points, and the log-likelihood of the new samples with wider noise.
+        """Return the log-density of points, (n,), and that of new samples with wider noise, (n, factors).
 
-        Shapes are (n,) and (n, factors). It is NaN if there is a discrepancy, which may couple a sample to later ones.
+        It is NaN if there is a discrepancy, which may couple a sample to later ones.
         """
         model = self.model
         values, wider = model.log_prior(points), np.full((len(points), len(WIDER)), -np.inf)
@@ -246,10 +245,7 @@ class Particles:
 
 
 def _is_continued(before: ContourModel | None, model: ContourModel) -> bool:
-    """Return True if the first samples of a record have the paths that they had before it was continued.
-
-    They have others if new samples changed the side of a contact, or, where the base is carried, the line of the drive.
-    """
+    """Return True if a record's first samples have their paths as before: the same sides, and no carried base."""
     if before is None or model.likelihood.segments.is_carried:
         return False
     sides = before.likelihood.segments.signs_of_samples

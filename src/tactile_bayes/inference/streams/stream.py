@@ -12,12 +12,11 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_function, check_numbers, check_path, check_whole_number
-from tactile_bayes.errors import InferenceError, RecordError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws, unit_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import identity_of
@@ -27,15 +26,17 @@ from tactile_bayes.inference.ensembles.checkpoint import changes
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.result import STREAMED, provenance
-from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, WIDER, Particles
+from tactile_bayes.inference.streams.e_value import surprise_after
+from tactile_bayes.inference.streams.growing_record import continued
+from tactile_bayes.inference.streams.particles import DECORRELATED, SETTLED, Particles
 from tactile_bayes.inference.streams.stream_state import StreamState, read_tree, state_in, tree_of
 from tactile_bayes.numerics.random_numbers import Rng, child, seed_sequence, whole_seed
 from tactile_bayes.numerics.selection import resampled
-from tactile_bayes.record import carried_sweeps, validate
+from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["LEVELS", "Stream", "surprise_after"]
+__all__ = ["LEVELS", "Stream"]
 
 LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)  # levels of the quantiles of parameters and of the band
 _MOST_SURPRISE = 700.0  # largest logarithm of an e-value that is stated, which is finite
@@ -46,11 +47,10 @@ class Stream:
     """The posterior of a contour from the record so far, updated with every new block of samples.
 
     Weighted particles represent the posterior. They come from the prior; each block multiplies their weights by the
-    ratio of the likelihoods of the record with and without it. If their effective number falls below half of them, the
-    block enters by powers of that ratio, and after each the particles are resampled (systematically) and moved by the
-    steps of `infer_contour` (Del Moral, Doucet & Jasra 2006, doi 10.1111/j.1467-9868.2006.00553.x). The likelihood is
-    that of `infer_contour` for the record so far, so that after the last sample both have the same posterior, within
-    the Monte-Carlo error of the particles. Samples without contact count from the first one on.
+    ratio of the likelihoods of the record with and without it. If too few of them remain effective, the block enters by
+    powers of that ratio, and after each the particles are resampled and moved by the steps of `infer_contour` (Del
+    Moral, Doucet & Jasra 2006, doi 10.1111/j.1467-9868.2006.00553.x). The likelihood is that of `infer_contour` for the
+    record so far, and so is the posterior, within the Monte-Carlo error of the particles.
 
     Parameters
     ----------
@@ -76,8 +76,7 @@ class Stream:
     -----
     Each update computes the likelihood of the whole record so far again: exact for drifts, correlated noise and
     integrated biases, but an update costs more the longer the record. With 1,000 particles, updates by 28 samples, up
-    to 330 of a double sweep, took 0.1 to 0.6 s on one core with four parameters, and 0.1 to 1.0 s with 13, once the rod
-    had touched; the first two took 2 and 1 s, and 4 and 2 s. The result states its `seconds`.
+    to 330 of a double sweep, took 0.1 to 1.0 s on one core with 13 parameters; the first two took 4 and 2 s.
 
     `e_value` is the largest so far of a martingale: the density of the samples from some block on with noise that is
     wider by 1.5, 3 or 6, over that of the model, both given the samples before. For records of the model, drawn from
@@ -155,7 +154,7 @@ class Stream:
         """
         began = perf_counter()
         old = self._state
-        record = validate(samples) if old is None else _continued(old.record, samples)
+        record = validate(samples) if old is None else continued(old.record, samples)
         experiment = Experiment(record, self._rig, self._family)
         updates = 0 if old is None else old.updates + 1
         random = self._random(0, updates)
@@ -391,25 +390,12 @@ class Stream:
         return result
 
 
-def surprise_after(old: StreamState | None, log_ratios: Floats) -> tuple[Floats, float]:
-    """Return the products of ratios after a block, and the logarithm of the largest e-value so far.
-
-    The block from which the model is wrong has the prior weight 1/(k(k + 1)), for the k-th; what remains of it, for
-    blocks to come, has no ratio yet.
-    """
-    blocks = 1 if old is None else old.updates + 2
-    before = np.full(len(WIDER), -np.inf) if old is None else old.log_products
-    products = np.logaddexp(before, -np.log(blocks * (blocks + 1.0))) + log_ratios
-    now = float(np.logaddexp(logsumexp(products) - np.log(len(WIDER)), -np.log(blocks + 1.0)))
-    return products, now if old is None else float(np.fmax(now, old.surprise))
-
-
 def _share_within_reach(model: ContourModel, old: StreamState | None, random: np.random.Generator) -> float:
     """Return the share of the prior within reach, which only a new sweep or parameter changes."""
     before = None if old is None else old.experiment.model
     if old is None or before is None or model.likelihood.segments.is_carried or before.names != model.names:
         return model.share_within_reach(random, _PRIOR_DRAWS)
-    is_same = before.likelihood.segments.contacts == model.likelihood.segments.contacts
+    is_same = np.array_equal(before.likelihood.segments.contacts, model.likelihood.segments.contacts)
     return old.share if is_same else model.share_within_reach(random, _PRIOR_DRAWS)
 
 
@@ -417,41 +403,3 @@ def _weighted_quantiles(values: Floats, weights: Floats) -> Floats:
     """Return quantiles of every column, shape (levels, columns); NaN where a value is."""
     found = np.quantile(values, LEVELS, axis=0, weights=weights, method="inverted_cdf")
     return np.where(np.isfinite(values).all(axis=0), found, np.nan)
-
-
-def _continued(record: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
-    """Return a record with new samples behind its own."""
-    new = validate(samples)
-    for name in sorted({*record.attrs, *new.attrs}, key=str):
-        one, other = record.attrs.get(name, ""), new.attrs.get(name, "")
-        if not np.array_equal(one, other):
-            raise RecordError(
-                f"attribute {name!r} of the new samples is {other!r}, but was {one!r}: give all samples in the same "
-                "units, of the same rod and load cell"
-            )
-    if set(record.variables) != set(new.variables):
-        odd = ", ".join(map(repr, sorted(map(str, set(record.variables) ^ set(new.variables)))))
-        raise RecordError(f"the new samples and those before do not have the same columns, they differ in {odd}")
-    last, first = int(record.sweep[-1]), int(new.sweep[0])
-    had = set(record.sweep.values.tolist()) - {last}
-    if again := sorted(had & set(new.sweep.values.tolist())):
-        raise RecordError(
-            f"sweep {again[0]} was over when sweep {last} began: give samples in the order in which they were measured"
-        )
-    joined = validate(xr.concat([record, new], "sample", combine_attrs="override"))
-    if first == last and last not in carried_sweeps(joined):
-        _refuse_return(record, new, last)
-    return joined
-
-
-def _refuse_return(record: xr.Dataset, new: xr.Dataset, sweep: int) -> None:
-    """Refuse new samples that begin further back in a sweep than its encoder scatters."""
-    sense = 1.0 if str(new.direction.values[0]) == "forward" else -1.0
-    before, after = (sense * each.drive_angle.values[each.sweep.values == sweep] for each in (record, new))
-    scatter = max((float(-np.diff(part).min(initial=0.0)) for part in (before, after)), default=0.0)
-    scatter = max(scatter, float(record.attrs.get("load_cell_drive_angle_noise", 0.0)))
-    if after[0] < before[-1] - 6.0 * scatter - 1e-9:
-        raise RecordError(
-            f"the new samples of sweep {sweep} begin at a drive angle of {sense * after[0]:.6g} rad, behind the last "
-            f"one, {sense * before[-1]:.6g} rad: give each sample once, in the order in which they were measured"
-        )

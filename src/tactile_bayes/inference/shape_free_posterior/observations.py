@@ -1,0 +1,108 @@
+"""Linearised observations of a shape-free contour and its rig."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.contours import Smooth
+from tactile_bayes.inference.shape_free_posterior.columns import linear_names, white_scales
+from tactile_bayes.inference.shape_free_posterior.observer import HUBER_THRESHOLD, Observer
+from tactile_bayes.numerics.scatter import robust_deviation
+
+__all__ = ["LinearPrior", "Observations", "linearised"]
+
+# Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
+# of the further ones.
+_STEP, _LARGEST_STEP = 1e-5, 0.01
+_FURTHER_DIFFERENCES = 2  # number of times that differences are taken again
+_MIN_CHANGE = 0.03  # least singular value of residuals that counts, in deviations per prior scale
+
+
+class LinearPrior(NamedTuple):
+    """Means and precisions, shape (d,) each, of log r, the directions' weights, the vertex and the rig."""
+
+    mean: Floats
+    precision: Floats
+
+
+class Observations(NamedTuple):
+    """Linearised observations: as few combinations of readings and snap-offs as carry all information."""
+
+    slopes: Floats  # over the log-radii at the nodes and the other parameters, shape (observations, k)
+    values: Floats  # at zero parameters, with the noise of the scales, shape (observations,)
+    kinds: Index  # kinds of noise, the last of which is that of snap-offs, shape (observations,)
+    readings: Floats  # number of readings of each other kind
+    scatter: Floats  # robust standard deviation of these readings from those at the centre
+
+
+def linearised(observer: Observer, prior: LinearPrior, scales: Floats, centre: Floats) -> Observations:
+    """Return the observations linearised at a centre, (k,): the log-radii at the nodes, and the other parameters.
+
+    Differences along the parameters give rough slopes, and steps of about a deviation along their singular vectors
+    better ones.
+    """
+    model = observer.model
+    rig = linear_names(model)[prior.mean.size - len(model.unknowns.names) :]
+    nodes = centre.size - 2 - len(rig)
+    units = np.append(np.ones(nodes), prior.precision[-2 - len(rig) :] ** -0.5)
+    noises = scales[white_scales(model)]
+
+    def differences(axes: Floats, steps: Floats) -> tuple[list[_Lines], list[float]]:
+        """Return the lines along axes, for each kind of noise and for snap-offs, and the scatter of each kind."""
+        moves = steps[:, None] * axes * units
+        points = np.concatenate([centre + moves, centre - moves, centre[None]])
+        contours = Smooth(points[:, :nodes], q=points[:, nodes], x_c=points[:, nodes + 1])
+        residual, agree, late = observer(contours, dict(zip(rig, points[:, nodes + 2 :].T, strict=True)))
+        # A sample that is loaded on one side of a difference only has no slope.
+        smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
+        lines, scatter = [], []
+        for chosen, noise in zip(model.noise_columns, noises, strict=True):
+            of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
+            scatter.append(robust_deviation(of_kind[-1]))
+            of_kind *= np.minimum(1.0, HUBER_THRESHOLD * noise / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
+            lines.append(_Lines.of(of_kind, steps, axes))
+        return [*lines, _Lines.of(late, steps, axes)], scatter
+
+    axes = np.eye(centre.size)
+    lines, scatter = differences(axes, np.full(centre.size, _STEP))
+    for _ in range(_FURTHER_DIFFERENCES):
+        every = [line.slopes / noise for line, noise in zip(lines, (*noises, 1.0), strict=True)]
+        upper = np.linalg.qr(np.concatenate([*every, np.zeros(axes.shape)]), mode="r")
+        _, sizes, axes = np.linalg.svd(upper)
+        lines, scatter = differences(axes, 1.0 / np.maximum(sizes, 1.0 / _LARGEST_STEP))
+    observed = [line.condensed() for line in lines]
+    kinds = np.repeat(np.arange(len(observed)), [len(line.values) for line in observed])
+    slopes = np.concatenate([line.slopes for line in observed]) / units
+    values = slopes @ centre + np.concatenate([line.values for line in observed])
+    counts = [float(line.values.size) for line in lines[:-1]]
+    return Observations(slopes, values, kinds, np.array(counts), np.array(scatter))
+
+
+class _Lines(NamedTuple):
+    """Linearised residuals with unit noise, whose signs are those of measured less expected values."""
+
+    slopes: Floats  # slopes of the expected values, over changes of the parameters in prior scales, shape (n, k)
+    values: Floats  # at the centre, shape (n,)
+
+    @classmethod
+    def of(cls, residual: Floats, steps: Floats, axes: Floats) -> _Lines:
+        """Return the lines through residuals, (2 k + 1, n), at points a step along each axis to either side of the
+        centre, and at the centre. Those that are not finite at one of the points, like a snap-off that the rod does not
+        reach, are zero."""
+        size = steps.size
+        finite = np.isfinite(residual).all(axis=0)
+        change = np.where(finite, residual[:size] - residual[size:-1], 0.0) / (2.0 * steps[:, None])
+        return cls(change.T @ axes, -np.where(finite, residual[-1], 0.0))
+
+    def condensed(self) -> _Lines:
+        """Return combinations that carry all information, by singular value decomposition."""
+        axes, sizes, across = np.linalg.svd(self.slopes, full_matrices=False)
+        significant = sizes > _MIN_CHANGE
+        explained = axes[:, significant].T @ self.values
+        # The norm of the unexplained residual, with slopes of zero, informs the noise scale.
+        rest = np.sqrt(max(float(self.values @ self.values - explained @ explained), 0.0))
+        combined = sizes[significant, None] * across[significant]
+        return _Lines(np.vstack([combined, np.zeros(across.shape[1])]), np.append(explained, rest))

@@ -1,0 +1,133 @@
+"""Modes of the posterior of a contour, found from the record alone."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
+from tactile_bayes.inference.coordinates.flank import FlankCoordinates
+from tactile_bayes.inference.deadline import Deadline
+from tactile_bayes.inference.densities import ANYTHING, Ends, Proposal
+from tactile_bayes.inference.importance import approximate
+from tactile_bayes.inference.record_likelihood.likelihood import events_of
+from tactile_bayes.inference.starts.cloud import Cloud, gather
+from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, optima_of
+
+__all__ = ["Modes", "flank_at_contacts"]
+
+_MANY_SAMPLES = 100  # loaded ones, from which an optimum that explains the record is taken for the only one
+_MAX_SEARCHES = 9  # after which no other begins, unless none of them explains a record of few loaded samples
+# Searches that end in known modes, after which no other mode is expected: for a record of many loaded samples, and for
+# any record if the posterior is nearly normal around the last mode found.
+_REPEATS, _REPEATS_FEW_SAMPLES = 2, 4
+_EFFICIENT = 0.35  # efficiency of a proposal above which the posterior is nearly normal around it
+# Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred: a
+# ridge that bends beyond the draws of the importance sampling looks straight.
+_FLANK_EFFICIENCY = 0.4
+_MAX_EXCESS_COST = 100.0  # above the smallest cost, from which an optimum is disregarded
+_MODE_RADIUS = 3.0  # distance from a mode, over that of typical points of its proposal, within which an optimum is its
+_MAX_LOG_MASS_RATIO = 9.0  # from which the smaller mode is left out: one draw in ten thousand
+_EXTENT_DRAWS = 500  # from which the extent of a proposal is estimated
+
+
+class Mode(NamedTuple):
+    """Mode of the posterior."""
+
+    optimum: ContourOptimum
+    cloud: Cloud
+    proposal: Proposal
+    coordinates: Coordinates  # of the cloud and the proposal
+    usual: Mode | None = None  # the mode in the model's own coordinates, if those are others
+
+
+class Modes:
+    """Modes of the posterior that were found so far."""
+
+    def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
+        self.model, self.rng, self.deadline = model, rng, deadline
+        self.found: list[Mode] = []
+        self._own = model.coordinates
+
+    def found_by_search(self) -> list[Mode]:
+        """Return modes, that with the most mass first: one if it explains many loaded samples, else all of mass."""
+        found = self.found
+        for optimum in sorted(self._not_explaining(), key=lambda one: one.cost):
+            least = min((mode.optimum.cost for mode in found), default=optimum.cost)
+            late = found and self.deadline.has_passed
+            if optimum.cost < least + _MAX_EXCESS_COST and not late and not self._is_known(optimum):
+                found.append(self._around(optimum))
+        if not found:
+            raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
+        found.sort(key=lambda mode: -mode.proposal.log_mass)
+        least_mass = found[0].proposal.log_mass - _MAX_LOG_MASS_RATIO
+        return [mode for mode in found if mode is found[0] or mode.proposal.log_mass > least_mass]
+
+    def _not_explaining(self) -> list[ContourOptimum]:
+        """Search, find the modes of optima that explain the record, and return the other optima."""
+        others, repeats = [], 0
+        many_samples = bool(np.count_nonzero(~self.model.found["unloaded"].values) >= _MANY_SAMPLES)
+        for tried, optimum in enumerate(optima_of(self.model, self.rng, self.deadline), start=1):
+            if not optimum.fits:
+                others.append(optimum)
+            elif self._is_known(optimum):
+                repeats += 1
+            else:
+                self.found.append(self._around(optimum))
+            if self._are_all(repeats, tried, many_samples):
+                break
+        return others
+
+    def _are_all(self, repeats: int, tried: int, many_samples: bool) -> bool:
+        """Return True if no further search is worth while, after so many, of which so many ended in known modes."""
+        normal = bool(self.found) and self.found[-1].proposal.efficiency > _EFFICIENT
+        if many_samples and (normal or repeats == _REPEATS):
+            return True
+        if normal and repeats == _REPEATS_FEW_SAMPLES:
+            return True
+        return tried >= _MAX_SEARCHES and (bool(self.found) or many_samples)
+
+    def _is_known(self, optimum: ContourOptimum) -> bool:
+        """Return True if an optimum belongs to a mode that was found before."""
+        point = optimum.point[None]
+        far = _MODE_RADIUS * np.sqrt(point.size)
+        return any(np.linalg.norm(mode.proposal.steps(mode.coordinates.of(point))) < far for mode in self.found)
+
+    def _around(self, optimum: ContourOptimum) -> Mode:
+        """Approximate a mode in the coordinates in which it is nearer to normal; modes on a flank share them."""
+        model, point = self.model, optimum.point
+        usual = self._in(self._own, optimum, optimum.covariance, model.walked_ends)
+        if usual.proposal.efficiency > _EFFICIENT or self.deadline.has_passed:
+            return usual
+        flanks = dict.fromkeys([*(mode.coordinates for mode in self.found), flank_at_contacts(model, point)])
+        for flank in flanks:  # each once, since modes share them
+            if not isinstance(flank, FlankCoordinates):
+                continue
+            covariance = flank.covariance(point, optimum.covariance)
+            if not np.isfinite(covariance).all():  # the vertex is too near, or on the other side
+                continue
+            mode = self._in(flank, optimum, covariance)._replace(usual=usual)
+            is_better = bool(self.found) or mode.proposal.efficiency > _FLANK_EFFICIENCY * usual.proposal.efficiency
+            if is_better and not flank.reach_vertex(mode.proposal.draw(self.rng, _EXTENT_DRAWS)[0]):
+                return mode
+        return usual
+
+    def _in(self, coordinates: Coordinates, optimum: ContourOptimum, covariance: Floats, ends: Ends = ANYTHING) -> Mode:
+        target, centre = in_coordinates(self.model.log_probability, coordinates), coordinates.of(optimum.point[None])[0]
+        cloud = gather(target, centre, covariance, self.rng, self.deadline, ends)
+        proposal = approximate(target, cloud.centre, cloud.narrow_covariance, self.rng, self.deadline, ends)
+        return Mode(optimum, cloud, proposal, coordinates)
+
+
+def flank_at_contacts(model: ContourModel, point: Floats) -> FlankCoordinates | None:
+    """Return coordinates of a flank at the middle of the contacts predicted at a point, shape (parameters,)."""
+    if not FlankCoordinates.describe(model.family.name):
+        return None
+    at = point[None]
+    events = events_of(model.likelihood, model.contours(at), model.rig(at), exact=False)
+    x = float(np.mean([events["first_contact_x"], events["snap_off_contact_x"]]))
+    return FlankCoordinates.at(model.family.name, model.names, model.coordinates, point, x)
