@@ -75,7 +75,8 @@ def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
     diameter = _quantity("rod_diameter", attrs.get("rod_diameter", 0.0), source)
     shape = {name: attrs[f"rod_{name}"] for name in _SHAPE if f"rod_{name}" in attrs}
     for name, value in shape.items():
-        if not (isinstance(value, str) and value.lstrip().startswith("{")):
+        is_text = isinstance(value, str) and value.lstrip().startswith("{")
+        if not is_text and name != "rest_shape_modes":
             shape[name] = _quantity(f"rod_{name}", value, source)
     try:
         rod = Rod(length, rigidity, diameter, **shape)
