@@ -18,6 +18,7 @@ from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
 from tactile_bayes.mechanics.branches.sweeps import Segments, Shapes, Solutions, Sweeps, shapes_of, solve_sweeps
 from tactile_bayes.mechanics.elastica import Wrench
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
+from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.rods.profile import Profile
@@ -236,6 +237,7 @@ def _sweeps_of(sweep_frame: SweepFrame, friction_angle: ArrayLike, compliance: A
     values |= {"rest_curvature": sweep_frame.rest_curvature, "friction_angle": friction_angle, "compliance": compliance}
     values |= {"offset": 0.0, "rigidity": 1.0, "relative_length": 1.0}
     each: dict[str, Any] = {name: np.array(np.broadcast_to(of, (count,)), dtype=float) for name, of in values.items()}
+    each["rest_shape"] = np.array(np.broadcast_to(sweep_frame.rest_shape, (count, MOST_MODES)), dtype=float)
     return Sweeps(contour=every, segment=every, backward=np.ascontiguousarray(sweep_frame.mirrored), **each)
 
 

@@ -21,7 +21,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
 from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, parameter_named
 from tactile_bayes.rig.stated import Stated, stated_values, unit_of
-from tactile_bayes.rig.unknown import Unknown, of_pivots
+from tactile_bayes.rig.unknown import Unknown, of_modes, of_pivots
 
 if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
@@ -88,10 +88,15 @@ class Unknowns:
         off: dict[str, Any] = {"friction": 0.0}
         if "length" in values:
             off["length"] = values["length"] / self.rod.length
+        modes = dict(zip(GROUPS["rest_shape"], self.rod.rest_shape_modes, strict=False))
+        if shaped := [name for name in modes if name in values]:
+            off["rest_shape"] = np.zeros((len(values[shaped[0]]), len(GROUPS["rest_shape"])))
+            for name in shaped:
+                off["rest_shape"][:, GROUPS["rest_shape"].index(name)] = values[name]
         if "rest_curvature" in values:
             longer = off.get("length", 1.0)  # the rod of another length has the stated turn from base to tip
-            bent = longer * values["rest_curvature"] - self.rod.mean_rest_curvature
-            off["rest_curvature"] = bent / self.units["rest_curvature"]
+            mean = self.rod.mean_rest_curvature + sum(modes[name].mean * values[name] for name in shaped)
+            off["rest_curvature"] = (longer * values["rest_curvature"] - mean) / self.units["rest_curvature"]
         if "taper" in values:
             off["taper"] = values["taper"] - self.rod.taper
         if "stem" in values:
@@ -181,7 +186,7 @@ def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool =
         joint = joint.without([name for name in joint.priors if not _is_shown(name, present)])
     of_joint = {} if joint is None else dict(joint.priors)
     said = {name: v for name, v in rig.said.items() if name not in (*of_joint, *_OF_NOISE)}
-    said = of_pivots(said, pivots)
+    said = of_modes(of_pivots(said, pivots), rod)
     names = (*_unknown_names(said, measured, rig, cell, present, gauge, of_joint), *of_joint)
     if "stem" in names:
         _refuse_shifted_stem(measured, names, gauge)

@@ -25,7 +25,7 @@ from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps, shapes_of, solve_sweeps
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import Reachability
-from tactile_bayes.mechanics.rods.profile import Profile
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 from tactile_bayes.record import CHANNELS, frame_of, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
@@ -117,12 +117,13 @@ class RecordLikelihood:
 
     def _in_sweep_frame(self, contours: Contour, sweeps: Sweeps) -> SweepFrame:
         every, standoff = contours.take(sweeps.contour), 0.5 * self.rod.diameter
-        of_rod = sweeps.rest_curvature, sweeps.taper, sweeps.stem
+        of_rod = sweeps.rest_curvature, sweeps.taper, sweeps.stem, 0.0, sweeps.rest_shape
         return SweepFrame(every, sweeps.base_x, sweeps.base_y, sweeps.length, standoff, sweeps.backward, *of_rod)
 
     def _profile(self, rig: RigValues) -> Profile | None:
         """Return the profile of the rod, without what the rig adds to it; None for arcs."""
-        return self._as_profile if self.rod.profile is not None or np.any(rig.taper) else None
+        varies = self.rod.profile is not None or np.any(rig.taper) or np.any(rig.rest_shape)
+        return self._as_profile if varies else None
 
     @cached_property
     def _as_profile(self) -> Profile:
@@ -236,6 +237,7 @@ class RecordLikelihood:
             friction_angle=np.tile(np.arctan(rig.friction), segments),
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale / rig.length, segments),
             rest_curvature=np.tile(curvature + rig.rest_curvature, segments),
+            rest_shape=np.tile(rig.rest_shape, (segments, 1)),
             taper=np.tile(rod.taper + rig.taper, segments),
             stem=np.tile((rod.stem / rod.length + rig.stem) / rig.length, segments),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
@@ -249,7 +251,8 @@ class RecordLikelihood:
         shifts = np.zeros((count, self.segments.pivots.max() + 1, 2))
         if rig.base_shifts is not None:
             shifts[:, : rig.base_shifts.shape[1]] = rig.base_shifts
-        return RigValues._make((*(np.broadcast_to(value, (count,)) for value in rig[:-1]), shifts))
+        shape = np.broadcast_to(0.0 if rig.rest_shape is None else rig.rest_shape, (count, MOST_MODES))
+        return RigValues._make((*(np.broadcast_to(value, (count,)) for value in rig[:-2]), shape, shifts))
 
     def log_likelihood(
         self, contours: Contour, noise_scale: Any = 1.0, rig: RigValues | None = None, *, pointwise: bool = False

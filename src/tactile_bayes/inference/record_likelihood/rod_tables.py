@@ -22,6 +22,7 @@ __all__ = ["RodTables"]
 # default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and
 # for uneven curvature that of the rest curvature.
 _TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
+_SHAPES = 4.0, 2.5  # amplitudes of the modes of a traced rod: one of 900, and one of 10 draws from the prior is beyond
 _LENGTHS = 0.9, 1.1  # over the stated one, in tables of a cone: ten deviations of the default prior
 # Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where the base is
 # carried.
@@ -56,9 +57,10 @@ class RodTables:
             senses = (True, False) if self._is_carried and (varied[2] or self._friction) else (False,)
             angle = float(np.arctan(self._friction))
             low, high = _FRICTION_ANGLES[is_strong] if varied[2] else (angle, angle)
-            for grade, both, bend, taper in product(range(GRADES), senses, *widths[::-1]):
+            shapes = _SHAPES if self._rod.rest_shape_modes else (0.0,)
+            for grade, both, shape, bend, taper in product(range(GRADES), senses, shapes, *widths[::-1]):
                 box = self._box(taper, bend, (-high if both else low, high), _LENGTHS if varied[3] else (1.0, 1.0))
-                self.made[key] = forward_table(profile, box, grade)
+                self.made[key] = forward_table(profile, box._replace(shape=shape), grade)
                 if self.made[key] is not NO_TABLE:
                     break
         return self.made[key]

@@ -28,8 +28,9 @@ from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_of, varied_of
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLES, Tables, prepare
+from tactile_bayes.mechanics.poses.taylor import write_shape
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
-from tactile_bayes.mechanics.rods.profile import Profile
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 from tactile_bayes.tasks import in_parts
 
 if TYPE_CHECKING:
@@ -114,6 +115,8 @@ class Sweeps(NamedTuple):
     compliance: Floats
     rest_curvature: Floats
     """Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]; with a profile, what is added to its own."""
+    rest_shape: Floats
+    """Amplitudes of the modes of a profile, shape (sweeps, MOST_MODES)."""
     taper: Floats
     """Taper, for rods with a profile."""
     stem: Floats
@@ -183,7 +186,8 @@ def _as_sweeps(sweeps: Sweeps) -> NDArray[np.void]:
 def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
     """Structured type, so that compiled code takes one array instead of one for each name."""
     kinds = {**dict.fromkeys(_INDICES, np.intp), **dict.fromkeys(_FLAGS, np.bool_), **dict.fromkeys(_CODES, np.int8)}
-    return np.dtype([(name, kinds.get(name, np.float64)) for name in names], align=True)
+    shapes = {"rest_shape": (MOST_MODES,)}
+    return np.dtype([(name, kinds.get(name, np.float64), shapes.get(name, ())) for name in names], align=True)
 
 
 _SWEEP, _EVENTS = _side_by_side(Sweeps._fields), _side_by_side(Solutions._fields[3:])
@@ -259,8 +263,9 @@ def _beam(
     """Rod of a sweep, with coefficients for its friction, and for friction of the other sense if that may act."""
     if varied is None:
         return beam_of(sign * sweep.rest_curvature, varied, sweep.stem)
-    edges, curvature, rigidity, _, bend, _ = varied.profile
-    room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
+    edges, curvature, rigidity, _, bend, _, modes, shape = varied.profile
+    write_shape(modes, sweep.rest_shape, shape, curvature)
+    room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign, modes, shape)
     angle, own, other = sweep.friction_angle, varied.sheet, varied.other_sheet
     slenderness, otherwise = 0.0, 0.0
     for table in known:
@@ -378,7 +383,7 @@ def solve_sweeps(
     def solve(part: slice) -> None:
         _solve(
             shapes,
-            varied_of(profile),
+            varied_of(None if profile is None else profile.shaped(np.zeros(MOST_MODES))),  # with arrays of its own
             known,
             sweep[part],
             segments,

@@ -34,7 +34,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
-from tactile_bayes.mechanics.rods.profile import Profile
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 
 __all__ = [
     "BACKWARD",
@@ -59,6 +59,7 @@ __all__ = [
     "rest_curvature_at",
     "rise",
     "workspace",
+    "write_shape",
 ]
 
 _TERMS = 24
@@ -160,6 +161,18 @@ def cell_at(profile: Profile, arclength: float, direction: float) -> int:
     while cell > 0 and (profile.edges[cell] > arclength or (direction < 0.0 and profile.edges[cell] == arclength)):
         cell -= 1
     return cell
+
+
+@compiled
+def write_shape(modes: Floats, amplitudes: Floats, shape: Floats, curvature: Floats) -> None:
+    """Write amplitudes of modes, and the rest curvature with them."""
+    for k in range(MOST_MODES):
+        shape[k] = amplitudes[k]
+    for i in range(curvature.shape[0]):
+        for j in range(curvature.shape[1]):
+            curvature[i, j] = modes[0, i, j]
+            for k in range(1, modes.shape[0]):
+                curvature[i, j] += shape[k - 1] * modes[k, i, j]
 
 
 @compiled
