@@ -31,6 +31,8 @@ class Event:
         line of force passes through the pivot) or "jump" (friction lets the contact neither slide nor stick). A rod
         that is curved or carried may also leave the contour without a jump ("release"), and one that is carried still
         touch it at the end of the drive ("never").
+    phase : str
+        Contact from then on, "tip" or "tangential"; at snap-off, up to then.
     travel : float
         Position along the drive: the drive angle of a rotation [rad], or the distance moved by the base [length].
     drive_angle, slope_angle : float
@@ -44,6 +46,7 @@ class Event:
     """
 
     kind: str
+    phase: str
     travel: float
     drive_angle: float
     base_x: float
@@ -134,7 +137,11 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
         *(_change(before, after) for before, after in pairwise(modes)),
         SnapOff(int(paths.snap_off[0])).name.lower(),
     ]
-    names = [name for name in Event.__dataclass_fields__ if name != "kind"]
-    found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
+    phases = [_PHASES[modes[min(k, len(modes) - 1)].tip] for k in order]
+    names = [name for name in Event.__dataclass_fields__ if name not in ("kind", "phase")]
+    found = [
+        Event(kind, phase, **{name: float(columns[name][i]) for name in names})
+        for i, (kind, phase) in enumerate(zip(kinds, phases, strict=True))
+    ]
     strain = float(paths.largest_curvature[0]) * 0.5 * rod.diameter / rod.length
     return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, again, strain)
