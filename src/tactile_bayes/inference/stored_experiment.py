@@ -64,7 +64,7 @@ def likelihood_of(posterior: xr.DataTree, record: xr.Dataset) -> tuple[RecordLik
     # `infer_contour` gives a cell whose noise it infers a noise of 1.
     noises: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in posterior["posterior"]}
     cell = replace(LoadCell.from_record(record) or LoadCell(), **noises)
-    return RecordLikelihood(record, cell, unknowns.friction), unknowns
+    return RecordLikelihood(record, cell, unknowns.friction, rubs="friction" in unknowns.names), unknowns
 
 
 def found_rig(measured: xr.Dataset, posterior: xr.DataTree, load_cell: LoadCell | None = None) -> Corrected:
