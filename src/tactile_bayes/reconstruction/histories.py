@@ -42,7 +42,7 @@ def drive_histories(measured: xr.Dataset, backward: Flags, load_cell: LoadCell, 
     for number in dict.fromkeys(sweep[found == 0].tolist()):
         own = np.flatnonzero(sweep == number)
         if before is not None and _goes_on(measured, before, own, backward, goes_back):
-            found[before] = found[own] = max(found[before[0]], sweep[before[0]] + 1)
+            found[before] = found[own] = found[before[0]] or sweep[before[0]] + 1
         elif _turns_back(measured.drive_angle.values[own], load_cell):
             found[own] = number + 1
         before = own

@@ -117,8 +117,7 @@ class RecordSegments:
         self.angles_in_sweep_frame[own] = np.tile(travels, own.size // len(once))
         on = np.maximum(np.searchsorted(lines[:, 6], self.angles_in_sweep_frame[own], side="right") - 1, 0)
         self.pace[own] *= lines[on, 5]
-        corners = np.append(lines[:, 2], lines[-1, 2] + (lines[-1, 7] - lines[-1, 6]) * lines[-1, 5])
-        self._ways[k] = np.append(lines[:, 6], lines[-1, 7]), np.pi - corners if backward else corners
+        self._ways[k] = np.array([travels[0], lines[-1, 7]]), np.array([0.0, lines[-1, 7] - travels[0]])
         return lines
 
     def event_samples(self, loaded: Flags) -> Index:
@@ -153,11 +152,20 @@ class RecordSegments:
         return Course.along(direction[self.of_sample] * self.angles_in_sweep_frame, self.samples)
 
     def ways(self, travels: Floats) -> Floats:
-        """Convert travels in the sweep frame, (n, segments), to ways of the base [length], or angles as read [rad]."""
+        """Convert travels in the sweep frame, (n, segments), to ways of the base [length], or angles as read [rad].
+
+        Of a drive that turns back about a pivot it is the way since its first sample [rad].
+        """
         ways = np.where(self.backward, np.pi - travels, travels)
         for k, known in self._ways.items():
             ways[:, k] = np.interp(travels[:, k], *known)
         return ways
+
+    @property
+    def ways_of_samples(self) -> Floats:
+        """`ways` at the samples, shape (samples,)."""
+        every = np.repeat(self.angles_in_sweep_frame[:, None], len(self), axis=1)
+        return np.asarray(self.ways(every)[np.arange(len(every)), self.of_sample])
 
     def samples_with(self, errors: Floats) -> Segments:
         """Return the samples of every segment, once for each error of the encoder, sorted by drive angle."""
