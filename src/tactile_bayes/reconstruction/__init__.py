@@ -4,6 +4,7 @@ from tactile_bayes.reconstruction.axial_score import AXIAL_ALARM
 from tactile_bayes.reconstruction.estimate import STATUSES
 from tactile_bayes.reconstruction.histories import drive_histories, least_turn, turned_sweeps
 from tactile_bayes.reconstruction.samples import FALSE_ALARM, Samples, loaded_samples, samples_of
+from tactile_bayes.reconstruction.senses import with_likelier_senses
 from tactile_bayes.reconstruction.sides import (
     CONTACT_SIDES,
     OTHER_SIDE,
@@ -13,7 +14,7 @@ from tactile_bayes.reconstruction.sides import (
     sides_and_doubts,
     with_sides,
 )
-from tactile_bayes.reconstruction.step2 import contacts_of, reconstruct, with_likelier_senses
+from tactile_bayes.reconstruction.step2 import contacts_of, reconstruct
 
 __all__ = [
     "AXIAL_ALARM",
