@@ -75,7 +75,12 @@ def reconstruct(
         contact_xy_correlation, slope_angle_sd, contact_arclength_sd, and tangent_sd and normal_sd, along the contour
         and across it. They include errors that samples share, like an unknown bias, as if they were independent.
         other_contact_x, other_contact_y and other_contact_arclength are those of a second contact, where status is
-        "ambiguous" or "either phase", else NaN.
+        "ambiguous" or "either phase", else NaN. least_slope_angle and greatest_slope_angle are the ends between which
+        friction leaves the slope, for the force as it is read: the rod may slide either way or stick where it is
+        carried, its drive turns back in contact, or it is curved toward the object. There the ends are two friction
+        angles apart, and the slope angle is the one for sliding, the other way where that fits clearly better, judged
+        for each way of the drive. Elsewhere both are the slope angle. Points of a straight rod without a diameter do
+        not depend on it by the raw method; the constrained one takes the rod to slide.
 
         With method="constrained" also misfit, the residual sum of squared deviations in standard deviations, and
         edge_distance, the distance of the contact from the change between tip and tangential contact in standard
