@@ -192,7 +192,8 @@ def density_of(
     senses = np.unique(samples.sense[loaded])
     if senses.size > 1:
         raise ParameterError(
-            "the rod slides along the object both ways, on different ways of the drive: give them one by one"
+            "the rod slides along the object both ways, on different ways of the drive: give them one by one, each "
+            "as a sweep of its own"
         )
     sense = float(senses[0]) if senses.size else 1.0
     delta = rod.surface.friction_angle(sense * float(np.arctan(friction)))
