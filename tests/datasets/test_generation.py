@@ -551,3 +551,18 @@ def test_another_seed_gives_other_numbers():
 def test_a_record_without_contour_is_refused():
     with refused(ParameterError, "contour", "truth=True"):
         contour_of(record(PLAIN, 0, truth=False))
+
+
+def test_records_of_rods_that_stick_on_their_way():
+    """Upright rods that are carried, with friction: phases are those of tip and tangential contact."""
+    sweep = {"base": [0.7, 0.0], "heading": 3.14159265, "drive_angle": 1.5708, "travel": 1.4}
+    spec = {
+        "records": 4,
+        "seed": 1,
+        "contours": [{"family": "circle", "r": {"uniform": [0.3, 0.5]}, "q": {"uniform": [0.75, 0.8]}}],
+        "unknown": {"friction": 0.3},
+        "scan": {"samples": 60, "translations": [sweep, sweep | {"base": [-0.7, 0.0], "heading": 0.0}]},
+    }
+    for number in range(4):
+        record = tb.datasets.record(spec, number)
+        assert np.abs(record.force_y.values).max() > 0.1

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -325,7 +326,7 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
 def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
     """Columns of every sweep, shape (n,)."""
     paths = tried.paths
-    phases = np.array(phases_of(paths), dtype=object)
+    phases = np.array([_touching(phases) for phases in phases_of(paths)], dtype=object)
     if spec.translations:
         found = {"direction": paths.sweep_frame.mirrored.astype(np.int8), "phases": phases}
     else:
@@ -341,6 +342,11 @@ def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
             paths.largest_curvature * paths.sweep_frame.standoff / paths.sweep_frame.length
         )
     return found
+
+
+def _touching(phases: str) -> str:
+    """Return phases as `phases_of` writes them, of tip and tangential contact alone, whether they slide or stick."""
+    return "-".join(phase for phase, _ in groupby(phases.upper().split("-")))
 
 
 def _of_samples(tried: _Tried, index: Index) -> dict[str, NDArray[Any]]:

@@ -18,6 +18,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.load_cell.curve import curved
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
 from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, parameter_named
 from tactile_bayes.rig.stated import Stated, stated_values, unit_of
@@ -241,10 +242,26 @@ def _hidden(measured: xr.Dataset, rig: Rig, cell: LoadCell, present: Sequence[st
                 raise ParameterError(
                     f"{name} is in the load cell's bias_uncertainty already, and integrated out: leave one of the two"
                 )
+    hidden |= _hidden_backlash(measured, rig, cell)
+    return hidden
+
+
+def _hidden_backlash(measured: xr.Dataset, rig: Rig, cell: LoadCell) -> set[str]:
+    """Return the backlash where no drive, or only one way, shows it, or friction makes loads depend on a history."""
     turned = measured.direction.values[~np.isin(measured.sweep.values, carried_sweeps(measured))]
     if turned.size == 0 or (len(np.unique(turned)) == 1 and not rig.is_named("backlash")):
-        hidden.add("backlash")
-    return hidden
+        return {"backlash"}
+    if rig.said.get("friction", 0.0) == 0.0:
+        return set()
+    turned_back = turned_sweeps(measured, cell)
+    if not turned_back:
+        return set()
+    if rig.is_named("backlash"):
+        raise ParameterError(
+            f"backlash cannot be inferred beside friction where a drive turns back in contact, as in sweep "
+            f"{min(turned_back)}: state the backlash of the encoder (drive_angle_backlash of the load cell)"
+        )
+    return {"backlash"}
 
 
 def deviating(known: Mapping[str, float], unknown: Collection[str], rod: Rod, cell: LoadCell) -> dict[str, float]:

@@ -48,7 +48,8 @@ class RecordLikelihood:
 
     Contours are in the record's unit of length, loads inside in EI/L and EI/L², forces in the record's frame. With
     `exact`, paths are so to rounding; otherwise as the noise requires, at a fifth of the cost. Unless
-    `is_always_clear`, contours that the unloaded rod is not clear of after snap-off are excluded.
+    `is_always_clear`, contours that the unloaded rod is not clear of after snap-off are excluded. Friction acts if it
+    is stated, or if the rod `rubs` on the object with that of a rig.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class RecordLikelihood:
         friction: float = 0.0,
         exact: bool = False,
         is_always_clear: bool = True,
+        rubs: bool = False,
     ) -> None:
         self.exact = exact
         self.is_always_clear = is_always_clear
@@ -76,9 +78,9 @@ class RecordLikelihood:
             )
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
         self.noise = self.load_cell.noise
-        self.segments = RecordSegments(measured, load_cell)
+        self.segments = RecordSegments(measured, load_cell, rubs or friction > 0.0)
         self._turn = self.segments.drive_angles if frame_of(record) == "turning" else None
-        self._tables = RodTables(self.rod, friction, self.segments.is_carried)
+        self._tables = RodTables(self.rod, friction, self.segments.has_history)
 
     @property
     def noise(self) -> Floats:
@@ -146,10 +148,9 @@ class RecordLikelihood:
         """Return travels of samples as `paths` takes them, shape (n or 1, samples): drive angles [rad], or ways [L]."""
         sign = self.segments.signs_of_samples
         in_sweep_frame = np.where(sign < 0.0, np.pi - drive_angles, drive_angles)[None]
-        if not self.segments.is_carried:
+        if not self.segments.has_history:
             return np.asarray(in_sweep_frame - sign * self.misread(rig))
-        carried = self.segments.senses[self.segments.of_sample] == 0.0
-        known = carried & np.isfinite(drive_angles)
+        known = (self.segments.senses[self.segments.of_sample] == 0.0) & np.isfinite(drive_angles)
         return np.where(known, self.segments.angles_in_sweep_frame, in_sweep_frame)
 
     def misread(self, rig: RigValues) -> Floats:
@@ -214,7 +215,7 @@ class RecordLikelihood:
     def _events(self, found: Solutions, rig: RigValues) -> Floats:
         """Return readings of the drive angle at first contact and snap-off, in the sweep frame, (n, segments, 2)."""
         events = np.stack([found.first_angle, found.snap_angle], axis=-1).reshape(len(self.segments), -1, 2)
-        misread = 0.0 if self.segments.is_carried else (self.segments.signs * self._misread(rig))[..., None]
+        misread = 0.0 if self.segments.has_history else (self.segments.signs * self._misread(rig))[..., None]
         return np.asarray(events.swapaxes(0, 1) + misread)
 
     def _shapes(self, contours: Contour, sweeps: Sweeps) -> Shapes:

@@ -62,6 +62,9 @@ _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
 _FAST = _EXACT._replace(resolved=1e-3, sharp=1e-6, first_step=1e-6, last_step=1e-4, exact=False)
 """Accuracy that noise requires, beside its tolerance."""
 
+_LAST_STEP_STUCK = 4e-16
+"""Last step where a rod may stick: what hardly slips is lost by coarser ones."""
+
 _EXACT_ORDER, _FAST_ORDER = 32, 12
 """Numbers of terms of the series of a leg."""
 
@@ -372,6 +375,8 @@ def solve_sweeps(
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     else:
         accuracy, order = _FAST._replace(tolerance=tolerance), _FAST_ORDER
+        if segments.lines is not None and np.any(sweeps.friction_angle):
+            accuracy = accuracy._replace(last_step=_LAST_STEP_STUCK)
     count, rows = shape
     sweep = _as_sweeps(sweeps)
     loads, all_states = np.zeros((count, rows, 3)), np.zeros((count, rows if states else 0), dtype=STATE)
