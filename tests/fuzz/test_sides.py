@@ -12,7 +12,7 @@ from helpers.rest_lines import depth, rest_line
 from tactile_bayes.errors import ClearanceWarning, TactileBayesError
 from tactile_bayes.rig import Rig
 
-SCANS, LOOKS, POSES = 12, 9, 24
+SCANS, LOOKS, POSES = 8, 9, 24
 """Number of drives that a seed checks, and of poses by which they are chosen and checked."""
 
 ROUNDING = 2e-3
