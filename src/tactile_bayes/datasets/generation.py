@@ -89,7 +89,7 @@ _WIDER = "give wider contours, or bring the pivots nearer to them, or to their m
 _CORRECTIONS = {
     "out of reach": "bring contours and pivots closer to one another (are contours, bases and rod in one unit?)",
     "cuts the pivot": _HIGHER,
-    "first touched beyond its end": _WIDER,
+    "touched beyond its end": _WIDER,
     "too close to the pivot": _HIGHER,
     "still touched at its other end": _WIDER,
     "touched twice": "give rods that are less curved, or contours that are more so where rods touch them",

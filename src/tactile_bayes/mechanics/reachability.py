@@ -20,7 +20,7 @@ class Reachability(IntEnum):
     CUTS_PIVOT = 2
     """The pivot is not below the contour."""
     ENDS = 3
-    """The rod would first touch beyond the end of the contour from which it comes."""
+    """The rod would touch beyond the end of the contour from which it comes."""
     TOO_CLOSE = 4
     """The pivot is nearer to the contour than `CLEARANCE`."""
     RUNS_OUT = 5
@@ -32,7 +32,7 @@ class Reachability(IntEnum):
     SLIPS_OFF = 8
     """At first contact the tip is turned beyond the normal of the contour, so that any force pushes it off."""
     BEGINS_INSIDE = 9
-    """A rod that is carried touches the contour already at the beginning of its drive."""
+    """A rod that is carried is in the object at the beginning of its drive, or comes into it without a contact."""
     HEAD_ON = 10
     """Friction lets the contact neither slide nor stick at first, or both: a straight rod is pushed along itself."""
     FOLDS_OVER = 11
@@ -48,7 +48,7 @@ _MESSAGES = {
     Reachability.TOUCHES: "ok",
     Reachability.TOO_FAR: "out of reach",
     Reachability.CUTS_PIVOT: "cuts the pivot",
-    Reachability.ENDS: "first touched beyond its end",
+    Reachability.ENDS: "touched beyond its end",
     Reachability.TOO_CLOSE: "too close to the pivot",
     Reachability.RUNS_OUT: "still touched at its other end",
     Reachability.GRAZES: "hardly touched",

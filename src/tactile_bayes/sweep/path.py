@@ -207,7 +207,7 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
             )
         case Reachability.ENDS:
             raise ContourError(
-                f"{sweep} the rod would first touch beyond {_end(contour, direction == 'forward')}, "
+                f"{sweep} the rod would touch beyond {_end(contour, direction == 'forward')}, "
                 "and nothing is known of the object there: extend the contour, or move the pivot"
             )
         case Reachability.RUNS_OUT:

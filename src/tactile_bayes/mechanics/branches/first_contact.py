@@ -148,7 +148,8 @@ def _missing(outline: Outline, beam: Beam, what: _Sought, p: float) -> tuple[flo
     at = place(outline, p)
     if what == _Sought.LEVER:
         along, facing = frame(at)
-        return along, at.speed + facing * at.bend
+        # What faces away from the base lies beyond the point upright over it.
+        return (along, at.speed + facing * at.bend) if facing > 0.0 else (at.x, at.speed * at.cos)
     if what == _Sought.WITHIN:
         at = narrower(outline, at, 1.0)
         along = frame(at)[0]
@@ -389,9 +390,25 @@ def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> tuple[Appr
     """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
     if lines is None:
         return _approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline
-    near, k, travel = _arrival(scene.outline, scene.beam, lines)
+    (reach, distance, begin, tip_first, _, gap), k, travel = _arrival(scene.outline, scene.beam, lines)
+    near = Approach(reach, distance, begin, tip_first, _ends_along(scene.outline, lines), gap)
     pose = pose_at(line_of(lines, k), travel)
     return near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y)
+
+
+@compiled
+def _ends_along(outline: Outline, lines: Floats) -> tuple[float, float]:
+    """Least and greatest parameter of the contour that a rod may reach along lines of a drive."""
+    low, high = math.inf, -math.inf
+    for k in range(lines.shape[0]):
+        if math.isnan(lines[k, 0]):
+            break
+        line = line_of(lines, k)
+        for travel in (line.travel, line.end):
+            pose = pose_at(line, travel)
+            of_pose = ends(from_base(outline, pose.x, pose.y))
+            low, high = min(low, of_pose[0]), max(high, of_pose[1])
+    return low, high
 
 
 @compiled

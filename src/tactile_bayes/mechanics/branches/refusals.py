@@ -1,6 +1,7 @@
-"""What rules out a path: a second contact, and a tip that folds over.
+"""What rules out a path: a second contact, a tip that folds over, and the end of the contour.
 
 A rod that is curved toward the object may touch it at two points, and one whose tip folds over with its other side.
+One that is carried outward may come to the end of what is known of the object.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from tactile_bayes.mechanics.branches.advance import Here, Setting
 from tactile_bayes.mechanics.branches.leg import PLACE, REST, LegSeries, guess
 from tactile_bayes.mechanics.branches.meeting import Meeting
 from tactile_bayes.mechanics.branches.outline import Place, beside, is_inside
-from tactile_bayes.mechanics.branches.phase import Contact, contact_at, tip_touches
+from tactile_bayes.mechanics.branches.phase import STUCK, Contact, contact_at, tip_touches
 from tactile_bayes.mechanics.branches.scene import Equilibrium, Scene
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.poses.beam import PARTS, free_end, from_tip, loaded_part, rest_curvature
@@ -22,8 +23,11 @@ __all__ = ["ruled_out"]
 _SHORT_END = 1e-3
 """Length of a free end [L] up to which its curvature at the contact tells whether it is in the object."""
 
+_ROUNDING = 1e-9
+"""How far beyond the end of the contour rounding may put a contact at it."""
+
 _ACROSS = 0.5 * math.pi
-_TOUCHES, _TOO_CLOSE = int(Reachability.TOUCHES), int(Reachability.TOO_CLOSE)
+_TOUCHES, _TOO_CLOSE, _ENDS = int(Reachability.TOUCHES), int(Reachability.TOO_CLOSE), int(Reachability.ENDS)
 _TOUCHES_TWICE, _FOLDS_OVER = int(Reachability.TOUCHES_TWICE), int(Reachability.FOLDS_OVER)
 _CLEARANCE = CLEARANCE
 
@@ -34,12 +38,25 @@ def ruled_out(here: Here, setting: Setting, met: Meeting, work: LegSeries) -> tu
     scene, at, stop = here.scene, contact_at(here.scene, met.at.at), met.stop
     if stop > 0.0 and not tip_touches(scene.phase) and setting.lines is not None and at.arclength < _CLEARANCE:
         return _TOO_CLOSE, at.p
+    if _is_past_end(scene, setting.ends[1], stop, work):
+        return _ENDS, setting.ends[1]
     # A leg that continues the one before it begins where that was checked.
     twice = _second_contact(scene, setting.ends, math.isfinite(here.before.at.p), stop, work)
     if not math.isnan(twice):
         return _TOUCHES_TWICE, twice
     folded = _folded_over(scene, stop, work)
     return (_TOUCHES, math.nan) if math.isnan(folded) else (_FOLDS_OVER, folded)
+
+
+@inlined
+def _is_past_end(scene: Scene, end: float, stop: float, work: LegSeries) -> bool:
+    """True if a contact up to a position on a leg is beyond the end of the contour from which the rod comes."""
+    if scene.phase == STUCK:
+        return False
+    for k in range(work.nodes.size):
+        if work.nodes[k] <= stop and work.at_nodes[PLACE, k] > end + _ROUNDING:
+            return True
+    return stop > 0.0 and guess(work, stop).p > end + _ROUNDING
 
 
 @inlined

@@ -16,6 +16,7 @@ from tactile_bayes.mechanics.branches.branch import (
     BranchWorkspace,
     branch_workspace,
     follow_branch,
+    refuse,
 )
 from tactile_bayes.mechanics.branches.clearance import travel_into
 from tactile_bayes.mechanics.branches.first_contact import clear_angle
@@ -41,7 +42,9 @@ __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "shapes_of", "solve_swee
 _SAME_ANGLE = 1e-5
 """Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
 
-_TOUCHES, _BEGINS_INSIDE = int(Reachability.TOUCHES), int(Reachability.BEGINS_INSIDE)
+_TOUCHES, _TOO_FAR, _BEGINS_INSIDE = (
+    int(reach) for reach in (Reachability.TOUCHES, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
+)
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
 _EXACT = Accuracy(
@@ -302,7 +305,7 @@ def _clear_angle(scene: Scene, lines: Floats | None, event: Any, accuracy: Accur
 
 @compiled
 def _is_inside_before(scene: Scene, lines: Floats | None, first: float) -> bool:
-    """True if a drive has carried the unloaded rod into the object before it touches there from this side."""
+    """True if a drive carries the unloaded rod into the object before it touches there from this side, if it does."""
     if lines is None:
         return False
     inside = travel_into(scene.outline, scene.beam, lines, line_of(lines, 0).travel, True)
@@ -346,8 +349,10 @@ def _solve(
         event.clear_angle = math.nan
         if asks_clearance and event.reach == _TOUCHES:
             event.clear_angle = _clear_angle(scene, room, event, accuracy)
-            if accuracy.exact and _is_inside_before(scene, room, event.first_angle):
-                event.reach = _BEGINS_INSIDE
+        if asks_clearance and accuracy.exact and event.reach in (_TOUCHES, _TOO_FAR):
+            first = event.first_angle if event.reach == _TOUCHES else math.inf
+            if _is_inside_before(scene, room, first):
+                refuse(_BEGINS_INSIDE, math.nan, event)
 
 
 def solve_sweeps(
