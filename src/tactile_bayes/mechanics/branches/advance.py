@@ -6,19 +6,16 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.branches.crossings import DIP, change_of_phase, first_knot, release
 from tactile_bayes.mechanics.branches.equilibrium import Balance, settle_at, settle_at_limit
 from tactile_bayes.mechanics.branches.leg import (
     ANGLE,
-    DIP,
     NUDGE,
     REST,
     Leg,
     LegSeries,
-    change_of_phase,
-    first_knot,
     guess,
     leg_from,
-    release,
     sample_leg,
     share_of,
     shortened,

@@ -8,8 +8,9 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.branches.crossings import NOT_SLIPPING
 from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, balance, nowhere, settle, unloaded
-from tactile_bayes.mechanics.branches.leg import HARDLY, NOT_SLIPPING
+from tactile_bayes.mechanics.branches.leg import HARDLY
 from tactile_bayes.mechanics.branches.line import Line, line_of, pose_at
 from tactile_bayes.mechanics.branches.outline import (
     Outline,

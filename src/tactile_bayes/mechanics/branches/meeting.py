@@ -8,6 +8,16 @@ from typing import Any, NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.advance import LONGEST, Here, Setting, Step
+from tactile_bayes.mechanics.branches.crossings import (
+    LOST,
+    NOT_SLIPPING,
+    change_of_mode,
+    change_of_phase,
+    end_of_line,
+    first_fall,
+    polished_fold,
+    regained,
+)
 from tactile_bayes.mechanics.branches.equilibrium import (
     SETTLED,
     Balance,
@@ -18,18 +28,10 @@ from tactile_bayes.mechanics.branches.equilibrium import (
     settle_at_limit,
 )
 from tactile_bayes.mechanics.branches.leg import (
-    LOST,
-    NOT_SLIPPING,
     NUDGE,
     LegSeries,
-    change_of_mode,
-    change_of_phase,
-    end_of_line,
-    first_fall,
     guess,
     leg_from,
-    polished_fold,
-    regained,
     sample_leg,
     settle_on,
     share_of,
