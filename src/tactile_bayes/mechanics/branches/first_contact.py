@@ -8,7 +8,6 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.crossings import NOT_SLIPPING
 from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, balance, nowhere, settle, unloaded
 from tactile_bayes.mechanics.branches.leg import HARDLY
 from tactile_bayes.mechanics.branches.line import Line, line_of, pose_at
@@ -37,7 +36,7 @@ from tactile_bayes.mechanics.branches.scene import (
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import golden, newton_step
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.poses.beam import Beam, Chord, chord_to, is_straight, mirrored_beam
+from tactile_bayes.mechanics.poses.beam import Beam, Chord, chord_to, mirrored_beam
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
 __all__ = ["Beginning", "beginning", "clear_angle"]
@@ -87,6 +86,9 @@ _NOT_TURNED = 1e-3
 """Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried: as
 near as its first contact is found."""
 
+
+_HARDLY_SLIPS = 1e-5
+"""Slip per travel whose sense errors of a table may decide, ten times these."""
 
 _SLIGHT = 1e-3
 """Travel [rad or L] on which the sense of a slip is decided that vanishes to first order, as that of straight rods
@@ -421,8 +423,8 @@ def _first_state(scene: Scene, lines: Floats | None, seen: Outline, near: Approa
         near = Approach(near.reach, near.distance, near.begin, True, near.ends, near.gap)
         scene = in_phase(scene, TIP)
         begin = _unloaded(scene, lines, seen, near)
-    # A straight rod that turns about a pivot slides inward.
-    if scene.rig.friction_angle == 0.0 or (lines is None and is_straight(scene.beam)):
+    # A rod that turns about a pivot slides inward unless it is curved toward the object.
+    if scene.rig.friction_angle == 0.0 or (lines is None and scene.beam.most_curvature <= 0.0):
         return _TOUCHES if lines is None or _is_pushed(begin) else _SLIPS_OFF, scene, begin
     other = with_friction(scene, -scene.rig.friction_angle)
     at_other = _unloaded(other, lines, seen, near)
@@ -452,7 +454,7 @@ def _is_head_on(begin: Balance) -> bool:
 def _opposes(scene: Scene, begin: Balance) -> bool:
     """True if friction opposes the slip as the force grows from none."""
     slipping = slip(scene, begin.at, begin.tangent) / begin.rates.travel
-    if abs(slipping) <= NOT_SLIPPING:
+    if abs(slipping) <= _HARDLY_SLIPS:
         at, tangent, size = begin.at, begin.tangent, _SLIGHT / begin.rates.travel
         force = size * tangent.force
         start = Equilibrium(at.p + size * tangent.p, at.q + size * tangent.q, force)
