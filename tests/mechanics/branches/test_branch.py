@@ -149,7 +149,7 @@ def test_a_rod_curved_toward_the_object_is_outside_of_it(name, curvature, fricti
 def test_a_rod_more_curved_than_a_circle_touches_it_twice():
     """And one less curved does not, where it comes to lie along it."""
     radius, count = 0.5, 6
-    contour, zero = Circle(np.full(count, radius), np.linspace(0.34, 0.5, count), 0.0), np.zeros(count)
+    contour, zero = Circle(np.full(count, radius), np.linspace(0.45, 0.5, count), 0.0), np.zeros(count)
     for curvature, reach in ((1.9, Reachability.TOUCHES), (2.1, Reachability.TOUCHES_TWICE)):
         for sign, backward in ((1.0, False), (-1.0, True)):
             mirrored_too = np.full(count, backward)
