@@ -14,6 +14,7 @@ MOST = 9
 
 EXCEPTIONS = {
     "LoadCell": "a data sheet, whose fields are the numbers of a sensor, each with its name",
+    "Rod": "a data sheet too; the modes of its rest curvature come from a trace, with the deviation of their mean",
     "Event": "a result, which is read and never made by hand: the values at one event of a sweep",
     "Specification": "a result, which read_specification makes from a file with sections",
 }

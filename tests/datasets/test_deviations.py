@@ -41,7 +41,14 @@ SI = {
         "drive_angle_backlash": 0.01,
     },
 }
-NEVER_DRAWN = {*GROUPS["gauge"], *GROUPS["discrepancy"], "noise_scale", "moment_noise", "force_noise"}
+NEVER_DRAWN = {
+    *GROUPS["gauge"],
+    *GROUPS["discrepancy"],
+    *GROUPS["rest_shape"],
+    "noise_scale",
+    "moment_noise",
+    "force_noise",
+}
 EVERY = [name for name in PARAMETERS if name not in (*NEVER_DRAWN, "rigidity_scale")]
 
 

@@ -82,3 +82,17 @@ def carried_drive(rng: np.random.Generator, poses: int | None = None) -> Carried
             (float(x[0]), float(y[0])), float(np.arctan2(way[1], way[0])), float(angle[0]), float(np.hypot(*way))
         )
     return tb.Motion(x, y, angle)
+
+
+def aimed_drive(rng: np.random.Generator, contour: Contour) -> Carried:
+    """A drive of any heading and any direction of the rod, whose tip comes near the object or into it."""
+    angle, heading = rng.uniform(-0.4, np.pi + 0.4), rng.uniform(-np.pi, np.pi)
+    lowest = float(np.nanmin(contour.height(np.linspace(-0.5, 0.5, 41))))
+    tip = np.array([rng.uniform(-1.2, 1.2), lowest + rng.uniform(-0.6, 0.4)])
+    way, past = rng.uniform(0.3, 1.2), rng.uniform(0.0, 1.0)
+    along = np.array([np.cos(heading), np.sin(heading)])
+    begin = tip - np.array([np.cos(angle), np.sin(angle)]) - way * along
+    if rng.integers(2):
+        return tb.Translation((float(begin[0]), float(begin[1])), heading, angle, way + past)
+    end = begin + (way + past) * along
+    return tb.Motion([begin[0], end[0]], [begin[1], end[1]], [angle, angle + rng.uniform(-0.5, 0.5)])

@@ -40,8 +40,9 @@ def _integrated(rod: tb.Rod, begin: np.ndarray, end: np.ndarray, state: np.ndarr
 def violations(scan: Scan, rod: tb.Rod, friction: float, tolerance: float = 1e-6) -> dict[str, float]:
     """Largest violations of each condition that is not met, over all samples of a scan of one sweep.
 
-    "residual": the rod under the recorded wrench does not end at the recorded contact. "cone": the force is not at the
-    edge of the cone of friction. "sense": friction pushes on the slip [L]. "inside": the rod lies in the object.
+    "residual": the rod under the recorded wrench does not end at the recorded contact. "cone": the force is beyond the
+    cone of friction, or inside it between two samples that slip [L]. "sense": friction pushes on the slip [L].
+    "inside": the rod lies in the object.
     """
     record, backward = scan.record, scan.sweeps[0].direction == "backward"
     mirror = -1.0 if backward else 1.0
@@ -82,12 +83,16 @@ def violations(scan: Scan, rod: tb.Rod, friction: float, tolerance: float = 1e-6
     force = np.hypot(wrench[1], wrench[2])
     felt = force > 1e-6
     inclined = mirror * (np.arctan2(-wrench[1], wrench[2]) - alpha)
-    note("cone", float(np.abs(np.abs(inclined[felt]) - np.arctan(friction)).max(initial=0.0)), 1e-6)
+    within = np.arctan(friction) - np.abs(inclined)
+    note("cone", float(-within[felt].min(initial=0.0)), 1e-6)
     moved = mirror * np.diff(px + on["base_x"]) * np.cos(0.5 * (alpha[1:] + alpha[:-1]))
     moved += mirror * np.diff(py + on["base_y"]) * np.sin(0.5 * (alpha[1:] + alpha[:-1]))
     slip = moved - np.where(lying[1:], np.diff(s1), 0.0)
-    same = (lying[1:] == lying[:-1]) & felt[1:] & (friction > 0.0)
-    note("sense", float((np.sign(inclined[1:]) * slip)[same].max(initial=0.0)), 1e-7)
+    edge = within < 1e-7
+    same = (lying[1:] == lying[:-1]) & felt[1:] & felt[:-1] & (friction > 0.0)
+    steady = same & edge[1:] & edge[:-1] & (inclined[1:] * inclined[:-1] > 0.0)
+    note("sense", float((np.sign(inclined[1:]) * slip)[steady].max(initial=0.0)), 1e-7)
+    note("cone", float(np.abs(slip[same & ~edge[1:] & ~edge[:-1]]).max(initial=0.0)), 1e-7)
     for part, begin, end in ((bent, 0.0 * s1, s1), (free, s1, np.ones_like(s1))):
         s = begin + (end - begin) * np.linspace(0.0, 1.0, _STEPS + 1)[:, None]
         half = 0.5 * rod.diameter * (1.0 - rod.taper * s)

@@ -21,7 +21,8 @@ from tactile_bayes.rig import Rig
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 
-ROD = Rod(0.1, 2e-4, rest_curvature=2.0, taper=0.2, stem=0.004)
+MODES = [lambda s: 3.0 - 30.0 * s, lambda s: 20.0 * s, lambda s: np.cos(60.0 * s)]
+ROD = Rod(0.1, 2e-4, rest_curvature=2.0, taper=0.2, stem=0.004, rest_shape_modes=MODES)
 CELL = LoadCell(
     force_noise=0.05 * ROD.force_unit,
     moment_noise=0.02 * ROD.moment_unit,
@@ -53,6 +54,9 @@ KNOWN = {
     "moment_curve_cubic": 0.004 / MOMENT**2,
     "suspension_compliance": 0.03 / MOMENT,
     "rest_curvature": 1.1,
+    "rest_shape_1": 0.7,
+    "rest_shape_2": -0.4,
+    "rest_shape_3": 1.2,
     "taper": 0.25,
     "stem": 0.0055,
     "length": 0.102,

@@ -8,7 +8,7 @@ from helpers.legendre import equilibrium, tangential_arclength
 from helpers.single_states import states_at
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw
 from tactile_bayes.contours.sweep_frame import SweepFrame
-from tactile_bayes.mechanics.branches.leg import DIP
+from tactile_bayes.mechanics.branches.crossings import DIP
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability, SnapOff

@@ -27,7 +27,7 @@ from helpers.exact_rod import mp
 from helpers.single_states import states_at
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, paper_profile
 from tactile_bayes.errors import ContourError
-from tactile_bayes.mechanics.branches.leg import DIP
+from tactile_bayes.mechanics.branches.crossings import DIP
 from tactile_bayes.mechanics.elastica import tangential_arclength
 from tactile_bayes.mechanics.phases import NONE
 from tactile_bayes.mechanics.reachability import SnapOff

@@ -44,8 +44,15 @@ def test_a_scan_without_noise_gives_its_contacts_back(name, friction, method):
     found = tb.reconstruct(record, method=method, rig=Rig(load_cell=CELL, unknown={"friction": friction}))
     loaded = record["truth_contact_phase"].values != "none"
     assert set(found["status"].values[loaded]) <= {"ok", "at the edge"}
+    ends = [found[f"{end}_slope_angle"].values[loaded] for end in ("least", "greatest")]
+    slope = record["truth_slope_angle"].values[loaded]
+    assert np.all((ends[0] - 1e-9 <= slope) & (slope <= ends[1] + 1e-9))
+    inward = np.abs(found["slope_angle"].values[loaded] - slope) < 1e-9  # elsewhere it slides outward at first
+    assert np.mean(inward) > 0.9
     for truth in TRUTHS:
-        np.testing.assert_allclose(found[truth].values[loaded], record[f"truth_{truth}"].values[loaded], atol=1e-9)
+        where = inward if truth == "slope_angle" or method == "constrained" else np.ones_like(inward)
+        expected = record[f"truth_{truth}"].values[loaded][where]
+        np.testing.assert_allclose(found[truth].values[loaded][where], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["tapered", "curved along it"])

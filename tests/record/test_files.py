@@ -206,6 +206,19 @@ def test_the_one_dimension_of_a_netcdf_file_may_have_any_name(tmp_path, name):
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_a_traced_rod_is_kept_with_its_modes(tmp_path, suffix):
+    rod = Rod(0.1, 1e-4, rest_curvature=2.0, rest_shape_modes=(lambda s: 3.0 - 30.0 * s, lambda s: np.cos(60.0 * s)))
+    write_record(make_record(columns(), Rig(rod)), tmp_path / f"record{suffix}")
+    assert rod_of(read_record(tmp_path / f"record{suffix}")) == rod
+
+
+@pytest.mark.parametrize("text", ["none", "{}", '{"modes": 3}', '{"modes": [3]}', '{"modes": [{"edges": [0, 1]}]}'])
+def test_modes_that_are_none_are_refused(text):
+    with refused(RecordError, "rest_shape_modes"):
+        make_record(columns(), attrs={"units": "dimensionless", "rod_rest_shape_modes": text})
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_coordinates_are_written_as_columns(tmp_path, suffix):
     record = make_record(columns(time=np.arange(6.0)))
     write_record(record.set_coords("time"), tmp_path / f"record{suffix}")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.refusals import refused
 from helpers.tasks import through_a_pipe
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
@@ -24,7 +25,8 @@ from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 RECORD = scan(Parabola(0.5, q=0.5), drive_step=0.1).record
-ALL = tuple(name for group in STANDARD for name in members(group))
+ALL = tuple(name for group in STANDARD if group != "rest_shape" for name in members(group))
+TRACED = Rod(rest_shape_modes=(lambda s: 0.2 * (1.0 - s), lambda s: 0.1 * s))
 
 
 def unknown_of(said, record=RECORD, **rig):
@@ -38,6 +40,25 @@ def unknown_of(said, record=RECORD, **rig):
 def test_what_is_not_named_is_unknown_if_it_is_unknown_of_a_real_rig():
     assert unknown_of({}) == ALL
     assert unknown_of({"drift": "default"}) == (*ALL, *GROUPS["drift"])
+
+
+def test_the_course_of_the_curvature_is_unknown_of_a_traced_rod():
+    record = scan(Parabola(0.5, q=0.5), Rig(TRACED), drive_step=0.1).record
+    assert unknown_of({}, record) == (*ALL, *GROUPS["rest_shape"][:2])
+    assert unknown_of({"rest_shape_1": 0.3}, record) == (*ALL, "rest_shape_2")
+    drawn = Rig(TRACED).draw(rng=1)
+    z = [drawn.known[name] for name in GROUPS["rest_shape"][:2]]
+    s = np.linspace(0.0, 1.0, 7)
+    np.testing.assert_allclose(drawn.known_rod.rest_curvature(s), 0.2 * (1.0 - s) * z[0] + 0.1 * s * z[1], atol=1e-12)
+    assert GROUPS["rest_shape"][0] not in Rig().draw(rng=1).known
+
+
+@pytest.mark.parametrize("value", [0.3, stats.norm(0.0, 1.0)])
+def test_a_mode_that_the_rod_does_not_have_is_refused(value):
+    with refused(ParameterError, "rest_shape_3", "2 modes"):
+        Rig(TRACED, unknown={"rest_shape_3": value}).draw(rng=1)
+    with refused(ParameterError, "rest_shape_1", "0 modes"):
+        unknown_of({"rest_shape_1": value})
 
 
 def test_a_number_is_known_and_a_distribution_unknown():

@@ -158,8 +158,11 @@ def test_a_drive_that_ends_in_contact_says_so():
         (ContourError, {"drive": tb.Translation((-0.2, 0.0), np.pi, 1.2, 1.0)}, ["from the beginning"]),
         (
             ReachError,
-            {"drive": tb.Motion([0.8, -0.3, 0.8], 0.0, 1.2), "rig": Rig(unknown={"friction": 0.2})},
-            ["friction", "other way"],
+            {
+                "drive": tb.Translation((0.0, -0.5), 0.5 * np.pi, 0.5 * np.pi, 1.0),
+                "rig": Rig(unknown={"friction": 0.2}),
+            },
+            ["friction", "head-on"],
         ),
         (ParameterError, {"drive": THERE, "direction": "backward"}, ["direction"]),
         (ParameterError, {"drive": THERE, "drive_angles": [0.1, 0.2]}, ["drive_angles"]),

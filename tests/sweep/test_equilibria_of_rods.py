@@ -55,6 +55,11 @@ def test_states_of_sweeps_once_the_contact_comes_back(name):
                 swept += 1
                 slopes = swept_states.slope_angle.values
                 farthest = int(np.argmax(side * slopes))
+                if friction:  # friction acts outward at first, and then holds the contact
+                    off = np.arctan2(-swept_states.force_x, swept_states.force_y).values - slopes
+                    farthest = max(
+                        farthest, int(np.flatnonzero(side * off < np.arctan(friction) - 1e-9).max(initial=0))
+                    )
                 found = equilibria(
                     contour, slopes, direction=direction, rig=Rig(rod=rod, unknown={"friction": friction})
                 )
@@ -62,8 +67,9 @@ def test_states_of_sweeps_once_the_contact_comes_back(name):
                 assert np.all(off[farthest + 1 :] < 1e-9)
                 later = found.contact_phase.values[farthest + 1 :]
                 np.testing.assert_array_equal(later, swept_states.contact_phase.values[farthest + 1 :])
-                assert np.all(swept_states.contact_phase.values[:farthest] == "tip")
-                assert not np.any(off[:farthest] < 1e-9)
+                if friction == 0.0:
+                    assert np.all(swept_states.contact_phase.values[:farthest] == "tip")
+                    assert not np.any(off[:farthest] < 1e-9)
                 same, different = same + slopes.size - farthest - 1, different + farthest
     assert swept >= 8
     assert same > 10 * different

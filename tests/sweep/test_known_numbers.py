@@ -39,6 +39,9 @@ KNOWN = {
     "moment_curve_cubic": 0.004,
     "suspension_compliance": 0.03,
     "rest_curvature": 0.11,
+    "rest_shape_1": 0.7,
+    "rest_shape_2": -0.4,
+    "rest_shape_3": 1.2,
     "taper": 0.25,
     "stem": 0.055,
     "length": 1.02,
@@ -48,14 +51,16 @@ KNOWN = {
 }
 """In units of the rod."""
 PIN = Circle(0.3, 0.5, 0.02)
-ROD = Rod(rest_curvature=0.2, taper=0.2, stem=0.04)
+MODES = (lambda s: 0.3 * (1.0 - s) ** 2, lambda s: 0.2 * s, lambda s: 0.1 * np.cos(6.0 * s))
+ROD = Rod(rest_curvature=0.2, taper=0.2, stem=0.04, rest_shape_modes=MODES)
 CELL = LoadCell(gain=((1.02, 0, 0.03), (0, 0.97, 0.01), (0, 0, 1)), lever=(0.01, 0.02), moment_curve=(0.02, 0.001))
 BASES = ((0.0, 0.0), (0.1, 0.03))
 
 
 def scaled(length: float, rigidity: float):
     """Rod, load cell, contour, pivots and known numbers in SI."""
-    whole = Rod(length, rigidity, rest_curvature=0.2 / length, taper=0.2, stem=0.04 * length)
+    modes = [lambda s, of=of: of(s / length) / length for of in MODES]
+    whole = Rod(length, rigidity, rest_curvature=0.2 / length, taper=0.2, stem=0.04 * length, rest_shape_modes=modes)
     moment, force = whole.moment_unit, whole.force_unit
     units = {
         name: (force if name.startswith("force") else moment) ** of.of_moment * length**of.of_length

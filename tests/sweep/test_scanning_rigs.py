@@ -66,8 +66,8 @@ HALF = np.linspace(0.1, 0.9, 30)
 @pytest.mark.parametrize(
     ("contour", "base", "direction", "named"),
     [
-        (Circle(0.3, 0.3), (0.6, 0.2), "forward", ["first touch", "right end", "(0.3, 0.6)", "vertical"]),
-        (Circle(0.3, 0.3), (-0.6, 0.2), "backward", ["first touch", "left end", "(-0.3, 0.6)", "vertical"]),
+        (Circle(0.3, 0.3), (0.6, 0.2), "forward", ["would touch beyond", "right end", "(0.3, 0.6)", "vertical"]),
+        (Circle(0.3, 0.3), (-0.6, 0.2), "backward", ["would touch beyond", "left end", "(-0.3, 0.6)", "vertical"]),
         (Ellipse(0.3, 0.2, 0.3), (0.6, 0.2), "forward", ["right end", "(0.3, 0.5)", "vertical"]),
         (
             from_function(lambda x: 0.3 + 0.5 * x**2, (-0.9, 0.5)),
@@ -94,7 +94,7 @@ def test_contact_beyond_an_end_is_refused_with_its_name(contour, base, direction
         scan(contour, base=base, direction=direction)
 
 
-@pytest.mark.parametrize(("left", "right", "what"), [(-0.9, 0.5, "first touch"), (0.2, 1.2, "still touch")])
+@pytest.mark.parametrize(("left", "right", "what"), [(-0.9, 0.5, "would touch beyond"), (0.2, 1.2, "still touch")])
 def test_of_several_bases_the_one_that_is_refused_is_named(left, right, what):
     contour = from_function(lambda x: 0.3 + 0.5 * x**2, (left, right))
     good = (-0.45, 0.15) if left < 0 else (0.6, 0.0)

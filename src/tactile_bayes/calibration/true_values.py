@@ -11,6 +11,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import GROUPS, parameter_named
+from tactile_bayes.rig.rig import rod_with
 
 __all__ = ["true_values"]
 
@@ -26,12 +27,11 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
     known = {**simulated.own_family.known, **simulated.unknowns.known, **drawn}
     rod, stated = rod_of(simulated.record), rod_of(assumed.record)
     cell, stated_cell = simulated.noise.cell, assumed.noise.cell
-    length = known.get("length", rod.length)
     values = {
-        "rest_curvature": rod.mean_rest_curvature * rod.length / length,
+        "rest_curvature": rod_with(rod, known).mean_rest_curvature,
         "taper": rod.taper,
         "stem": rod.stem,
-        "length": length,
+        "length": rod.length,
         **dict(zip(GROUPS["moment_curve"], cell.moment_curve, strict=True)),
         **known,
     }

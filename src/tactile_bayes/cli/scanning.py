@@ -152,7 +152,6 @@ def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
                 "base": sweep.base,
                 "carried": number in carried,
                 "clear": sweep.clear,
-                "slides_from": sweep.slides_from,
                 "touches_again": sweep.touches_again,
                 "largest_strain": sweep.largest_strain,
                 "first_contact": asdict(sweep.first_contact),

@@ -43,6 +43,8 @@ class SweepFrame:
         Rigid piece between pivot and rod [rod length].
     way : float or ndarray, shape (n,)
         Farthest that a drive carries the base to either side of the pivot [rod length].
+    rest_shape : float or ndarray, shape (n, modes)
+        Amplitudes of the modes of the rest curvature, in the laboratory frame.
     """
 
     contour: Contour
@@ -55,6 +57,7 @@ class SweepFrame:
     taper: Parameter = 0.0
     stem: Parameter = 0.0
     way: Parameter = 0.0
+    rest_shape: Parameter = 0.0
 
     @property
     def size(self) -> int:

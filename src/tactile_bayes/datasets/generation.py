@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,12 +89,12 @@ _WIDER = "give wider contours, or bring the pivots nearer to them, or to their m
 _CORRECTIONS = {
     "out of reach": "bring contours and pivots closer to one another (are contours, bases and rod in one unit?)",
     "cuts the pivot": _HIGHER,
-    "first touched beyond its end": _WIDER,
+    "touched beyond its end": _WIDER,
     "too close to the pivot": _HIGHER,
     "still touched at its other end": _WIDER,
     "touched twice": "give rods that are less curved, or contours that are more so where rods touch them",
     "touched at the beginning": "begin the translations farther from the contours",
-    "held by friction": "take friction = 0 under [unknown], straight rods, or another heading or drive angle",
+    "met head-on": "take friction = 0 under [unknown], or another heading or drive angle",
     "slips off at once": "give rods that are less curved, or bring contours and pivots closer to one another",
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the unloaded rod would still cut the object",
@@ -309,7 +310,6 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
         relative=drives.way.ndim == 1,
         polished=False,
         lines=drives.lines,
-        asks_sliding=True,
     )
     return _Tried(candidate, paths, drives, units)
 
@@ -326,7 +326,7 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
 def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
     """Columns of every sweep, shape (n,)."""
     paths = tried.paths
-    phases = np.array(phases_of(paths), dtype=object)
+    phases = np.array([_touching(phases) for phases in phases_of(paths)], dtype=object)
     if spec.translations:
         found = {"direction": paths.sweep_frame.mirrored.astype(np.int8), "phases": phases}
     else:
@@ -342,6 +342,11 @@ def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
             paths.largest_curvature * paths.sweep_frame.standoff / paths.sweep_frame.length
         )
     return found
+
+
+def _touching(phases: str) -> str:
+    """Return phases as `phases_of` writes them, of tip and tangential contact alone, whether they slide or stick."""
+    return "-".join(phase for phase, _ in groupby(phases.upper().split("-")))
 
 
 def _of_samples(tried: _Tried, index: Index) -> dict[str, NDArray[Any]]:

@@ -11,9 +11,8 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import FEWEST_PREDICTIONS
-from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
 from tactile_bayes.inference.result import posterior_draws, record_of, refuse_no_contour, refuse_not_finite
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.stored_experiment import segments_of
 from tactile_bayes.load_cell.blocks import are_blocks
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
@@ -227,8 +226,8 @@ def _loaded(posterior: xr.DataTree) -> Flags:
     """Return True for samples between first contact and snap-off, at the posterior medians of these events."""
     record = record_of(posterior)
     events = posterior["events"].to_dataset().median(("chain", "draw"))
-    segments = RecordSegments(record, LoadCell.from_record(record) or LoadCell())
-    along, place = travels_of(record), "travel" if carried_sweeps(record) else "drive_angle"
+    segments = segments_of(posterior, record)
+    along, place = segments.ways_of_samples, "travel" if segments.has_history else "drive_angle"
     loaded = np.zeros(along.size, dtype=bool)
     ends = np.sort(np.stack([events[f"first_{place}"].values, events[f"snap_off_{place}"].values]), axis=0)
     for own, low, high in zip(segments.samples, *ends, strict=True):

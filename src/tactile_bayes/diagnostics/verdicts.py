@@ -20,7 +20,7 @@ from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.misfit import CHECK_RIG, GAUGE, is_inferred, what_to_try
 from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, zero_load
-from tactile_bayes.reconstruction import AXIAL_ALARM, contact_sides
+from tactile_bayes.reconstruction import AXIAL_ALARM, contact_sides, drive_histories
 from tactile_bayes.record import CHANNELS, carried_sweeps
 from tactile_bayes.record.origin import column_entry
 from tactile_bayes.record.rig_entry import rig_entries, rig_entry
@@ -158,20 +158,24 @@ def verdicts(
 
 
 def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
-    """Report sweeps about a pivot that go back in contact, along which friction acts the other way.
+    """Report sweeps about a pivot that go back in contact, where friction acts the other way, without a way forth.
 
     If all seem to, it is the sign of the moment.
     """
     if not (is_inferred("friction", _inferred(posterior)) or posterior.attrs.get("friction", 0.0)):
         return []
-    back = (contact_sides(record) > 0.0) != (record["direction"].values == "forward")
-    sweeps = sorted(set(record["sweep"].values[back].tolist()) - set(carried_sweeps(record)))
-    if not sweeps or back.all():
+    backward = contact_sides(record) < 0.0
+    back = backward != (record["direction"].values == "backward")
+    if not back.any() or back.all():
+        return []
+    history = drive_histories(record, backward, LoadCell.from_record(record) or LoadCell(), rubs=True)
+    sweeps = sorted(set(record["sweep"].values[back & (history == 0)].tolist()))
+    if not sweeps:
         return []
     named = f"{'Sweeps' if len(sweeps) > 1 else 'Sweep'} {', '.join(map(str, sweeps))}"
     return [
-        f"{named} went back in contact, where friction acts the other way, which is not modelled: infer the record "
-        f"without these samples, or without friction ({rig_entry('friction', 0, 'unknown')}), and compare."
+        f"{named} went back in contact after no sweep on that side, so that friction is taken as on the way forth: add "
+        f"the way forth to the record, or infer without friction ({rig_entry('friction', 0, 'unknown')}), and compare."
     ]
 
 
@@ -361,15 +365,9 @@ def _cut_off_message(posterior: xr.DataTree) -> list[str]:
     draws = posterior_draws(posterior)
     least_most = {"above": 1.0, "below": 0.0}
     ends = [f"{name} ({end} {float(draws[name].quantile(least_most[end])):.3g})" for name, end in cut_off.items()]
-    advice = "is the family right, and the rod?"
-    if is_inferred("friction", _inferred(posterior)) or posterior.attrs.get("friction", 0.0):
-        advice = (
-            "friction excludes states in which the contact would stick, which is not modelled. Infer it without "
-            f"friction ({rig_entry('friction', 0, 'unknown')}) and compare."
-        )
     return [
         f"The posterior is CUT OFF where the model has no path of the rod, not by the record: {', '.join(ends)}. "
-        f"Intervals are too narrow on that side: {advice}"
+        "Intervals are too narrow on that side: is the family right, and the rod?"
     ]
 
 

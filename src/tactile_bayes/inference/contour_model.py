@@ -72,7 +72,11 @@ class ContourModel:
         self._jointly = [self.names.index(name) for name in unknowns.joint.priors] if unknowns.joint else []
         self.rubs = bool(unknowns.friction) or "friction" in unknowns.names
         self.likelihood = RecordLikelihood(
-            measured, noise.cell.straight, unknowns.friction, is_always_clear=family.is_always_clear and not self.rubs
+            measured,
+            noise.cell.straight,
+            unknowns.friction,
+            is_always_clear=family.is_always_clear and not self.rubs,
+            rubs=self.rubs,
         )
         if noise.of_discrepancy and self.likelihood.encoder.count > 1:
             raise ParameterError(
@@ -267,23 +271,14 @@ class ContourModel:
 
     def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:
         """Draw from the prior of contours within reach. Returns points, shape (count, d)."""
-        found, drawn, without_friction = [np.empty((0, len(self.names)))], 0, 0
+        found, drawn = [np.empty((0, len(self.names)))], 0
         most = max(_MOST_TRIALS * count, _FEWEST_TRIALS)
         while (had := sum(map(len, found))) < count and drawn < most:
             if had and deadline.has_passed:
                 break
-            tried = self.prior_points(rng, count)
-            found.append(self._within_reach(tried))
+            found.append(self._within_reach(self.prior_points(rng, count)))
             drawn += count
-            if self.rubs and not len(found[-1]) and not without_friction:
-                without_friction = len(self._within_reach(tried, friction=False))
         points = np.concatenate(found)
-        if not len(points) and without_friction:
-            raise ReachError(
-                f"with friction the rod has no path along any of {drawn} contours from the prior in every sweep, but "
-                f"without friction it has along {without_friction} of {count}: the contact would stick, which is not "
-                "modelled. Infer without friction (friction = 0 under [unknown] of rig.toml)"
-            )
         if not len(points):
             raise ReachError(
                 f"the rod reaches none of {drawn} contours from the prior in every sweep: check base, rod length and "
@@ -297,13 +292,12 @@ class ContourModel:
         """Return the share of so many draws of `prior_points` that are within reach, at least 1/count."""
         return max(len(self._within_reach(self.prior_points(rng, count, others))), 1) / count
 
-    def _within_reach(self, points: Floats, friction: bool = True) -> Floats:
+    def _within_reach(self, points: Floats) -> Floats:
         """Return those of the points, (n, d), of which the rod reaches the contour in every sweep."""
         points = points[self.within_bounds(points)]
         if not len(points):
             return points
-        rig = self.rig(points)
-        return points[self.likelihood.usable(self.contours(points), rig if friction else rig._replace(friction=0.0))]
+        return points[self.likelihood.usable(self.contours(points), self.rig(points))]
 
     def _zero_load(self) -> xr.Dataset:
         with warnings.catch_warnings():

@@ -95,7 +95,8 @@ class Experiment:
     @cached_property
     def shortened(self) -> Experiment:
         """The experiment with the samples that the likelihood takes, which are fewer for a long record."""
-        record, cell = shortened(self.record, self.noise.cell)
+        rubs = bool(self.unknowns.friction) or "friction" in self.unknowns.names
+        record, cell = shortened(self.record, self.noise.cell, rubs)
         if record is self.record:
             return self
         noted = record.assign_attrs({_WHOLE: record_hash(self.record)})

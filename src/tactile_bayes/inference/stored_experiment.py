@@ -15,6 +15,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.parameters.unknowns import Unknowns, belongs
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
+from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
 from tactile_bayes.inference.result import contour_draws, known_of, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contacts_of
@@ -23,7 +24,15 @@ from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["contact_points", "experiment_of", "found_rig", "likelihood_of", "points_of", "predicted_points"]
+__all__ = [
+    "contact_points",
+    "experiment_of",
+    "found_rig",
+    "likelihood_of",
+    "points_of",
+    "predicted_points",
+    "segments_of",
+]
 
 
 def experiment_of(posterior: xr.DataTree, family: Family | None = None, rig: Rig | None = None) -> Experiment:
@@ -64,7 +73,14 @@ def likelihood_of(posterior: xr.DataTree, record: xr.Dataset) -> tuple[RecordLik
     # `infer_contour` gives a cell whose noise it infers a noise of 1.
     noises: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in posterior["posterior"]}
     cell = replace(LoadCell.from_record(record) or LoadCell(), **noises)
-    return RecordLikelihood(record, cell, unknowns.friction), unknowns
+    return RecordLikelihood(record, cell, unknowns.friction, rubs="friction" in unknowns.names), unknowns
+
+
+def segments_of(posterior: xr.DataTree, record: xr.Dataset) -> RecordSegments:
+    """Return the sweep segments of a posterior's record, in the order of its events."""
+    rubs = posterior.attrs.get("friction", 0.0) > 0.0
+    rubs |= "friction" in read_json(posterior.attrs.get("nuisances", "[]"), "nuisances")
+    return RecordSegments(record, LoadCell.from_record(record) or LoadCell(), rubs)
 
 
 def found_rig(measured: xr.Dataset, posterior: xr.DataTree, load_cell: LoadCell | None = None) -> Corrected:

@@ -18,11 +18,12 @@ from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
 from tactile_bayes.mechanics.branches.sweeps import Segments, Shapes, Solutions, Sweeps, shapes_of, solve_sweeps
 from tactile_bayes.mechanics.elastica import Wrench
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
+from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = ["Paths", "States", "trace"]
+__all__ = ["Mode", "Paths", "States", "trace"]
 
 
 class States(NamedTuple):
@@ -40,6 +41,16 @@ class States(NamedTuple):
         """Return the states at indices, one for each axis."""
         wrench: list[Any] = [column[where] for column in self.wrench]
         return States(self.parameter[where], self.x[where], self.y[where], self.slope_angle[where], Wrench(*wrench))
+
+
+class Mode(NamedTuple):
+    """How rod and object touch along a part of a path."""
+
+    tip: bool
+    """True if the tip touches, else the rod."""
+    sticks: bool
+    to_right: bool
+    """True if it slips along the contour to the right; of one that sticks it is not defined, nor without friction."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +92,6 @@ class Paths:
     then travels, in rod lengths."""
     sampled: Floats
     """States at the drive angles given to `trace`, shape (n, k, columns)."""
-    slides_from: float | None = None
-    """Drive angle of a single path from which friction opposes the slip, if it does not all along."""
 
     def is_clear(self) -> Flags:
         """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,).
@@ -137,10 +146,15 @@ class Paths:
         shape (*index.shape,); NaN out of contact."""
         return _as_states(self.sampled[index, sample])
 
-    def changes_to_tip(self) -> list[list[bool]]:
-        """Return whether the phases of each path are tip contact."""
-        to_tip = (self.events[..., 0] == TIP).tolist()
-        return [of_path[:count] for of_path, count in zip(to_tip, self.phases.tolist(), strict=True)]
+    def modes(self) -> list[list[Mode]]:
+        """Return how each path touches, one after the other."""
+        column = {name: self.events[..., k] for k, name in enumerate(STATE_COLUMNS)}
+        to_right = (column["friction_angle"] < 0.0) != self.sweep_frame.mirrored[:, None]
+        found = zip(column["phase"] == TIP, column["sticks"] > 0.0, to_right, self.phases, strict=True)
+        return [
+            [Mode(*map(bool, one)) for one in zip(tip[:n], sticks[:n], right[:n], strict=True)]
+            for tip, sticks, right, n in found
+        ]
 
     def event_states(self) -> States:
         """Exact states at first contact, at the changes of the phase and at snap-off, shape (n, phases + 1).
@@ -165,7 +179,6 @@ def trace(
     relative: bool = False,
     polished: bool = True,
     lines: Floats | None = None,
-    asks_sliding: bool = False,
 ) -> Paths:
     """Follow the equilibria of every contour from first contact to snap-off.
 
@@ -186,13 +199,11 @@ def trace(
     lines : ndarray, shape (1 or n, lines, columns), optional
         Lines of drives that carry the base, in the sweep frame from the first pose of each, as in `lines_through`; NaN
         after the last. Drive angles are then travels, in rod lengths.
-    asks_sliding : bool
-        Whether there is a path only where friction opposes the slip all along it, as it always does on such lines.
     """
     sweeps = _sweeps_of(sweep_frame, friction_angle, suspension_compliance)
     shapes = shapes_of(sweep_frame.contour, *(sweep_frame.own_domain() if sweep_frame.contour.halves is None else ()))
     angles = np.empty(0) if drive_angles is None else drive_angles
-    options: dict[str, Any] = {"profile": profile, "tolerance": tolerance, "asks_sliding": asks_sliding}
+    options: dict[str, Any] = {"profile": profile, "tolerance": tolerance}
     solutions = _swept(shapes, sweeps, angles, lines, relative, states=True, polished=polished, **options)
     most = int(solutions.phases.max(initial=0))
     has_path = solutions.phases[:, None, None] > 0
@@ -226,6 +237,7 @@ def _sweeps_of(sweep_frame: SweepFrame, friction_angle: ArrayLike, compliance: A
     values |= {"rest_curvature": sweep_frame.rest_curvature, "friction_angle": friction_angle, "compliance": compliance}
     values |= {"offset": 0.0, "rigidity": 1.0, "relative_length": 1.0}
     each: dict[str, Any] = {name: np.array(np.broadcast_to(of, (count,)), dtype=float) for name, of in values.items()}
+    each["rest_shape"] = np.array(np.broadcast_to(sweep_frame.rest_shape, (count, MOST_MODES)), dtype=float)
     return Sweeps(contour=every, segment=every, backward=np.ascontiguousarray(sweep_frame.mirrored), **each)
 
 

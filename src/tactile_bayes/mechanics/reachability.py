@@ -20,7 +20,7 @@ class Reachability(IntEnum):
     CUTS_PIVOT = 2
     """The pivot is not below the contour."""
     ENDS = 3
-    """The rod would first touch beyond the end of the contour from which it comes."""
+    """The rod would touch beyond the end of the contour from which it comes."""
     TOO_CLOSE = 4
     """The pivot is nearer to the contour than `CLEARANCE`."""
     RUNS_OUT = 5
@@ -32,9 +32,9 @@ class Reachability(IntEnum):
     SLIPS_OFF = 8
     """At first contact the tip is turned beyond the normal of the contour, so that any force pushes it off."""
     BEGINS_INSIDE = 9
-    """A rod that is carried touches the contour already at the beginning of its drive."""
-    STICKS = 10
-    """Friction would hold the contact of a rod that is carried, or the contact would slide the other way."""
+    """A rod that is carried is in the object at the beginning of its drive, or comes into it without a contact."""
+    HEAD_ON = 10
+    """Friction lets the contact neither slide nor stick at first, or both: a straight rod is pushed along itself."""
     FOLDS_OVER = 11
     """The tip would turn over until the other side of the rod lies along the contour."""
 
@@ -48,14 +48,14 @@ _MESSAGES = {
     Reachability.TOUCHES: "ok",
     Reachability.TOO_FAR: "out of reach",
     Reachability.CUTS_PIVOT: "cuts the pivot",
-    Reachability.ENDS: "first touched beyond its end",
+    Reachability.ENDS: "touched beyond its end",
     Reachability.TOO_CLOSE: "too close to the pivot",
     Reachability.RUNS_OUT: "still touched at its other end",
     Reachability.GRAZES: "hardly touched",
     Reachability.TOUCHES_TWICE: "touched twice",
     Reachability.SLIPS_OFF: "slips off at once",
     Reachability.BEGINS_INSIDE: "touched at the beginning",
-    Reachability.STICKS: "held by friction",
+    Reachability.HEAD_ON: "met head-on",
     Reachability.FOLDS_OVER: "folded over at its tip",
 }
 
@@ -72,3 +72,5 @@ class SnapOff(IntEnum):
     """The line of force passes through the pivot, so that the holding moment vanishes."""
     RELEASE = 4
     """The force vanishes: a rod that is curved or carried leaves the contour without a jump."""
+    JUMP = 5
+    """Friction lets the contact neither slide nor stick: it jumps."""

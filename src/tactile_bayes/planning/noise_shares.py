@@ -16,6 +16,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence, seed_words
 from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
 from tactile_bayes.planning.plan import Plan
+from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import carried_sweeps, travels_of
 
 __all__ = ["noise_shares"]
@@ -111,7 +112,7 @@ def _distribution(plan: Plan, source: str, deviation: float) -> Any:
 
 def _states(plan: Plan, count: int) -> xr.Dataset:
     """Return loaded samples at even distances between first contact and snap-off of every sweep."""
-    carried = carried_sweeps(plan.scan.record)
+    carried = sorted({*carried_sweeps(plan.scan.record), *turned_sweeps(plan.scan.record, plan.cell)})
     if len(carried) == len(plan.scan.sweeps):
         record = _with_travels(plan.scan.record)
         loaded = [
@@ -124,8 +125,8 @@ def _states(plan: Plan, count: int) -> xr.Dataset:
         )
     if carried:
         raise ParameterError(
-            "noise_shares takes rotations or drives that carry the base, not both: plan them one by one, or leave "
-            "noise_shares out of the parts"
+            "noise_shares takes rotations one way, or drives that carry the base or turn back, not both: plan them one "
+            "by one, or leave noise_shares out of the parts"
         )
     angles = []
     for sweep in plan.scan.sweeps:

@@ -81,7 +81,7 @@ def with_events(
     They are at drive angles [degrees], or at travels of the base.
     """
     marked = [events.first_contact, *events.transitions, events.snap_off]
-    following = [event.kind.split(" → ")[-1] for event in marked[:-1]]
+    following = [event.phase for event in marked[:-1]]
     angle = np.append(angle, [_place_of(event, travels) for event in marked])
     value = np.append(value, [_load_of(event, channel, frame) for event in marked])
     phase = np.append(phase, [*following, following[-1]])

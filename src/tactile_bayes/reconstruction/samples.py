@@ -35,10 +35,11 @@ class Samples(NamedTuple):
     cut_off: Flags  # true if a channel is at the end of its range
     has_noise: bool  # true if any noise level is known
     sense: Floats  # +1, or −1 where the contact slides the other way than on the side of a rotation, shape (n,)
+    is_sure: Flags  # false where it may also slide the other way, or stick, shape (n,)
 
     def friction_angles(self, friction: float) -> Floats:
         """Return the friction angles with which the centreline touches, shape (n,)."""
-        return self.sense * self.rod.surface.friction_angle(float(np.arctan(friction)))
+        return np.asarray(self.sense * np.arctan(friction) - self.rod.surface.half_angle)
 
     def take(self, where: Index) -> Samples:
         """Select samples."""
@@ -49,6 +50,7 @@ class Samples(NamedTuple):
             loaded=self.loaded[where],
             cut_off=self.cut_off[where],
             sense=self.sense[where],
+            is_sure=self.is_sure[where],
         )
 
 
@@ -96,7 +98,17 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         side[:, None] * signs * leaning,
         np.broadcast_to(covariance, (angle.size, 3, 3)),
     )
-    return Samples(rod, reading, side, rod.mirrored(side), loaded, cut_off, has_noise, np.ones(angle.size))
+    return Samples(
+        rod,
+        reading,
+        side,
+        rod.mirrored(side),
+        loaded,
+        cut_off,
+        has_noise,
+        np.ones(angle.size),
+        np.ones(angle.size, dtype=bool),
+    )
 
 
 def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> Flags:

@@ -18,12 +18,13 @@ from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
 from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.reconstruction.axial_score import axial_score
-from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
+from tactile_bayes.reconstruction.constrained import constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
 from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
+from tactile_bayes.reconstruction.senses import fits_better, slopes_by_friction, with_likelier_senses
 from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_doubts, with_sides
-from tactile_bayes.record import CHANNELS, COLUMNS, carried_sweeps, present_channels, validate, with_rod
+from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
@@ -33,8 +34,6 @@ __all__ = ["contacts_of", "reconstruct"]
 _METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 _PHYSICAL = ("m", "N", "N m", "1/m")  # units of what is dimensionless in a dimensionless record
-_NO_CONTACT = 25.0  # bound on the misfit of a loaded sample; the value for a sample without a contact
-_TWENTY_TO_ONE = 6.0  # difference of misfits at which one of two sides is twenty times as likely
 # Signs by which backward contacts are mirrored: contact point, slope angle and arc length.
 _MIRROR = np.array([-1.0, 1.0, -1.0, 1.0])
 # Standard deviations from the edge between the phases at which the misfit is χ² with one degree of freedom.
@@ -76,7 +75,12 @@ def reconstruct(
         contact_xy_correlation, slope_angle_sd, contact_arclength_sd, and tangent_sd and normal_sd, along the contour
         and across it. They include errors that samples share, like an unknown bias, as if they were independent.
         other_contact_x, other_contact_y and other_contact_arclength are those of a second contact, where status is
-        "ambiguous" or "either phase", else NaN.
+        "ambiguous" or "either phase", else NaN. least_slope_angle and greatest_slope_angle are the ends between which
+        friction leaves the slope, for the force as it is read: the rod may slide either way or stick where it is
+        carried, its drive turns back in contact, or it is curved toward the object. There the ends are two friction
+        angles apart, and the slope angle is the one for sliding, the other way where that fits clearly better, judged
+        for each way of the drive. Elsewhere both are the slope angle. Points of a straight rod without a diameter do
+        not depend on it by the raw method; the constrained one takes the rod to slide.
 
         With method="constrained" also misfit, the residual sum of squared deviations in standard deviations, and
         edge_distance, the distance of the contact from the change between tip and tangential contact in standard
@@ -166,10 +170,10 @@ def contacts_of(found: Corrected, method: Literal["raw", "constrained"]) -> xr.D
         raise refused("suspension_compliance", compliance, correction)
     measured, doubtful = _with_likelier_sides(measured, cell, compliance, friction)
     samples = samples_of(measured, cell, compliance)
-    samples = with_likelier_senses(samples, measured, friction)
+    samples = with_likelier_senses(samples, measured, cell, friction)
     estimate = _METHODS[method](samples, samples.friction_angles(friction))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
-    contacts = kept.assign(_variables(estimate, samples, measured)).assign_attrs(
+    contacts = kept.assign(_variables(estimate, samples, measured, friction)).assign_attrs(
         method=method,
         friction=friction,
         units=found.units,
@@ -199,30 +203,8 @@ def _with_likelier_sides(
             samples_of(with_sides(part, {sweep: side}), cell, suspension_compliance)
             for side in (stated, OTHER_SIDE[stated])
         ]
-        taken[sweep] = OTHER_SIDE[stated] if _fits_better(both[1], both[0], friction) else stated
+        taken[sweep] = OTHER_SIDE[stated] if fits_better(both[1], both[0], friction) else stated
     return with_sides(measured, sides | taken), taken
-
-
-def with_likelier_senses(samples: Samples, measured: xr.Dataset, friction: float) -> Samples:
-    """Return samples whose carried sweeps slide the other way if they fit clearly better so; a sweep has one sense."""
-    sense = samples.sense.copy()
-    for sweep in carried_sweeps(measured) if friction else ():
-        rows = np.flatnonzero(measured.sweep.values == sweep)
-        part = samples.take(rows)
-        sense[rows] *= -1.0 if _fits_better(part._replace(sense=-part.sense), part, friction) else 1.0
-    return samples._replace(sense=sense)
-
-
-def _fits_better(one: Samples, other: Samples, friction: float) -> bool:
-    """Return whether the misfit of samples is clearly smaller than that of others; False without a noise level."""
-    if not (are_weighed(one) and are_weighed(other)):
-        return False
-    misfits = []
-    for samples in (one, other):
-        found = constrained_estimate(samples, samples.friction_angles(friction)).misfit
-        none = np.nan if found is None else found
-        misfits.append(float(np.minimum(np.nan_to_num(none, nan=_NO_CONTACT), _NO_CONTACT)[samples.loaded].sum()))
-    return misfits[0] < misfits[1] - _TWENTY_TO_ONE
 
 
 def _in_channels(measured: xr.Dataset, cell: LoadCell) -> xr.Dataset:
@@ -230,7 +212,9 @@ def _in_channels(measured: xr.Dataset, cell: LoadCell) -> xr.Dataset:
     return cell.corrected(measured) if len(present_channels(measured)) == len(CHANNELS) else measured
 
 
-def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> dict[str, tuple[str, object, object]]:
+def _variables(
+    estimate: Estimate, samples: Samples, measured: xr.Dataset, friction: float
+) -> dict[str, tuple[str, object, object]]:
     """Columns of the result, in the laboratory frame and the record's units."""
     rod, side = samples.rod, samples.side
     place, other = (_in_lab_frame(one, side, rod.surface) for one in (estimate.place, estimate.other))
@@ -272,6 +256,8 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
         variables[f"{name}_sd"] = column(
             spread[k] * scale, unit, f"standard deviation of the {COLUMNS[name].long_name}"
         )
+    for name, slopes in zip(("least", "greatest"), _slopes(estimate, samples, friction).T, strict=True):
+        variables[f"{name}_slope_angle"] = column(slopes, "rad", f"{name} slope angle that friction allows")
     variables["contact_xy_correlation"] = column(correlation, "1", "correlation of contact_x and contact_y")
     variables["tangent_sd"] = column(tangent * length, unit_of_length, "standard deviation along the contour")
     variables["normal_sd"] = column(normal * length, unit_of_length, "standard deviation across the contour")
@@ -281,6 +267,12 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
             estimate.edge_distance, "1", "standard deviations from the change of contact phase"
         )
     return variables
+
+
+def _slopes(estimate: Estimate, samples: Samples, friction: float) -> Floats:
+    """Return the least and the greatest slope that friction allows in the laboratory frame, shape (n, 2)."""
+    slopes = samples.side[:, None] * (slopes_by_friction(estimate, samples, friction) - samples.rod.surface.half_angle)
+    return np.sort(slopes, axis=1)
 
 
 def _in_lab_frame(place: Floats, side: Floats, surface: Surface) -> Floats:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.rods.along import Along
+from tactile_bayes.mechanics.rods.along import Along, text_along
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.attribute_names import misspelt
 from tactile_bayes.record.cell import number_in
@@ -17,7 +17,7 @@ from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, UNITS, Frame
 from tactile_bayes.record.storable import not_storable
 from tactile_bayes.record.table import Source
 
-_SHAPE = ("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviation", "stem")
+_SHAPE = ("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviation", "stem", "rest_shape_modes")
 """Properties by which a rod differs from a straight, uniform one."""
 
 _POINTS, _SAME = 101, 1e-9
@@ -46,7 +46,7 @@ def rod_attributes(rod: Rod) -> dict[str, Any]:
 def rod_shape_attributes(rod: Rod) -> dict[str, Any]:
     """Return the properties by which a rod differs from a straight, uniform one: numbers, or polynomials as text."""
     values = {f"rod_{name}": getattr(rod, name) for name in _SHAPE}
-    return {name: v.text if isinstance(v, Along) else v for name, v in values.items() if v not in (0.0, None)}
+    return {name: text_along(value) for name, value in values.items() if value not in (0.0, None, ())}
 
 
 def without_rod(attrs: Mapping[str, Any]) -> dict[str, Any]:
@@ -75,7 +75,8 @@ def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
     diameter = _quantity("rod_diameter", attrs.get("rod_diameter", 0.0), source)
     shape = {name: attrs[f"rod_{name}"] for name in _SHAPE if f"rod_{name}" in attrs}
     for name, value in shape.items():
-        if not (isinstance(value, str) and value.lstrip().startswith("{")):
+        is_text = isinstance(value, str) and value.lstrip().startswith("{")
+        if not is_text and name != "rest_shape_modes":
             shape[name] = _quantity(f"rod_{name}", value, source)
     try:
         rod = Rod(length, rigidity, diameter, **shape)
@@ -106,7 +107,9 @@ def same_rod(one: Rod, other: Rod) -> bool:
     return all(_alike(getattr(one, name), getattr(other, name)) for name in names)
 
 
-def _alike(one: float | Along | None, other: float | Along | None) -> bool:
+def _alike(one: Any, other: Any) -> bool:
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(_alike, one, other))
     if isinstance(one, Along) and isinstance(other, Along):
         shares = np.linspace(0.0, 1.0, _POINTS)
         values = one(shares * one.edges[-1]), other(shares * other.edges[-1])

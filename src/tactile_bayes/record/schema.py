@@ -158,6 +158,7 @@ ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
         "rod_taper": "1",
         "rod_rigidity_profile": "1",
         "rod_stem": "m",
+        "rod_rest_shape_modes": "1/m",
         **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
     }
 )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from tactile_bayes.mechanics.rods.profile import MOST_MODES
+
 __all__ = ["FORMULAS", "is_direction", "meaning_of"]
 
 FORMULAS = {
@@ -39,6 +41,7 @@ _MEANINGS = {
     "backlash": "encoder reading in forward motion less that in backward motion",
     "friction": "Coulomb's coefficient",
     "rest_curvature": "mean curvature of the unloaded rod",
+    **{f"rest_shape_{k}": f"amplitude of mode {k} of the rest curvature" for k in range(1, MOST_MODES + 1)},
     "stem": "length of the rigid piece between pivot and rod",
     "length": "length of the rod",
     "taper": "part of its diameter that the rod loses toward its tip",

@@ -11,8 +11,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.record_likelihood.record_segments import RecordSegments
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.stored_experiment import segments_of
 from tactile_bayes.plotting.drive_axis import DriveAxis, drive_axis
 from tactile_bayes.plotting.maps import outline
 from tactile_bayes.record import (
@@ -270,7 +269,7 @@ def _places(findings: Findings, along: DriveAxis, events: xr.Dataset, event: str
     travels = [float(at) for at in events[f"{event}_travel"].values]
     if along.kind == "travel":
         return travels
-    segments = RecordSegments(findings.record, LoadCell.from_record(findings.record) or LoadCell())
+    segments = segments_of(findings.posterior, findings.record)
     places = []
     for own, travel in zip(segments.samples, travels, strict=True):
         order = own[np.argsort(along.travels[own], kind="stable")]

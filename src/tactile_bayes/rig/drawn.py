@@ -17,7 +17,7 @@ from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.stated import Stated, within_bounds
-from tactile_bayes.rig.unknown import Unknown, of_pivots
+from tactile_bayes.rig.unknown import Unknown, of_modes, of_pivots
 
 __all__ = ["calibrated_at", "drawn_numbers", "refuse_undrawn", "unknown_of"]
 
@@ -49,6 +49,7 @@ def unknown_of(rig: Described, pivots: int, uncertain: Collection[str] = ()) -> 
     """
     found = () if rig.calibration is None else tuple(rig.calibration.priors)
     said = of_pivots({name: value for name, value in rig.said.items() if name not in found}, pivots)
+    said = of_modes(said, rig.rod or Rod())
     refuse_undrawn(said)
     hidden = {name for name in uncertain if not rig.is_named(name)}
     drawn = {*found, *(name for name, value in said.items() if not isinstance(value, float))}

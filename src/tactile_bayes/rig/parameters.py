@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
-from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, STEEPEST_TAPER
 
 __all__ = [
     "BASE",
@@ -169,6 +169,17 @@ _ROWS = (
         of_moment=-1,
     ),
     Parameter("rest_curvature", "mean curvature of the unloaded rod", "1/m", "normal", 0.05, None, of_length=-1),
+    *(
+        Parameter(
+            f"rest_shape_{k}",
+            f"amplitude of mode {k} of the rest curvature, in standard deviations of its trace",
+            "1",
+            "normal",
+            1.0,
+            hidden="unless the rod was traced",
+        )
+        for k in range(1, MOST_MODES + 1)
+    ),
     Parameter("taper", "part by which the diameter falls to the tip", "1", "normal", 0.05, None, 0.0, STEEPEST_TAPER),
     Parameter(
         "stem",
@@ -256,12 +267,13 @@ GROUPS = {
     **{what: tuple(f"{channel}_{what}" for channel in _CHANNELS) for what in ("bias", "drift", "gain")},
     "lever": ("lever_x", "lever_y"),
     "moment_curve": ("moment_curve_quadratic", "moment_curve_cubic"),
+    "rest_shape": tuple(f"rest_shape_{k}" for k in range(1, MOST_MODES + 1)),
     "gauge": ("gauge_x", "gauge_y"),
     "discrepancy": ("discrepancy_scale", "discrepancy_length"),
 }
 """Names that stand for several parameters; "base" stands for the shifts of all pivots but the first."""
 
-STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
+STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction", "rest_shape")
 """What is unknown of a real rig, unless it is said to be known."""
 
 MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem")

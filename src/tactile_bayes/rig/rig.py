@@ -21,7 +21,7 @@ from tactile_bayes.record import rod_of, validate
 from tactile_bayes.rig.drawn import drawn_numbers
 from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.measured import measured_by
-from tactile_bayes.rig.parameters import STANDARD, members
+from tactile_bayes.rig.parameters import GROUPS, STANDARD, members
 from tactile_bayes.rig.rig_file import named_in_errors, read_tables, stated_in, tables_of, text_of, write_file
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import DEFAULT, Unknown, checked_unknown, expanded
@@ -29,7 +29,7 @@ from tactile_bayes.tasks.documents import read_toml
 
 __all__ = ["Rig", "rig_of", "rod_with"]
 
-_SHAPE = ("rest_curvature", "taper", "stem", "length")
+_SHAPE = ("rest_curvature", "taper", "stem", "length", *GROUPS["rest_shape"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +50,8 @@ class Rig:
         Parameters of the rig, or groups of them (`tactile-bayes rig --parameters` lists them), in the units of the
         record: a number is known; a frozen distribution of scipy.stats is unknown, and "default" stands for the default
         distribution. What is not named is unknown if it is unknown of a real rig: `rigidity_scale`,
-        `drive_angle_offset`, `bias`, `lever`, `backlash` and `friction`, each where the record shows it; everything
-        else is as stated. "nothing": all is as stated, without friction.
+        `drive_angle_offset`, `bias`, `lever`, `backlash`, `friction` and, of a traced rod, `rest_shape`, each where the
+        record shows it; everything else is as stated. "nothing": all is as stated, without friction.
     calibration : RigPrior, optional
         Joint distribution of parameters that a known object has shown, from `calibrate_rig`.
     file : FileFormat or mapping
@@ -308,6 +308,7 @@ def rig_of(rig: Rig | None) -> Rig:
 
 def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
     """Return a rod of the shape that unknowns of the rig by name give it, others than those of shape without effect."""
-    length = rig.get("length", rod.length)
+    names = GROUPS["rest_shape"][: len(rod.rest_shape_modes)]
+    rod, length = rod.shaped([rig.get(name, 0.0) for name in names]), rig.get("length", rod.length)
     curvature = rig.get("rest_curvature", rod.mean_rest_curvature * rod.length / length)
     return rod.reshaped(curvature, rig.get("taper", rod.taper), rig.get("stem"), length)

@@ -17,7 +17,7 @@ from tactile_bayes.distributions import distribution_of_table, table_of_distribu
 from tactile_bayes.errors import ParameterError, TactileBayesError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import SEVERAL
-from tactile_bayes.mechanics.rods.along import Along
+from tactile_bayes.mechanics.rods.along import text_along
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.points import read_points
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
@@ -59,7 +59,7 @@ ROD_UNITS = {
     "stem": "m",
 }
 TABLES = {
-    "rod": (*ROD_UNITS, "rigidity_profile", "shape"),
+    "rod": (*ROD_UNITS, "rigidity_profile", "rest_shape_modes", "shape"),
     "load_cell": ("frame", *LOAD_CELL_UNITS, *SEVERAL),
     "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), "split_sweeps", "missing"),
     "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
@@ -118,6 +118,12 @@ def text_of(tables: Mapping[str, Any]) -> str:
     )
 
 
+def _table_of_rod(rod: Rod) -> dict[str, Any]:
+    usual = {"length": 1.0, "flexural_rigidity": 1.0} if rod.is_dimensionless else {}
+    given = {name: getattr(rod, name) for name in TABLES["rod"] if hasattr(rod, name)}
+    return {n: text_along(v) for n, v in given.items() if v not in (None, ()) and v != usual.get(n, 0.0)}
+
+
 def tables_of(
     rod: Rod | None,
     load_cell: LoadCell | None,
@@ -128,10 +134,7 @@ def tables_of(
     """Return the tables that state the arguments of `Rig`; the inverse of `stated_in`."""
     tables: dict[str, Any] = {}
     if rod is not None:
-        usual = {"length": 1.0, "flexural_rigidity": 1.0} if rod.is_dimensionless else {}
-        given = {name: getattr(rod, name) for name in TABLES["rod"] if hasattr(rod, name)}
-        texts = {name: value.text if isinstance(value, Along) else value for name, value in given.items()}
-        tables["rod"] = {n: v for n, v in texts.items() if v is not None and v != usual.get(n, 0.0)}
+        tables["rod"] = _table_of_rod(rod)
     if load_cell is not None:
         tables["load_cell"] = load_cell.entries()
     if file.table:
@@ -179,8 +182,7 @@ def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
         for name, unit in ROD_UNITS.items()
         if name in said
     }
-    if "rigidity_profile" in said:
-        numbers["rigidity_profile"] = said["rigidity_profile"]
+    numbers |= {name: said[name] for name in ("rigidity_profile", "rest_shape_modes") if name in said}
     modulus = numbers.pop("youngs_modulus", None)
     if modulus is not None:
         if "flexural_rigidity" in numbers or "diameter" not in numbers:

@@ -13,10 +13,11 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number, check_kind, check_mapping, shown
 from tactile_bayes.distributions import Distribution, check_distribution, frozen
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, STANDARD, members, parameter_named
 
-__all__ = ["DEFAULT", "NOTHING", "Unknown", "checked_unknown", "expanded", "of_pivots", "pivot_shifts"]
+__all__ = ["DEFAULT", "NOTHING", "Unknown", "checked_unknown", "expanded", "of_modes", "of_pivots", "pivot_shifts"]
 
 Unknown = float | Distribution | Literal["default"]
 """What is said of a parameter: a number if it is known, a distribution, or "default" for its default distribution."""
@@ -48,6 +49,18 @@ def of_pivots(said: Mapping[str, Unknown], pivots: int) -> dict[str, Unknown]:
         else:
             every[name] = value
     return {n: v for n, v in every.items() if (shift := BASE.fullmatch(n)) is None or int(shift[1]) <= pivots}
+
+
+def of_modes(said: Mapping[str, Unknown], rod: Rod) -> dict[str, Unknown]:
+    """Return what is said of each parameter, without amplitudes of modes that a rod does not have."""
+    absent = GROUPS["rest_shape"][len(rod.rest_shape_modes) :]
+    for name in absent:
+        if said.get(name, DEFAULT) not in (DEFAULT, 0.0):
+            raise ParameterError(
+                f"{name} is said to be other than 0, and the rod has {len(rod.rest_shape_modes)} modes of its rest "
+                "curvature: only a rod that was traced has them (Rod.from_shape, or shape under [rod])"
+            )
+    return {name: value for name, value in said.items() if name not in absent}
 
 
 def pivot_shifts(known: Mapping[str, float], pivots: int) -> Floats:

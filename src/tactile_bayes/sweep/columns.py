@@ -65,5 +65,7 @@ def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Fl
 
 
 def phases_of(paths: Paths) -> list[str]:
-    """Phases of every sweep in order, as "A-B-A" (A is tip contact, B tangential); "" for a sweep without contact."""
-    return ["-".join("A" if tip else "B" for tip in to_tip) for to_tip in paths.changes_to_tip()]
+    """Phases of every sweep in order, as "A-B-A": A is tip contact and B tangential; "a" and "b", contact that sticks;
+    "" without any."""
+    names = {(True, False): "A", (False, False): "B", (True, True): "a", (False, True): "b"}
+    return ["-".join(names[one.tip, one.sticks] for one in of_path) for of_path in paths.modes()]

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from tactile_bayes.mechanics.branches.line import lines_through
-from tactile_bayes.mechanics.paths import Paths
+from tactile_bayes.mechanics.paths import Mode, Paths
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Direction, Drive
@@ -24,11 +24,15 @@ class Event:
     Attributes
     ----------
     kind : str
-        At first contact "tip" or "tangential"; at a change "tip → tangential" and so on; at snap-off "fold" (a smooth
-        maximum of the drive angle, or of the travel), "corner" (a maximum where the phase changes or the contour's
-        curvature jumps) or "thrust" (the line of force passes through the pivot). A rod that is curved or carried
-        may also leave the contour without a jump ("release"), and one that is carried still touch it at the end of the
-        drive ("never").
+        At first contact "tip" or "tangential". At a change "tip → tangential" and so on; "stick" where the slip
+        vanishes and friction holds the contact, and "slip right" or "slip left" where it no longer does, after the
+        sense in which the rod then slips along the contour. At snap-off "fold" (a smooth maximum of the drive angle, or
+        of the travel), "corner" (a maximum where the phase changes or the contour's curvature jumps), "thrust" (the
+        line of force passes through the pivot) or "jump" (friction lets the contact neither slide nor stick). A rod
+        that is curved or carried may also leave the contour without a jump ("release"), and one that is carried still
+        touch it at the end of the drive ("never").
+    phase : str
+        Contact from then on, "tip" or "tangential"; at snap-off, up to then.
     travel : float
         Position along the drive: the drive angle of a rotation [rad], or the distance moved by the base [length].
     drive_angle, slope_angle : float
@@ -42,6 +46,7 @@ class Event:
     """
 
     kind: str
+    phase: str
     travel: float
     drive_angle: float
     base_x: float
@@ -67,14 +72,10 @@ class SweepEvents:
         The pivot, or where the drive begins [length].
     first_contact, snap_off : Event
     transitions : tuple of Event
-        Changes of the phase, in their order.
+        Changes of the phase, and of sliding and sticking, in their order.
     clear : bool
         Whether the unloaded rod is clear of the object after snap-off. If it is not, the rod comes to rest in another
         contact, which no sweep reaches.
-    slides_from : float
-        Travel from which friction opposes the slip. It is that of first contact, unless a rod turns about a pivot that
-        is curved toward the object: with friction it sticks there at first, which is not modelled, and no samples of
-        its contact before this travel are recorded.
     touches_again : float
         Travel at which a drive that carries the base brings the rod, clear after snap-off, to the object again
         [length], and beyond which its state is not computed; NaN if it does not.
@@ -88,7 +89,6 @@ class SweepEvents:
     transitions: tuple[Event, ...]
     snap_off: Event
     clear: bool
-    slides_from: float
     touches_again: float
     largest_strain: float
 
@@ -100,18 +100,30 @@ class SweepEvents:
         return hash(repr(self))
 
 
+_PHASES = {True: "tip", False: "tangential"}
+
+
+def _change(before: Mode, after: Mode) -> str:
+    """Name of a change between two parts of a path."""
+    if before.tip != after.tip:
+        return f"{_PHASES[before.tip]} → {_PHASES[after.tip]}"
+    return "stick" if after.sticks else f"slip {'right' if after.to_right else 'left'}"
+
+
 def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> SweepEvents:
-    phases = ["tip" if tip else "tangential" for tip in paths.changes_to_tip()[0]]
-    index = np.zeros(len(phases) + 1, dtype=np.intp)
-    states = paths.event_states().take(index, np.arange(index.size))
+    modes = paths.modes()[0]
+    held = [0] if modes[0].sticks else []
+    order = np.array([0, *held, *range(1, len(modes) + 1)])
+    index = np.zeros(order.size, dtype=np.intp)
+    states = paths.event_states().take(index, order)
     columns = to_lab_frame(paths.sweep_frame, index, states, rod)
     if np.any(paths.sweeps.compliance):  # the rod at its base has another direction than the drive
-        driven = paths.drive_angles_at(paths.event_travels()[0, : index.size])
+        driven = paths.drive_angles_at(paths.event_travels()[0, order])
         columns["drive_angle"] = np.pi - driven if direction == "backward" else driven
     clear, again = bool(paths.is_clear()[0]), np.nan
     if isinstance(drive, Carried):
         internal = lines_through(drive.poses, rod.length, backward=direction == "backward").travels
-        columns["travel"] = np.interp(paths.event_travels()[0, : index.size], internal, drive.travels)
+        columns["travel"] = np.interp(paths.event_travels()[0, order], internal, drive.travels)
         if paths.clear_angle[0] > paths.snap_angle[0]:
             clear, again = True, float(np.interp(paths.clear_angle[0], internal, drive.travels))
         columns["base_x"], columns["base_y"], _ = drive.at(columns["travel"]).T
@@ -119,15 +131,17 @@ def events_of(paths: Paths, direction: Direction, drive: Drive, rod: Rod) -> Swe
     else:
         base, columns["travel"] = drive.base, columns["drive_angle"]
         columns["base_x"], columns["base_y"] = (np.full(index.size, value) for value in base)
-    slides = float(columns["travel"][0])
-    if paths.slides_from is not None:
-        slides = np.pi - paths.slides_from if direction == "backward" else paths.slides_from
     kinds = [
-        phases[0],
-        *(f"{before} → {after}" for before, after in pairwise(phases)),
+        _PHASES[modes[0].tip],
+        *("stick" for _ in held),
+        *(_change(before, after) for before, after in pairwise(modes)),
         SnapOff(int(paths.snap_off[0])).name.lower(),
     ]
-    names = [name for name in Event.__dataclass_fields__ if name != "kind"]
-    found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
+    phases = [_PHASES[modes[min(k, len(modes) - 1)].tip] for k in order]
+    names = [name for name in Event.__dataclass_fields__ if name not in ("kind", "phase")]
+    found = [
+        Event(kind, phase, **{name: float(columns[name][i]) for name in names})
+        for i, (kind, phase) in enumerate(zip(kinds, phases, strict=True))
+    ]
     strain = float(paths.largest_curvature[0]) * 0.5 * rod.diameter / rod.length
-    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, slides, again, strain)
+    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, again, strain)

@@ -15,7 +15,7 @@ from tactile_bayes.errors import ContourError, ParameterError, ReachError, Tacti
 from tactile_bayes.mechanics.branches.line import lines_through
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.paths import Paths, trace
-from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Direction
@@ -28,24 +28,11 @@ _SAME = 1e-9
 """Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: its side
 is then the one to which it is turned less."""
 
-_LOOKS = 400
-"""Travels from first contact to snap-off at which contacts are compared to find the sense of the slip."""
-
-_ROUNDING = 1e-12
-"""Slip between two of them [L] that rounding may cause."""
-
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
 """Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
 of the object on one side seems to have passed it on the other."""
 
 _FREE = "without friction the rod has a path (friction = 0 under [unknown] of rig.toml); with it, "
-
-_SLIDING = (
-    "split a drive that turns back while the rod is in contact into drives that go one way, or take another heading or "
-    "drive angle",
-    "take a rod that is less curved toward the object, the other direction, or another pivot",
-)
-"""What to do where friction would hold a rod that is carried, and one that turns about a pivot."""
 
 _IN_CONTACT: dict[Reachability, tuple[type[TactileBayesError], str]] = {
     Reachability.GRAZES: (
@@ -93,7 +80,7 @@ def sweep_paths(
     """Compute the exact path of one sweep along one contour, or raise an error that says why there is none.
 
     Parameters and errors are those of `scan`, with one pivot and one direction, and the compliance of the suspension
-    [rad/(EI/L)]. Friction opposes the slip all along the path, or from `Paths.slides_from` on.
+    [rad/(EI/L)].
     """
     rod = Rod() if rod is None else rod
     sweep_frame = to_sweep_frame(contour, base, direction, rod)
@@ -105,10 +92,6 @@ def sweep_paths(
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
     paths = rotated_paths(sweep_frame, *rubbing, drive_angles)
-    if paths.reach[0] == Reachability.STICKS:
-        assumed = rotated_paths(sweep_frame, *rubbing, drive_angles, asks_sliding=False)
-        if assumed.reach[0] == Reachability.TOUCHES and np.isfinite(begin := _slides_from(assumed)):
-            paths = replace(assumed, slides_from=begin)
     _refuse(paths, contour, rod, direction, f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})")
     return paths
 
@@ -120,7 +103,6 @@ def rotated_paths(
     compliance: float,
     drive_angles: Floats | None,
     *,
-    asks_sliding: bool = True,
     polished: bool = True,
 ) -> Paths:
     """Follow the paths of a rod that turns in one direction, with states at drive angles in the laboratory frame."""
@@ -132,30 +114,8 @@ def rotated_paths(
         suspension_compliance=compliance,
         profile=rod.profile,
         drive_angles=drive_angles,
-        asks_sliding=asks_sliding,
         polished=polished,
     )
-
-
-def _slides_from(paths: Paths) -> float:
-    """Return the travel in the sweep frame from which friction opposes the slip along one path; NaN if it does not.
-
-    A rod that is curved toward the object is first straightened, and slides outward: friction has the wrong sense up to
-    there. A state of sliding has no memory, so that those after it are right.
-    """
-    travels = np.linspace(paths.first_angle[0], paths.snap_angle[0], _LOOKS + 1)
-    states = paths.states(np.zeros(travels.size, dtype=np.intp), travels)
-    frame, alpha = paths.sweep_frame, states.slope_angle
-    standoff = float(np.max(frame.standoff)) / float(np.max(frame.length))
-    middle, arclength = 0.5 * (alpha[1:] + alpha[:-1]), states.wrench.contact_arclength
-    moved = np.diff(states.x + standoff * np.sin(alpha)) * np.cos(middle)
-    moved += np.diff(states.y - standoff * np.cos(alpha)) * np.sin(middle)
-    lying = states.wrench.phase == TANGENTIAL
-    wrong = moved - np.where(lying[1:] & lying[:-1], np.diff(arclength), 0.0) > _ROUNDING
-    if not wrong.any():
-        return float(travels[0])
-    last = int(np.flatnonzero(wrong)[-1])
-    return float(travels[last + 2]) if wrong[: last + 1].all() and last + 2 < _LOOKS else np.nan
 
 
 def carried_paths(
@@ -221,14 +181,12 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 f"{sweep} the rod does not touch the contour: bring them closer together, or carry the rod farther "
                 "(are contour, drive and rod in one unit?)"
             )
-        case Reachability.STICKS:
-            free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)
-            is_free = Reachability(int(free.reach[0])) is Reachability.TOUCHES
+        case Reachability.HEAD_ON:
             raise ReachError(
-                f"{sweep} friction would hold the contact at {_point(paths)}: the rod would have to slide the other "
-                "way there, or would not slide at first, and sticking is not modelled; "
-                + (_FREE if is_free else "")
-                + _SLIDING[not is_carried]
+                f"{sweep} friction lets the rod neither slide nor yield at {_point(paths)}, where it meets the object "
+                "head-on, as a strut that buckles to either side; "
+                + (_FREE if _is_free(paths, rod) else "")
+                + "take another heading or drive angle, or another pivot"
             )
         case Reachability.TOO_FAR:
             raise ReachError(
@@ -249,7 +207,7 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
             )
         case Reachability.ENDS:
             raise ContourError(
-                f"{sweep} the rod would first touch beyond {_end(contour, direction == 'forward')}, "
+                f"{sweep} the rod would touch beyond {_end(contour, direction == 'forward')}, "
                 "and nothing is known of the object there: extend the contour, or move the pivot"
             )
         case Reachability.RUNS_OUT:
@@ -257,6 +215,12 @@ def _refuse(paths: Paths, contour: Contour, rod: Rod, direction: Direction, swee
                 f"{sweep} the rod would still touch at {_end(contour, direction == 'backward')}, and "
                 "nothing is known of the object beyond: extend the contour, or move the pivot"
             )
+
+
+def _is_free(paths: Paths, rod: Rod) -> bool:
+    """True if there is a path without friction."""
+    free = trace(paths.sweep_frame, profile=rod.profile, lines=paths.lines)
+    return Reachability(int(free.reach[0])) is Reachability.TOUCHES
 
 
 def _point(paths: Paths) -> str:

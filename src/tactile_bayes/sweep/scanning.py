@@ -220,9 +220,7 @@ def scan(
         with its surface. What is not known is as stated, without friction, which is at most 0.84. Errors of load cell
         and encoder change no load: `Rig.measure` applies them. The record states the rod with these deviations, so that
         one without a length whose stiffness or length deviates makes it SI, of a rod of about 1 m; `Rig.measure` states
-        the data sheets again, and `LoadCell.measure` does not. With friction, a rod that turns about a pivot and is
-        curved toward the object sticks at first, which is not modelled: these samples are left out
-        (`SweepEvents.slides_from`).
+        the data sheets again, and `LoadCell.measure` does not. With friction the contact slides or sticks.
     drive : Rotation, Translation or Motion, or a sequence of them, optional
         Path of the base. The sweeps of several drives (a support that is moved, or an array of whiskers) are numbered
         consecutively. The grid of a rotation consists of multiples of its step, from 15 steps before contact to 15
@@ -250,8 +248,7 @@ def scan(
     ------
     ReachError
         If the rod is too short to touch the contour, its tip folds over until the other side of the rod touches, or
-        friction would hold the contact: where a drive turns back while the rod is in contact, where a tip that is
-        carried head-on does not slide at first, and where the sense of sliding changes along the path.
+        a straight rod meets the object head-on with friction, and buckles.
     ContourError
         If the pivot is not below the contour or too close to it, the rod would touch beyond an end of it, or a rod that
         is curved toward the contour would touch it twice.
@@ -385,8 +382,7 @@ def _within_a_turn(drive: Rotation, every: Floats, sweep: SweepEvents) -> Index:
             ClearanceWarning,
             stacklevel=4,
         )
-    sticks = (sense * (angles - first) >= 0.0) & (sense * (sweep.slides_from - angles) > 0.0)
-    return np.asarray(chosen[kept & ~sticks][:: int(sense)])
+    return np.asarray(chosen[kept][:: int(sense)])
 
 
 def _floats(values: ArrayLike) -> Floats:

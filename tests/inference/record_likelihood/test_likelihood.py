@@ -481,6 +481,27 @@ def test_loads_of_rods_that_vary_are_within_1e_5_of_the_largest(name):
     assert np.all((np.abs(loads - exact) <= slack)[both])
 
 
+def test_a_rod_with_amplitudes_of_its_modes_is_the_rod_that_has_this_curvature():
+    """Exactly, and by a table to what the noise allows; also where the mean of the curvature is another."""
+    modes = (lambda s: 0.05 * (1.0 - s) ** 3, lambda s: 0.02 * s, lambda s: 0.01 * np.cos(6.0 * s))
+    rod, rng, count = Rod(rest_curvature=0.2, rest_shape_modes=modes), np.random.default_rng(3), 6
+    record = CELL.measure(with_rod(swept(Parabola(0.5, 0.6), step=0.05), rod), rng=1)
+    drawn = Parabola(*rng.uniform([0.4, 0.5, -0.05], [0.6, 0.7, 0.05], (count, 3)).T)
+    rig = RigValues(friction=rng.uniform(0.0, 0.3, count), rest_shape=rng.normal(size=(count, 3)))
+    by_table, exactly = (RecordLikelihood(record, CELL, exact=exact) for exact in (False, True))
+    found, exact = (of.log_likelihood(drawn, rig=rig) for of in (by_table, exactly))
+    assert all(table is not NO_TABLE for table in by_table._tables.made.values())
+    np.testing.assert_allclose(found, exact, rtol=1e-4, atol=0.05)
+    exact = exactly.log_likelihood(drawn, rig=rig._replace(rest_curvature=0.02))
+    for k, z in enumerate(rig.rest_shape):
+        shaped = rod.shaped(z)
+        own = RecordLikelihood(
+            with_rod(record, shaped.reshaped(shaped.mean_rest_curvature + 0.02, 0.0)), CELL, exact=True
+        )
+        one = own.log_likelihood(drawn.take(np.array([k])), rig=RigValues(friction=rig.friction[[k]]))
+        np.testing.assert_allclose(one, exact[k], rtol=1e-9)
+
+
 def test_a_drive_that_repeats_itself_is_followed_once_and_has_one_discrepancy():
     """Two sweeps through the same poses, and the same with the second further on by less than what matters."""
     there, contour = Translation((0.8, 0.0), np.pi, 1.2, 1.6, 0.05), Circle(0.3, 0.8)

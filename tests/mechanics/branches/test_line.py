@@ -125,7 +125,7 @@ def test_a_rotation_is_a_line_along_the_drive_angle(contour, backward):
     assert as_line.first_angle == pytest.approx(turned.first_angle, abs=1e-12)
     assert as_line.snap_angle == pytest.approx(turned.snap_angle, abs=1e-12)
     np.testing.assert_allclose(as_line.sampled, turned.sampled, atol=1e-9)
-    assert as_line.changes_to_tip() == turned.changes_to_tip()
+    assert as_line.modes() == turned.modes()
     assert as_line.is_clear() == turned.is_clear()
 
 
@@ -212,17 +212,20 @@ def test_a_rod_that_is_drawn_back_is_released_without_a_jump():
     assert ways[last] <= paths.snap_angle[0] < ways[last + 1]
 
 
-def test_friction_opposes_the_slip_and_may_hold_the_contact():
+def test_friction_opposes_the_slip_and_holds_the_contact_where_the_drive_turns_back():
     contour = Circle(0.3, 0.8)
-    ways = np.linspace(0.0, 1.7, 100)
-    forward = carried(contour, SHIFT, ways, friction=0.2)
-    assert forward.reach[0] == Reachability.TOUCHES
-    # Drawn back, the contact would have to slide the other way.
     poses = np.array([[0.9, 0.0, 1.1], [-0.3, 0.0, 1.1], [0.9, 0.0, 1.1]])
     without = carried(contour, poses)
     assert without.snap_off[0] == SnapOff.RELEASE
     assert without.snap_angle[0] == pytest.approx(2.4 - without.first_angle[0], abs=1e-9)
-    assert carried(contour, poses, friction=0.2).reach[0] == Reachability.STICKS
+    rubbed = carried(contour, poses, np.linspace(0.0, 2.4, 481), friction=0.2)
+    there, back = (rubbed.sampled[0, part] for part in (slice(0, 240), slice(241, None)))
+    there, back = there[there[:, 0] > 0.0], back[back[:, 0] > 0.0]
+    assert np.all(there[:, 12] == 0.2)
+    assert rubbed.snap_off[0] == SnapOff.RELEASE
+    assert [mode.sticks for mode in rubbed.modes()[0]].count(True) == 1
+    assert np.all(np.diff(back[:, 12]) <= 0.0)
+    assert back[-1, 12] == -0.2
 
 
 def test_a_backward_sweep_is_the_mirror_image():

@@ -11,6 +11,7 @@ from tactile_bayes.mechanics.poses import beam, forward_table, taylor
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLE, Box
 from tactile_bayes.mechanics.poses.forward_table import forward_table as tabulated
 from tactile_bayes.mechanics.rods.profile import profile_of
+from tactile_bayes.mechanics.rods.rod import Rod
 
 _beam_of, _beam_pose, _chord_to, _prepare = beam.beam_of, beam.beam_pose, beam.chord_to, forward_table.prepare
 _Varied, _mirrored_beam = beam.Varied, beam.mirrored_beam
@@ -108,6 +109,17 @@ def test_poses_of_rods_between_nodes_and_at_the_ends_of_ranges(sign):
     table = tabulated(profile, Box((0.35, 0.65), (-0.2, 0.2), (0.0, 0.5)))
     for taper, bend, delta in ((0.35, 0.2, 0.0), (0.65, -0.2, 0.5), (0.41, 0.07, 0.2), (0.6, 0.0, 0.01)):
         compared(profile._replace(taper=taper, bend=bend, sign=sign), table, delta)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_poses_of_a_rod_with_modes(sign):
+    """Within the ball of amplitudes; beyond it there is no table."""
+    modes = [lambda s: 0.06 * (1.0 - s) ** 4, lambda s: 0.04 * (s - 0.2), lambda s: 0.03 * np.cos(6.0 * s)]
+    profile = Rod(rest_curvature=lambda s: 0.15 + 0.5 * s, rest_shape_modes=modes).profile._replace(sign=sign)
+    table = tabulated(profile, Box((0.0, 0.0), (0.0, 0.0), (0.0, 0.5), 4.5))
+    for shape in ((0.0, 0.0, 0.0), (4.4, 0.0, 0.0), (-2.5, 2.5, -2.5), (1.0, -4.0, 1.5)):
+        compared(profile.shaped(np.array(shape)), table, 0.2)
+    assert not poses(profile.shaped(np.array([3.0, 3.0, 3.0])), table, 0.2, [0.1], [1.0], [1.0], True)[0]
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ def test_numbers_are_constant():
     assert profile.edges.tolist() == [0.0, 1.0]
     assert profile.curvature.tolist() == [[0.3], [0.3]]
     assert profile.rigidity.tolist() == [[1.0], [1.0]]
-    assert profile[3:] == (0.5, 0.0, 1.0)
+    assert profile[3:6] == (0.5, 0.0, 1.0)
 
 
 @pytest.mark.parametrize(

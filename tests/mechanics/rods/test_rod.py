@@ -158,12 +158,13 @@ def test_a_traced_rod_is_the_one_that_was_traced(turned):
     assert own.mean_rest_curvature == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_rod_that_slips_off_at_once_is_refused_as_such():
-    """Its tip is turned beyond the normal of the contour where it first touches: a right angle to the tangent."""
+def test_a_tip_beyond_the_normal_slips_off_or_is_held():
+    """It is turned by more than a right angle to the tangent of the contour where it first touches."""
     contour, rod = tb.contours.Circle(0.7992, 0.7331, -0.7511), tb.Rod(rest_curvature=1.5)
-    with refused(tb.errors.ReachError, "slips off", "forward sweep", "beyond the normal"):
-        tb.scan(contour, rig=Rig(rod=rod, unknown={"friction": 0.4}), direction="forward")
-    many = tb.scan_many(
-        contour.broadcast_to((2,)), [1.5], rig=Rig(rod=rod, unknown={"friction": 0.4}), direction="forward"
+    slips, held = (
+        tb.scan(contour, rig=Rig(rod=rod, unknown={"friction": friction}), direction="forward").sweeps[0]
+        for friction in (0.2, 0.3)
     )
-    assert many.status.values.tolist() == ["slips off at once"] * 2
+    assert slips.snap_off.kind == "release"
+    assert [change.kind for change in held.transitions] == ["stick"]
+    assert held.snap_off.drive_angle > slips.snap_off.drive_angle + 1.0

@@ -177,7 +177,7 @@ def density_of(
     measured: xr.Dataset, cell: LoadCell, friction: float, prior: ContactPrior
 ) -> tuple[ContactDensity, Index]:
     """Return the density of the loaded samples, and their numbers."""
-    samples = with_likelier_senses(samples_of(measured, cell), measured, friction)
+    samples = with_likelier_senses(samples_of(measured, cell), measured, cell, friction)
     if cell.degrees_of_freedom <= 2.0:  # proposals take a covariance
         about = samples_of(measured, replace(cell, degrees_of_freedom=np.inf))
         samples = samples._replace(reading=about.reading)
@@ -191,9 +191,12 @@ def density_of(
     loaded = np.flatnonzero(samples.loaded & ~samples.cut_off)
     senses = np.unique(samples.sense[loaded])
     if senses.size > 1:
-        raise ParameterError("the rod slides along the object both ways, in different sweeps: give them one by one")
+        raise ParameterError(
+            "the rod slides along the object both ways, on different ways of the drive: give them one by one, each "
+            "as a sweep of its own"
+        )
     sense = float(senses[0]) if senses.size else 1.0
-    delta = sense * rod.surface.friction_angle(float(np.arctan(friction)))
+    delta = rod.surface.friction_angle(sense * float(np.arctan(friction)))
     return ContactDensity(samples, readings, base, turning=turning, delta=delta, prior=prior).take(loaded), loaded
 
 

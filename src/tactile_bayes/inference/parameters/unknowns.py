@@ -18,10 +18,11 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.blocks import elapsed_in
 from tactile_bayes.load_cell.curve import curved
 from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import bases_of, carried_sweeps, present_channels, rod_of
 from tactile_bayes.rig.parameters import BASE, GROUPS, PARAMETERS, parameter_named
 from tactile_bayes.rig.stated import Stated, stated_values, unit_of
-from tactile_bayes.rig.unknown import Unknown, of_pivots
+from tactile_bayes.rig.unknown import Unknown, of_modes, of_pivots
 
 if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
@@ -88,10 +89,15 @@ class Unknowns:
         off: dict[str, Any] = {"friction": 0.0}
         if "length" in values:
             off["length"] = values["length"] / self.rod.length
+        modes = dict(zip(GROUPS["rest_shape"], self.rod.rest_shape_modes, strict=False))
+        if shaped := [name for name in modes if name in values]:
+            off["rest_shape"] = np.zeros((len(values[shaped[0]]), len(GROUPS["rest_shape"])))
+            for name in shaped:
+                off["rest_shape"][:, GROUPS["rest_shape"].index(name)] = values[name]
         if "rest_curvature" in values:
             longer = off.get("length", 1.0)  # the rod of another length has the stated turn from base to tip
-            bent = longer * values["rest_curvature"] - self.rod.mean_rest_curvature
-            off["rest_curvature"] = bent / self.units["rest_curvature"]
+            mean = self.rod.mean_rest_curvature + sum(modes[name].mean * values[name] for name in shaped)
+            off["rest_curvature"] = (longer * values["rest_curvature"] - mean) / self.units["rest_curvature"]
         if "taper" in values:
             off["taper"] = values["taper"] - self.rod.taper
         if "stem" in values:
@@ -181,7 +187,7 @@ def unknowns_of(measured: xr.Dataset, rig: Rig, cell: LoadCell, *, gauge: bool =
         joint = joint.without([name for name in joint.priors if not _is_shown(name, present)])
     of_joint = {} if joint is None else dict(joint.priors)
     said = {name: v for name, v in rig.said.items() if name not in (*of_joint, *_OF_NOISE)}
-    said = of_pivots(said, pivots)
+    said = of_modes(of_pivots(said, pivots), rod)
     names = (*_unknown_names(said, measured, rig, cell, present, gauge, of_joint), *of_joint)
     if "stem" in names:
         _refuse_shifted_stem(measured, names, gauge)
@@ -236,10 +242,26 @@ def _hidden(measured: xr.Dataset, rig: Rig, cell: LoadCell, present: Sequence[st
                 raise ParameterError(
                     f"{name} is in the load cell's bias_uncertainty already, and integrated out: leave one of the two"
                 )
+    hidden |= _hidden_backlash(measured, rig, cell)
+    return hidden
+
+
+def _hidden_backlash(measured: xr.Dataset, rig: Rig, cell: LoadCell) -> set[str]:
+    """Return the backlash where no drive, or only one way, shows it, or friction makes loads depend on a history."""
     turned = measured.direction.values[~np.isin(measured.sweep.values, carried_sweeps(measured))]
     if turned.size == 0 or (len(np.unique(turned)) == 1 and not rig.is_named("backlash")):
-        hidden.add("backlash")
-    return hidden
+        return {"backlash"}
+    if rig.said.get("friction", 0.0) == 0.0:
+        return set()
+    turned_back = turned_sweeps(measured, cell)
+    if not turned_back:
+        return set()
+    if rig.is_named("backlash"):
+        raise ParameterError(
+            f"backlash cannot be inferred beside friction where a drive turns back in contact, as in sweep "
+            f"{min(turned_back)}: state the backlash of the encoder (drive_angle_backlash of the load cell)"
+        )
+    return {"backlash"}
 
 
 def deviating(known: Mapping[str, float], unknown: Collection[str], rod: Rod, cell: LoadCell) -> dict[str, float]:

@@ -25,7 +25,7 @@ from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.mechanics.branches.sweeps import Shapes, Solutions, Sweeps, shapes_of, solve_sweeps
 from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.mechanics.reachability import Reachability
-from tactile_bayes.mechanics.rods.profile import Profile
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 from tactile_bayes.record import CHANNELS, frame_of, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
@@ -48,7 +48,8 @@ class RecordLikelihood:
 
     Contours are in the record's unit of length, loads inside in EI/L and EI/L², forces in the record's frame. With
     `exact`, paths are so to rounding; otherwise as the noise requires, at a fifth of the cost. Unless
-    `is_always_clear`, contours that the unloaded rod is not clear of after snap-off are excluded.
+    `is_always_clear`, contours that the unloaded rod is not clear of after snap-off are excluded. Friction acts if it
+    is stated, or if the rod `rubs` on the object with that of a rig.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class RecordLikelihood:
         friction: float = 0.0,
         exact: bool = False,
         is_always_clear: bool = True,
+        rubs: bool = False,
     ) -> None:
         self.exact = exact
         self.is_always_clear = is_always_clear
@@ -76,9 +78,9 @@ class RecordLikelihood:
             )
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
         self.noise = self.load_cell.noise
-        self.segments = RecordSegments(measured, load_cell)
+        self.segments = RecordSegments(measured, load_cell, rubs or friction > 0.0)
         self._turn = self.segments.drive_angles if frame_of(record) == "turning" else None
-        self._tables = RodTables(self.rod, friction, self.segments.is_carried)
+        self._tables = RodTables(self.rod, friction, self.segments.has_history)
 
     @property
     def noise(self) -> Floats:
@@ -117,12 +119,13 @@ class RecordLikelihood:
 
     def _in_sweep_frame(self, contours: Contour, sweeps: Sweeps) -> SweepFrame:
         every, standoff = contours.take(sweeps.contour), 0.5 * self.rod.diameter
-        of_rod = sweeps.rest_curvature, sweeps.taper, sweeps.stem
+        of_rod = sweeps.rest_curvature, sweeps.taper, sweeps.stem, 0.0, sweeps.rest_shape
         return SweepFrame(every, sweeps.base_x, sweeps.base_y, sweeps.length, standoff, sweeps.backward, *of_rod)
 
     def _profile(self, rig: RigValues) -> Profile | None:
         """Return the profile of the rod, without what the rig adds to it; None for arcs."""
-        return self._as_profile if self.rod.profile is not None or np.any(rig.taper) else None
+        varies = self.rod.profile is not None or np.any(rig.taper) or np.any(rig.rest_shape)
+        return self._as_profile if varies else None
 
     @cached_property
     def _as_profile(self) -> Profile:
@@ -145,10 +148,9 @@ class RecordLikelihood:
         """Return travels of samples as `paths` takes them, shape (n or 1, samples): drive angles [rad], or ways [L]."""
         sign = self.segments.signs_of_samples
         in_sweep_frame = np.where(sign < 0.0, np.pi - drive_angles, drive_angles)[None]
-        if not self.segments.is_carried:
+        if not self.segments.has_history:
             return np.asarray(in_sweep_frame - sign * self.misread(rig))
-        carried = self.segments.senses[self.segments.of_sample] == 0.0
-        known = carried & np.isfinite(drive_angles)
+        known = (self.segments.senses[self.segments.of_sample] == 0.0) & np.isfinite(drive_angles)
         return np.where(known, self.segments.angles_in_sweep_frame, in_sweep_frame)
 
     def misread(self, rig: RigValues) -> Floats:
@@ -213,7 +215,7 @@ class RecordLikelihood:
     def _events(self, found: Solutions, rig: RigValues) -> Floats:
         """Return readings of the drive angle at first contact and snap-off, in the sweep frame, (n, segments, 2)."""
         events = np.stack([found.first_angle, found.snap_angle], axis=-1).reshape(len(self.segments), -1, 2)
-        misread = 0.0 if self.segments.is_carried else (self.segments.signs * self._misread(rig))[..., None]
+        misread = 0.0 if self.segments.has_history else (self.segments.signs * self._misread(rig))[..., None]
         return np.asarray(events.swapaxes(0, 1) + misread)
 
     def _shapes(self, contours: Contour, sweeps: Sweeps) -> Shapes:
@@ -236,6 +238,7 @@ class RecordLikelihood:
             friction_angle=np.tile(np.arctan(rig.friction), segments),
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale / rig.length, segments),
             rest_curvature=np.tile(curvature + rig.rest_curvature, segments),
+            rest_shape=np.tile(rig.rest_shape, (segments, 1)),
             taper=np.tile(rod.taper + rig.taper, segments),
             stem=np.tile((rod.stem / rod.length + rig.stem) / rig.length, segments),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
@@ -249,7 +252,8 @@ class RecordLikelihood:
         shifts = np.zeros((count, self.segments.pivots.max() + 1, 2))
         if rig.base_shifts is not None:
             shifts[:, : rig.base_shifts.shape[1]] = rig.base_shifts
-        return RigValues._make((*(np.broadcast_to(value, (count,)) for value in rig[:-1]), shifts))
+        shape = np.broadcast_to(0.0 if rig.rest_shape is None else rig.rest_shape, (count, MOST_MODES))
+        return RigValues._make((*(np.broadcast_to(value, (count,)) for value in rig[:-2]), shape, shifts))
 
     def log_likelihood(
         self, contours: Contour, noise_scale: Any = 1.0, rig: RigValues | None = None, *, pointwise: bool = False

@@ -12,8 +12,8 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.discrepancy import Course
 from tactile_bayes.mechanics.branches.line import LINE_COLUMNS, lines_through
 from tactile_bayes.mechanics.branches.sweeps import Segments
-from tactile_bayes.reconstruction import contact_sides
-from tactile_bayes.record import CHANNELS, base_of_sample, carried_sweeps, present_channels, rod_of
+from tactile_bayes.reconstruction import contact_sides, drive_histories, least_turn
+from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of
 
 __all__ = ["RecordSegments", "without_errors"]
 
@@ -21,24 +21,27 @@ _OFF = 1e-6  # distance of recorded poses from a line [L and rad] that is roundi
 _SCATTER = 10.0  # range of drive angles, over the noise of their readings, of a rod that is clamped at one
 # Rotation as a line, with the drive angle as travel.
 _TURNS = np.array([[0.0, 0.0, -0.5 * np.pi, 0.0, 0.0, 1.0, -0.5 * np.pi, 1.5 * np.pi]])
+_FREE = -0.5 * np.pi + 1e-9  # drive angle in the sweep frame from which a rod was turned to where its record begins
 
 
 class RecordSegments:
-    """Sweep segments: samples with one pivot, side of contact and direction of the drive, or carried along one way.
+    """Sweep segments: samples with one pivot, side of contact and direction of the drive, or of one history of it.
 
-    Drive angles are corrected by the data sheet of the load cell. In the frame of a sweep they grow in forward contact;
-    where the drive carries the base, its travel [L] takes their place, in `angles_in_sweep_frame` too.
+    Drive angles are corrected by the data sheet of the load cell. In the frame of a sweep they grow in forward contact.
+    In `angles_in_sweep_frame` the travel takes their place where the drive carries the base [L], and, if the rod `rubs`
+    on the object, where it turns back in contact [rad]: then loads depend on the history of the drive.
     """
 
-    def __init__(self, measured: xr.Dataset, load_cell: LoadCell) -> None:
+    def __init__(self, measured: xr.Dataset, load_cell: LoadCell, rubs: bool = False) -> None:
         angle = measured.drive_angle.values - load_cell.misread(measured.direction.values)
         backward = contact_sides(without_errors(measured, load_cell), load_cell) < 0.0
         bases, pivot = base_of_sample(measured)
         poses = np.column_stack([measured.base_x.values, measured.base_y.values, angle])
-        carried = _repeated(measured, poses)
-        sense = np.where(carried > 0, 0.0, np.where(measured.direction.values == "backward", -1.0, 1.0))
+        history = drive_histories(measured, backward, load_cell, rubs=rubs)
+        known = _repeated(history, poses, backward)
+        sense = np.where(known > 0, 0.0, np.where(measured.direction.values == "backward", -1.0, 1.0))
         places = np.array(bases)[pivot]
-        kinds, which = np.unique(np.column_stack([places, backward, sense, carried]), axis=0, return_inverse=True)
+        kinds, which = np.unique(np.column_stack([places, backward, sense, known]), axis=0, return_inverse=True)
         self.drive_angles = angle
         self.of_sample: Index = which  # segment of each sample, shape (samples,)
         self.samples: list[Index] = [np.flatnonzero(which == k) for k in range(len(kinds))]  # of each segment
@@ -48,17 +51,18 @@ class RecordSegments:
         self.bases = kinds[:, :2]  # pivots, or where drives begin [length], shape (segments, 2)
         self.backward = kinds[:, 2] > 0.0  # True for contact on the side of a backward sweep
         self.signs = np.where(self.backward, -1.0, 1.0)
-        # Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 if it carries the base, which
-        # turns no encoder.
+        # Direction of the drive, whatever the side of contact: +1 forward, −1 backward; 0 where it has a history.
         self.senses = kinds[:, 3]
         self.angles_in_sweep_frame = np.where(self.backward[which], np.pi - angle, angle)
+        # Change of the travel with the reading of the encoder, shape (samples,): 0 if the drive carries the base, which
+        # turns no encoder.
+        self.pace = self.signs[which].copy()
         self._samples_by_errors: dict[bytes, Segments] = {}
-        self._ways: dict[int, Floats] = {}
-        # Lines of all drives, (segments, lines, LINE_COLUMNS), NaN after the last; None if no drive carries the base.
+        self._ways: dict[int, tuple[Floats, Floats]] = {}
+        # Lines of all drives, (segments, lines, LINE_COLUMNS), NaN after the last; None if none has a history.
         self.lines: Floats | None = None
-        if np.any(carried):
-            noise = max(load_cell.drive_angle_noise, load_cell.drive_angle_resolution)
-            self.lines = self._drives(measured.sweep.values, poses, rod_of(measured).length, noise)
+        if np.any(known):
+            self.lines = self._drives(history, poses, rod_of(measured).length, load_cell)
 
     def __len__(self) -> int:
         return len(self.samples)
@@ -69,27 +73,51 @@ class RecordSegments:
         return np.column_stack([self.bases, self.signs, self.senses])
 
     @property
-    def is_carried(self) -> bool:
-        """True if a drive carries the base in any sweep."""
+    def has_history(self) -> bool:
+        """True if loads depend on the history of a drive: it carries the base, or turns back in contact."""
         return self.lines is not None
 
-    def _drives(self, sweep: Index, poses: Floats, length: float, noise: float) -> Floats:
-        """Return `lines`, and write the travels of the sweeps that carry the base, for a noise of the encoder."""
+    def _drives(self, history: Index, poses: Floats, length: float, load_cell: LoadCell) -> Floats:
+        """Return `lines`, and write travels and ways of the drives with a history."""
         drives = []
         for k, own in enumerate(self.samples):
             if self.senses[k]:
                 drives.append(_TURNS)
                 continue
-            once = poses[own[sweep[own] == sweep[own[0]]]]
-            if np.ptp(once[:, 2]) <= _SCATTER * noise:
-                once[:, 2] = once[:, 2].mean()
-            path = lines_through(once, length, backward=bool(self.backward[k]), off=max(_OFF, 3.0 * noise))
-            self.angles_in_sweep_frame[own] = np.tile(path.travels, own.size // len(once))
-            self._ways[k] = np.append(0.0, np.cumsum(np.hypot(*np.diff(once[:, :2], axis=0).T)))
-            drives.append(path.lines)
+            once = poses[own[history[own] == history[own[0]]]]
+            lines_of = self._carry if np.ptp(once[:, :2], axis=0).any() else self._turn
+            drives.append(lines_of(k, once, length, load_cell))
         lines = np.full((len(drives), max(map(len, drives)), LINE_COLUMNS), np.nan)
         for of_segment, drive in zip(lines, drives, strict=True):
             of_segment[: len(drive)] = drive
+        return lines
+
+    def _carry(self, k: int, once: Floats, length: float, load_cell: LoadCell) -> Floats:
+        """Return the lines of a segment whose base is carried, once or often, through poses."""
+        own, noise = self.samples[k], max(load_cell.drive_angle_noise, load_cell.drive_angle_resolution)
+        if np.ptp(once[:, 2]) <= _SCATTER * noise:
+            once[:, 2] = once[:, 2].mean()
+        path = lines_through(once, length, backward=bool(self.backward[k]), off=max(_OFF, 3.0 * noise))
+        self.angles_in_sweep_frame[own] = np.tile(path.travels, own.size // len(once))
+        self.pace[own] = 0.0
+        self._ways[k] = path.travels, np.append(0.0, np.cumsum(np.hypot(*np.diff(once[:, :2], axis=0).T)))
+        return path.lines
+
+    def _turn(self, k: int, once: Floats, length: float, load_cell: LoadCell) -> Floats:
+        """Return the lines of a segment that turns back in contact; on the first the travel is the drive angle.
+
+        The rod was turned from a free angle to where the record begins.
+        """
+        own, backward = self.samples[k], bool(self.backward[k])
+        free = np.append(once[0, :2], np.pi - _FREE if backward else _FREE)
+        off = least_turn(once[:, 2], load_cell)
+        path = lines_through(np.vstack([free, once]), length, backward=backward, off=off)
+        lines, travels = path.lines, path.travels[1:] + _FREE
+        lines[:, 6:] += _FREE
+        self.angles_in_sweep_frame[own] = np.tile(travels, own.size // len(once))
+        on = np.maximum(np.searchsorted(lines[:, 6], self.angles_in_sweep_frame[own], side="right") - 1, 0)
+        self.pace[own] *= lines[on, 5]
+        self._ways[k] = np.array([travels[0], lines[-1, 7]]), np.array([0.0, lines[-1, 7] - travels[0]])
         return lines
 
     def event_samples(self, loaded: Flags) -> Index:
@@ -124,20 +152,28 @@ class RecordSegments:
         return Course.along(direction[self.of_sample] * self.angles_in_sweep_frame, self.samples)
 
     def ways(self, travels: Floats) -> Floats:
-        """Convert travels in the sweep frame, (n, segments), to ways of the base [length], or angles as read [rad]."""
+        """Convert travels in the sweep frame, (n, segments), to ways of the base [length], or angles as read [rad].
+
+        Of a drive that turns back about a pivot it is the way since its first sample [rad].
+        """
         ways = np.where(self.backward, np.pi - travels, travels)
-        for k, own in self._ways.items():
-            ways[:, k] = np.interp(travels[:, k], self.angles_in_sweep_frame[self.samples[k][: own.size]], own)
+        for k, known in self._ways.items():
+            ways[:, k] = np.interp(travels[:, k], *known)
         return ways
+
+    @property
+    def ways_of_samples(self) -> Floats:
+        """`ways` at the samples, shape (samples,)."""
+        every = np.repeat(self.angles_in_sweep_frame[:, None], len(self), axis=1)
+        return np.asarray(self.ways(every)[np.arange(len(every)), self.of_sample])
 
     def samples_with(self, errors: Floats) -> Segments:
         """Return the samples of every segment, once for each error of the encoder, sorted by drive angle."""
         key = errors.tobytes()
         if key not in self._samples_by_errors:
             samples, angles = [], []
-            for own, sign, sense in zip(self.samples, self.signs, self.senses, strict=True):
-                shifts = -sign * np.abs(sense) * errors
-                shifted = (self.angles_in_sweep_frame[own] + shifts[:, None]).ravel()
+            for own in self.samples:
+                shifted = (self.angles_in_sweep_frame[own] - self.pace[own] * errors[:, None]).ravel()
                 order = np.argsort(shifted, kind="stable")
                 angles.append(shifted[order])
                 samples.append((own + self.drive_angles.size * np.arange(errors.size)[:, None]).ravel()[order])
@@ -146,14 +182,12 @@ class RecordSegments:
         return self._samples_by_errors[key]
 
 
-def _repeated(measured: xr.Dataset, poses: Floats) -> Index:
-    """Return for each sample one more than the first sweep that is carried through the same poses, shape (samples, 3),
-    as its own; 0 if its sweep is not carried."""
-    sweep, backward = measured.sweep.values, measured.direction.values == "backward"
+def _repeated(history: Index, poses: Floats, backward: Flags) -> Index:
+    """Return for each sample the first history of a drive through the same poses as its own; 0 if it has none."""
     found, first = np.zeros(len(poses), dtype=np.intp), dict[tuple[bytes, bytes], int]()
-    for number in carried_sweeps(measured):
-        own = sweep == number
-        found[own] = 1 + first.setdefault((poses[own].tobytes(), backward[own].tobytes()), number)
+    for number in np.unique(history[history > 0]).tolist():
+        own = history == number
+        found[own] = first.setdefault((poses[own].tobytes(), backward[own].tobytes()), number)
     return found
 
 

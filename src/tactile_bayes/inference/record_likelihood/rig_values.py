@@ -19,6 +19,8 @@ class RigValues(NamedTuple):
     taper: Any = 0.0  # taper of the rod in addition to the stated one
     stem: Any = 0.0  # rigid piece between pivot and rod in addition to the stated one [L]
     length: Any = 1.0  # over the stated one; its rest curvature, and what is added to it, are then per that length
+    # Amplitudes of the modes of the rest curvature, shape (n, MOST_MODES); none by default.
+    rest_shape: Any = None
     # Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
     # after the last given one are not shifted.
     base_shifts: Any = None

@@ -22,17 +22,18 @@ __all__ = ["RodTables"]
 # default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and
 # for uneven curvature that of the rest curvature.
 _TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
+_SHAPES = 4.0, 2.5  # amplitudes of the modes of a traced rod: one of 900, and one of 10 draws from the prior is beyond
 _LENGTHS = 0.9, 1.1  # over the stated one, in tables of a cone: ten deviations of the default prior
-# Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where the base is
-# carried.
+# Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where a drive
+# has a history, along which a rod may slide back.
 _FRICTION_ANGLES = (0.0, 0.5), (0.5, MAX_FRICTION_ANGLE)
 
 
 class RodTables:
     """Tables of the stated rod, each made for the first rig that needs it, and kept."""
 
-    def __init__(self, rod: Rod, friction: float, is_carried: bool) -> None:
-        self._rod, self._friction, self._is_carried = rod, friction, is_carried
+    def __init__(self, rod: Rod, friction: float, may_slide_back: bool) -> None:
+        self._rod, self._friction, self._may_slide_back = rod, friction, may_slide_back
         self.made: dict[tuple[bool, ...], ForwardTable] = {}
         """Tables, or `NO_TABLE` where none is accurate enough, by whether taper, rest curvature, friction and length
         differ from what is stated, and whether friction is strong."""
@@ -44,7 +45,7 @@ class RodTables:
         slides = bool(np.any(friction != self._friction))
         is_cone = self._rod.diameter > 0.0 and bool(np.any(self._rod.taper + taper))
         varied = bool(np.any(taper)), bool(np.any(bend)), slides, is_cone and bool(np.any(length != 1.0))
-        is_strong = slides and not self._is_carried and bool(np.any(np.arctan(friction) > _FRICTION_ANGLES[0][1]))
+        is_strong = slides and not self._may_slide_back and bool(np.any(np.arctan(friction) > _FRICTION_ANGLES[0][1]))
         return self._table(profile, varied, False), self._table(profile, varied, True) if is_strong else NO_TABLE
 
     def _table(self, profile: Profile, varied: tuple[bool, bool, bool, bool], is_strong: bool) -> ForwardTable:
@@ -53,12 +54,13 @@ class RodTables:
         key = *varied, is_strong
         if key not in self.made:
             widths = _TAPERS if varied[0] else (0.0,), _BENDS if varied[1] else (0.0,)
-            senses = (True, False) if self._is_carried and (varied[2] or self._friction) else (False,)
+            senses = (True, False) if self._may_slide_back and (varied[2] or self._friction) else (False,)
             angle = float(np.arctan(self._friction))
             low, high = _FRICTION_ANGLES[is_strong] if varied[2] else (angle, angle)
-            for grade, both, bend, taper in product(range(GRADES), senses, *widths[::-1]):
+            shapes = _SHAPES if self._rod.rest_shape_modes else (0.0,)
+            for grade, both, shape, bend, taper in product(range(GRADES), senses, shapes, *widths[::-1]):
                 box = self._box(taper, bend, (-high if both else low, high), _LENGTHS if varied[3] else (1.0, 1.0))
-                self.made[key] = forward_table(profile, box, grade)
+                self.made[key] = forward_table(profile, box._replace(shape=shape), grade)
                 if self.made[key] is not NO_TABLE:
                     break
         return self.made[key]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Container
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -15,8 +16,9 @@ from tactile_bayes.inference.record_likelihood.record_segments import RecordSegm
 from tactile_bayes.load_cell import LoadCell, RandomWalk, zero_load
 from tactile_bayes.load_cell.blocks import AFTER_CONTACT, BEFORE_ONSET, IN_CONTACT
 from tactile_bayes.numerics.scatter import rough_noise
-from tactile_bayes.reconstruction import with_sides
+from tactile_bayes.reconstruction import least_turn, turned_sweeps, with_sides
 from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels, rows_of_sweeps
+from tactile_bayes.record.sweep_segments import turning_points
 
 __all__ = ["MOST_SAMPLES", "is_long", "shortened", "thinned"]
 
@@ -38,22 +40,23 @@ def is_long(record: xr.Dataset) -> bool:
     return bool(record.sizes["sample"] > MOST_SAMPLES and "blocks" not in record.attrs)
 
 
-def shortened(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
+def shortened(record: xr.Dataset, cell: LoadCell, rubs: bool = False) -> tuple[xr.Dataset, LoadCell]:
     """Return a record as the likelihood takes it, and the load cell of its samples; `blocks` of the record states how.
 
     Of more than `MOST_SAMPLES`, blocks of readings at neighbouring drive angles are taken, two points on a straight
     line for each; readings next to a snap-off stay single. For noise whose means are not normal (outliers, drift,
-    correlation, an uncertain encoder, coarse steps, the end of the range) and carried bases, every so many readings
-    are.
+    correlation, an uncertain encoder, coarse steps, the end of the range), for carried bases, and for drives that turn
+    back in contact if the rod `rubs`, every so many readings are.
     """
     if not is_long(record):
         return record, cell
-    if _averages(record, cell):
+    turned = turned_sweeps(record, cell) if rubs else set()
+    if not turned and _averages(record, cell):
         made = _Readings(record, cell).in_blocks()
         if made.sizes["sample"] < record.sizes["sample"]:
             return made, cell
         return record, cell
-    return thinned(record, cell)
+    return thinned(record, cell, turned)
 
 
 def _averages(record: xr.Dataset, cell: LoadCell) -> bool:
@@ -71,8 +74,9 @@ def _averages(record: xr.Dataset, cell: LoadCell) -> bool:
     )
 
 
-def thinned(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
-    """Return every so many samples of a long record, and all corners of carried ways, and the cell of these samples."""
+def thinned(record: xr.Dataset, cell: LoadCell, turned: Container[int] = frozenset()) -> tuple[xr.Dataset, LoadCell]:
+    """Return every so many samples of a long record, all corners of carried ways and ends of the ways of sweeps that
+    are turned back, and the cell of these samples."""
     if not is_long(record):
         return record, cell
     samples = record.sizes["sample"]
@@ -81,7 +85,11 @@ def thinned(record: xr.Dataset, cell: LoadCell) -> tuple[xr.Dataset, LoadCell]:
     kept[::every] = True
     carried = set(carried_sweeps(record))
     for rows in rows_of_sweeps(record["sweep"].values):
-        if int(record["sweep"].values[rows[0]]) in carried:
+        number = int(record["sweep"].values[rows[0]])
+        if number in turned:
+            angle = record["drive_angle"].values[rows]
+            kept[rows[[0, *turning_points(angle, least_turn(angle, cell)), -1]]] = True
+        if number in carried:
             kept[rows] = False
             kept[rows[::every]] = kept[rows[-1]] = True
             kept[rows[_corners(record, rows)]] = True

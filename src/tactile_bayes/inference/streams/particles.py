@@ -245,8 +245,8 @@ class Particles:
 
 
 def _is_continued(before: ContourModel | None, model: ContourModel) -> bool:
-    """Return True if a record's first samples have their paths as before: the same sides, and no carried base."""
-    if before is None or model.likelihood.segments.is_carried:
+    """Return True if a record's first samples have their paths as before: the same sides, and no history of a drive."""
+    if before is None or model.likelihood.segments.has_history:
         return False
     sides = before.likelihood.segments.signs_of_samples
     return np.array_equal(sides, model.likelihood.segments.signs_of_samples[: len(sides)])

@@ -393,7 +393,7 @@ class Stream:
 def _share_within_reach(model: ContourModel, old: StreamState | None, random: np.random.Generator) -> float:
     """Return the share of the prior within reach, which only a new sweep or parameter changes."""
     before = None if old is None else old.experiment.model
-    if old is None or before is None or model.likelihood.segments.is_carried or before.names != model.names:
+    if old is None or before is None or model.likelihood.segments.has_history or before.names != model.names:
         return model.share_within_reach(random, _PRIOR_DRAWS)
     is_same = np.array_equal(before.likelihood.segments.contacts, model.likelihood.segments.contacts)
     return old.share if is_same else model.share_within_reach(random, _PRIOR_DRAWS)

@@ -6,31 +6,22 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.equilibrium import (
-    Balance,
-    Equilibrium,
-    Scene,
-    settle_at,
-    settle_at_limit,
-    tangential_psi1,
-)
+from tactile_bayes.mechanics.branches.crossings import DIP, change_of_phase, first_knot, release
+from tactile_bayes.mechanics.branches.equilibrium import Balance, settle_at, settle_at_limit
 from tactile_bayes.mechanics.branches.leg import (
     ANGLE,
-    DIP,
     NUDGE,
     REST,
     Leg,
     LegSeries,
-    change_of_phase,
-    first_knot,
     guess,
     leg_from,
-    release,
     sample_leg,
     share_of,
     shortened,
 )
-from tactile_bayes.mechanics.branches.phase import limit
+from tactile_bayes.mechanics.branches.phase import limit, slides
+from tactile_bayes.mechanics.branches.scene import Equilibrium, Scene
 from tactile_bayes.mechanics.branches.series import change_of, tail
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
@@ -60,11 +51,15 @@ and in arc length [L]."""
 _PAST_TIP = 1e-6
 """Share of a leg by which it passes the tip of a rod that is not smooth there."""
 
+_SCATTER = 1e-12
+"""Distance from a knot, in the contour's parameter, which rounding does not pass where a leg ends."""
+
 _IN_A_DIP = 1e-5
 """Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
 
-_ROUNDING = 1e-14
-"""Tail of the series of a drive angle that its rounding leaves [rad]."""
+_ROUNDING, _ROUNDING_STUCK = 1e-14, 1e-11
+"""Tail of the series of a drive angle that its rounding leaves [rad], and where a contact sticks, which hardly
+yields."""
 
 _RESOLVED_LOADS = 1e-10
 """Error of loads that no tolerance is below, over the loads: rounding may leave it where the rod bears on its base."""
@@ -79,8 +74,6 @@ class Setting(NamedTuple):
     """Parameters at which the contour may not be smooth."""
     ends: tuple[float, float]
     """Least and greatest parameter of the contour."""
-    slides: bool
-    """Whether friction opposes the slip everywhere, or else there is no path."""
     may_release: bool
     """Whether the force may vanish: for a straight rod that turns about a pivot it does not."""
 
@@ -120,10 +113,10 @@ class Step(NamedTuple):
 def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: LegSeries) -> tuple[Step, float]:
     """Next leg, at most as long as given, and the factor of the length of the one after it."""
     exact = work.accuracy.exact
-    least, known, before, pace = LONGEST * 0.5**work.accuracy.halvings, 0.0, math.inf, 1.0
+    least, known, before, pace, is_noise = LONGEST * 0.5**work.accuracy.halvings, 0.0, math.inf, 1.0, False
     for _ in range(_MOST_TRIES):
         step = _trial(here, setting, length, known, work)
-        excess = _excess(in_dip, work) if step.is_sound else math.inf
+        excess = _excess(in_dip, slides(here.scene.phase), work) if step.is_sound else math.inf
         pace = _pace(excess, work)
         # Rounding, which a shorter leg does not make smaller.
         is_noise = 0.5 * before < excess < (_NOISE if exact else 1.0)
@@ -135,7 +128,9 @@ def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: Leg
         if step.is_sound:
             share = _up_to_tip(here.scene, step.leg, share, work)
         length, known = share * step.length, share if step.is_sound else 0.0
-    return step, pace
+    # Rounding where a contact that sticks hardly yields: others would all be as short.
+    is_stiff = not slides(here.scene.phase) and (step.length <= least or is_noise)
+    return step, _MOST_PACE if is_stiff else pace
 
 
 @inlined
@@ -151,35 +146,37 @@ def _trial(here: Here, setting: Setting, length: float, known: float, work: LegS
     `known` is as in `sample_leg`."""
     scene, begin = here.scene, here.begin
     leg = leg_from(scene, begin, here.onward, length)
-    if known == 0.0 and scene.beam.varied is not None:
+    if known == 0.0 and scene.beam.varied is not None and slides(scene.phase):
         share = _share_in_phase(scene, leg)
         leg, length = shortened(leg, share), share * length
     share = release(scene, leg) if setting.may_release else math.nan
     is_released = share <= 1.0
     if is_released:
         leg, length, known = shortened(leg, share), share * length, share * known
-    is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, known, work)
+    is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, known, is_released, work)
     knot, at_knot = math.nan, begin
     if is_sound:
-        knot, node = first_knot(leg, setting.knots, setting.ends[0], work)
+        knot, node = first_knot(scene, leg, setting.knots, setting.ends[0], work)
         if node <= 1.0:  # rates at the end are those before the knot
             at_knot = settle_at(scene, knot, guess(work, node))
-            share = share_of(leg, at_knot) * (1.0 - NUDGE)
+            share = share_of(leg, at_knot)
+            share -= max(NUDGE * share, _SCATTER / abs(leg.along.p))
             is_sound, is_released = share > 0.0, False
             if is_sound:
                 leg, length = shortened(leg, share), share * length
-                is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, share, work)
+                is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, share, is_released, work)
     return Step(is_sound, leg, length, end, before_end, knot, at_knot, is_released)
 
 
 @compiled
-def _excess(in_dip: bool, work: LegSeries) -> float:
+def _excess(in_dip: bool, is_sliding: bool, work: LegSeries) -> float:
     """Estimated error of the travel, the loads or the states over the tolerated one."""
     accuracy, series = work.accuracy, work.series
     angle, change = tail(series[ANGLE]), change_of(series[ANGLE])
     if in_dip:
         return angle / (_IN_A_DIP * DIP)
-    found = max(angle / max(accuracy.resolved * change, _ROUNDING), angle / accuracy.sharp)
+    rounding = _ROUNDING if is_sliding else _ROUNDING_STUCK
+    found = max(angle / max(accuracy.resolved * change, rounding), angle / accuracy.sharp)
     for c in range(3):
         of_load = change_of(series[c])
         tolerated = max(accuracy.tolerance[c], _RESOLVED_LOADS * (abs(series[c, 0]) + of_load))
@@ -201,7 +198,7 @@ def _pace(excess: float, work: LegSeries) -> float:
 @compiled
 def _share_in_phase(scene: Scene, leg: Leg) -> float:
     """Share of a leg up to somewhat beyond the change of the phase, as far as its direction tells."""
-    end, sense = limit(scene.phase, tangential_psi1(scene))
+    _, end, sense = limit(scene, leg.begin.p)
     room = sense * (end - leg.begin.q) + (_ROOM_IN_TIP if scene.phase == TIP else _ROOM_PAST_TIP)
     pace = sense * leg.along.q
     return room / pace if pace > room > 0.0 else 1.0

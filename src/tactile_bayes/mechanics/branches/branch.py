@@ -21,7 +21,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.advance import FIRST_LENGTH, LONGEST, Here, Setting, Step, advance, next_length
-from tactile_bayes.mechanics.branches.equilibrium import Equilibrium, Scene, nowhere
+from tactile_bayes.mechanics.branches.equilibrium import nowhere
 from tactile_bayes.mechanics.branches.first_contact import Beginning, beginning
 from tactile_bayes.mechanics.branches.leg import (
     RATE,
@@ -29,7 +29,8 @@ from tactile_bayes.mechanics.branches.leg import (
     LegSeries,
     leg_series,
 )
-from tactile_bayes.mechanics.branches.meeting import OPEN, Meeting, fate_of, go_on, meet
+from tactile_bayes.mechanics.branches.meeting import OPEN, Meeting, fate_of, go_on, meet, slid_back
+from tactile_bayes.mechanics.branches.phase import contact_at, slides, tip_touches
 from tactile_bayes.mechanics.branches.readings import (
     Course,
     Found,
@@ -43,9 +44,9 @@ from tactile_bayes.mechanics.branches.readings import (
     write_samples,
 )
 from tactile_bayes.mechanics.branches.refusals import ruled_out
+from tactile_bayes.mechanics.branches.scene import Equilibrium, Scene
 from tactile_bayes.mechanics.branches.series import value
 from tactile_bayes.mechanics.compiler import compiled, inlined
-from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import is_straight
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 
@@ -83,25 +84,30 @@ def branch_workspace(accuracy: Accuracy, order: int, samples: int, knots: int, l
 
 @compiled
 def follow_branch(
-    scene: Scene, lines: Floats | None, samples: Samples, slides: bool, workspace: BranchWorkspace, found: Found
+    scene: Scene, lines: Floats | None, samples: Samples, workspace: BranchWorkspace, found: Found
 ) -> None:
     """Follow a branch from first contact to snap-off, and write its events and what is known of its samples.
 
-    The scene has the first line of a drive that carries the base. `slides` says whether friction opposes the slip
-    everywhere, or else there is no path; otherwise it acts as in a forward sweep of a straight rod.
+    The scene has the first line of a drive that carries the base.
     """
     work, event = workspace.leg, found.event
-    start = beginning(scene, lines, slides, work.accuracy.first_step)
+    start = beginning(scene, lines, work.accuracy.first_step)
     here, length, followed = _begin(start, found), FIRST_LENGTH, 0
     if event.reach != _TOUCHES:
         return
     may_release = lines is not None or not is_straight(scene.beam)
-    setting = Setting(lines, workspace.knots, start.near.ends, slides, may_release)
+    setting = Setting(lines, workspace.knots, start.near.ends, may_release)
     for _ in range(workspace.legs.phase.size):
         in_dip = event.snap_off > _NEVER
         step, pace = advance(here, setting, length, in_dip, work)
         if not step.is_sound:
-            break
+            if slides(here.scene.phase):
+                break
+            here = slid_back(here)
+            if not math.isfinite(here.begin.at.p):
+                break
+            length = FIRST_LENGTH
+            continue
         met = meet(here, step, in_dip, followed == 0, work)
         if not in_dip:
             followed = _grow(followed, here, setting, step, met, samples, workspace, found)
@@ -120,10 +126,10 @@ def _begin(start: Beginning, found: Found) -> Here:
     begin, event = start.state, found.event
     event.reach, event.distance, event.snap_off, event.phases = start.reach, start.near.distance, OPEN, 0
     event.first_angle, event.first_parameter = begin.travel, start.near.begin
-    event.snap_angle, event.snap_parameter = begin.travel, begin.at.p
+    event.snap_angle, event.snap_parameter = begin.travel, contact_at(start.scene, begin.at).p
     event.curvature = 0.0 if found.events.size else math.nan
     if start.reach != _TOUCHES:
-        refuse(start.reach, begin.at.p, event)
+        refuse(start.reach, event.snap_parameter, event)
     return Here(start.scene, start.line, begin, nowhere(), Equilibrium(0.0, 0.0, 1.0), LONGEST)
 
 
@@ -150,7 +156,7 @@ def _grow(
     work, legs, event, begin = workspace.leg, workspace.legs, found.event, found.event.snap_angle
     scene, at, stop = here.scene, met.at, met.stop
     event.snap_off = fate_of(step, met)
-    event.reach, where = ruled_out(here, setting, step, met, work)
+    event.reach, where = ruled_out(here, setting, met, work)
     if event.reach != _TOUCHES:
         event.snap_parameter = where
     if event.reach != _TOUCHES or not stop > 0.0:
@@ -164,7 +170,7 @@ def _grow(
     if samples.angles.size and not met.is_maximum and at.travel > begin:
         steadiness = min(max(value(work.series[RATE], stop) * stop / (at.travel - begin), 0.0), 1.0)
     store(followed, scene, here.line, step.leg, at.at, Course(stop, begin, at.travel, steadiness), work, legs)
-    event.snap_angle, event.snap_parameter = at.travel, at.at.p
+    event.snap_angle, event.snap_parameter = at.travel, contact_at(scene, at.at).p
     return followed + 1
 
 
@@ -182,7 +188,7 @@ def _end(
     event, wants_states, first = found.event, found.events.size > 0, start.state.travel
     work, legs, where = workspace.leg, workspace.legs, event.snap_parameter
     if event.reach == _TOUCHES and (event.snap_off == OPEN or not event.snap_angle - first > _LEAST_TRAVEL):
-        across = start.scene.phase == TIP and start.state.at.q > _ACROSS
+        across = tip_touches(start.scene.phase) and contact_at(start.scene, start.state.at).psi1 > _ACROSS
         event.reach, where = _SLIPS_OFF if across else _GRAZES, math.nan
     if event.reach != _TOUCHES:
         refuse(event.reach, where, event)

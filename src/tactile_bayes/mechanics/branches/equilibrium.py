@@ -1,15 +1,14 @@
 """Equilibria of a rod and a contour: the contact, and how it moves along the branch of solutions.
 
-An equilibrium has three coordinates: the contour's parameter p at the contact, the contact force f, and the coordinate
-q of the rod: the angle ψ1 at its tip in tip contact, the arc length s1 in tangential contact. The rod's pose
-and the contour must agree on the vector (U, V) from the pivot to the contact in the frame of the force,
+An equilibrium has three coordinates, two of the contact, p and q (`phase`), and the contact force f. The rod's pose and
+the contour must agree on the vector (U, V) from the pivot to the contact in the frame of the force,
 
-    U(p) = u(q, f),    V(p) = v(q, f),
+    U(p, q) = u(p, q, f),    V(p, q) = v(p, q, f),
 
-two equations that leave a curve, the branch. A third, linear equation picks a point of it, so that neither p nor f need
-be monotone along the branch: a rod curved against the load is first straightened, and its contact moves outward before
-it moves inward. The null vector of the two equations is the branch's tangent, and the drive angle φ0 = β(p) + ψ1 + turn
-follows without another equation.
+two equations that leave a curve, the branch. A third, linear equation picks a point of it, so that none of the three
+need be monotone along the branch: a rod curved against the load is first straightened, and its contact moves outward
+before it moves inward. The null vector of the two equations is the branch's tangent, and the drive angle
+φ0 = β + ψ1 + turn follows without another equation, from the direction of the force β = α + γ.
 
 If a drive carries the base, position and angle of the base that follow from contact and pose must lie on a `Line`:
 again two equations. In place of the drive angle the travel along the line follows.
@@ -20,36 +19,45 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.line import Line, components, line_of, off_line
-from tactile_bayes.mechanics.branches.outline import Outline, Place, narrower, place
-from tactile_bayes.mechanics.branches.phase import is_possible, limit, on_rod, sliding, turning
+from tactile_bayes.mechanics.branches.line import Line, components, off_line
+from tactile_bayes.mechanics.branches.outline import Place, narrower, place
+from tactile_bayes.mechanics.branches.phase import (
+    STUCK,
+    Contact,
+    Move,
+    contact_at,
+    is_possible,
+    limit,
+    moves,
+    slides,
+    tip_touches,
+)
+from tactile_bayes.mechanics.branches.scene import (
+    BY_FORCE,
+    BY_P,
+    BY_Q,
+    NO_FORCE,
+    Equilibrium,
+    Scene,
+    cross,
+    dot,
+    less,
+    times,
+)
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.phases import TIP
-from tactile_bayes.mechanics.poses.beam import Beam, beam_pose, is_far_from_table, rubbed_otherwise
+from tactile_bayes.mechanics.poses.beam import beam_pose, is_far_from_table, whole_pose
 from tactile_bayes.mechanics.poses.pose import Pose
 
 __all__ = [
-    "BY_FORCE",
-    "NO_FORCE",
     "SETTLED",
     "Balance",
-    "Equilibrium",
     "Rates",
-    "Rig",
-    "Scene",
     "balance",
-    "dot",
-    "in_phase",
-    "less",
     "nowhere",
-    "on_line",
     "settle",
     "settle_at",
     "settle_at_limit",
-    "tangential_psi1",
-    "times",
-    "with_friction",
+    "unloaded",
 ]
 
 _MOST_STEPS = 25
@@ -61,44 +69,7 @@ _MOST_TURN, _MOST_LOADING = 0.4, 1.0
 SETTLED = 1e-8
 """Step, over the largest, after which a first-order correction leaves rounding errors only: its square."""
 
-
-class Equilibrium(NamedTuple):
-    """Coordinates of an equilibrium, or a direction in their space."""
-
-    p: float
-    q: float
-    force: float
-
-
-_BY_P, _BY_Q, BY_FORCE = Equilibrium(1.0, 0.0, 0.0), Equilibrium(0.0, 1.0, 0.0), Equilibrium(0.0, 0.0, 1.0)
-NO_FORCE = Equilibrium(0.0, 0.0, 0.0)
-
-
-class Rig(NamedTuple):
-    """Parameters of the loads other than rod and contour."""
-
-    friction_angle: float
-    """Friction angle δ = arctan μ [rad]."""
-    compliance: float
-    """Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]."""
-    offset: float
-    """Encoder offset in the sweep frame [rad]."""
-    sign: float
-    """−1 in backward sweeps, else 1."""
-    moment_unit: float
-    force_unit: float
-    """EI/L and EI/L² of the rod, in the units of loads."""
-
-
-class Scene(NamedTuple):
-    """All that an equilibrium depends on: one contour in the sweep frame, the rod, the rig, and the phase."""
-
-    outline: Outline
-    beam: Beam
-    rig: Rig
-    line: Line | None
-    """Drive that carries the base, which is at the origin at its beginning; None for a rotation about a pivot."""
-    phase: int
+_NONE = Pose(0.0, 0.0, 0.0)
 
 
 class Rates(NamedTuple):
@@ -125,7 +96,8 @@ class Balance(NamedTuple):
 
 
 class _Equations(NamedTuple):
-    """The two equations at a point, their derivatives, and those of travel and holding moment."""
+    """The two equations at a point, their derivatives, and those of travel, holding moment and direction of the
+    force."""
 
     miss_one: float
     miss_two: float
@@ -135,119 +107,162 @@ class _Equations(NamedTuple):
     travel_by: Equilibrium
     moment: float
     moment_by: Equilibrium
-    bend: float
+    turn_by: Equilibrium
 
 
-@compiled
-def in_phase(scene: Scene, phase: int) -> Scene:
-    """Scene in a phase of contact."""
-    return Scene(scene.outline, scene.beam, scene.rig, scene.line, phase)
+class _Force(NamedTuple):
+    """The contact force, and its direction (sin β, −cos β)."""
+
+    size: float
+    sin: float
+    cos: float
+    sin_gamma: float
+    cos_gamma: float
 
 
-@compiled
-def tangential_psi1(scene: Scene) -> float:
-    """ψ1 of a rod that lies along the contour with its surface [rad]."""
-    return scene.outline.half_angle - scene.rig.friction_angle
+class _Motion(NamedTuple):
+    """Derivatives of contact and rod by a coordinate."""
+
+    along: float
+    """Way of the contact along the contour."""
+    closer: float
+    """Way of the rod toward the object."""
+    turn: float
+    """Turn of the force."""
+    psi1: float
+    pose: Pose
 
 
-@compiled
-def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
-    """Scene with another line of the drive."""
-    if lines is None:
-        return scene
-    return Scene(scene.outline, scene.beam, scene.rig, line_of(lines, k), scene.phase)
+class _Response(NamedTuple):
+    """Derivatives of the equations, of travel and holding moment by a coordinate."""
 
-
-@compiled
-def with_friction(scene: Scene, angle: float) -> Scene:
-    """Scene with friction that acts in the other sense."""
-    _, compliance, offset, sign, moment_unit, force_unit = scene.rig
-    rig = Rig(angle, compliance, offset, sign, moment_unit, force_unit)
-    return Scene(scene.outline, rubbed_otherwise(scene.beam), rig, scene.line, scene.phase)
+    one: float
+    two: float
+    travel: float
+    moment: float
 
 
 @compiled
 def balance(scene: Scene, at: Equilibrium) -> tuple[Balance, _Equations]:
     """Loads and tangent at a point near the branch."""
-    delta, force = scene.rig.friction_angle, max(at.force, 0.0)
-    psi1, length = on_rod(scene.phase, at.q, tangential_psi1(scene))
-    spot = narrower(scene.outline, place(scene.outline, at.p), length)
-    sin_delta, cos_delta = math.sin(delta), math.cos(delta)
-    sin, cos = spot.sin * cos_delta + spot.cos * sin_delta, spot.cos * cos_delta - spot.sin * sin_delta
-    rod = beam_pose(scene.beam, psi1, length, force, scene.phase == TIP)
-    angle = math.atan2(sin, cos) + psi1 + rod[0].turn
-    equations = _equations(scene, scene.line, spot, force, sin, cos, rod, angle)
-    tangent, moment = _cross(equations.by_one, equations.by_two), equations.moment
-    turned = force * spot.bend * tangent.p
+    contact, size = contact_at(scene, at), max(at.force, 0.0)
+    spot = narrower(scene.outline, place(scene.outline, contact.p), contact.arclength)
+    sin_gamma, cos_gamma = math.sin(contact.friction_angle), math.cos(contact.friction_angle)
+    sin, cos = spot.sin * cos_gamma + spot.cos * sin_gamma, spot.cos * cos_gamma - spot.sin * sin_gamma
+    force = _Force(size, sin, cos, sin_gamma, cos_gamma)
+    by_p, by_q = moves(scene.phase, spot.speed)
+    here, pose_by_p, pose_by_q, by_force = _posed(scene, contact, size, by_p)
+    first, second = _motion(scene, spot, by_p, pose_by_p), _motion(scene, spot, by_q, pose_by_q)
+    angle = math.atan2(sin, cos) + contact.psi1 + here.turn
+    equations = _equations(scene.line, scene.rig.compliance, spot, force, here, first, second, by_force, angle)
+    tangent, moment = cross(equations.by_one, equations.by_two), equations.moment
+    turned = size * dot(equations.turn_by, tangent)
     rates = Rates(
         dot(equations.travel_by, tangent),
         dot(equations.moment_by, tangent),
         -sin * tangent.force - cos * turned,
         cos * tangent.force - sin * turned,
     )
-    return Balance(at, equations.travel, moment, -force * sin, force * cos, tangent, rates), equations
+    return Balance(at, equations.travel, moment, -size * sin, size * cos, tangent, rates), equations
+
+
+@compiled
+def _posed(scene: Scene, contact: Contact, force: float, by_p: Move) -> tuple[Pose, Pose, Pose, Pose]:
+    """Pose of the rod, and its derivatives by p, q and the force."""
+    psi1, arclength = contact.psi1, contact.arclength
+    if slides(scene.phase):
+        here, by_q, by_force = beam_pose(scene.beam, psi1, arclength, force, tip_touches(scene.phase))
+        return here, _NONE, by_q, by_force
+    whole = whole_pose(scene.beam, psi1, arclength, force)
+    turned, longer = whole.by_psi1, whole.by_arclength
+    a, b = by_p.psi1, by_p.arclength
+    first = Pose(a * turned.u + b * longer.u, a * turned.v + b * longer.v, a * turned.turn + b * longer.turn)
+    return whole.here, first, Pose(-turned.u, -turned.v, -turned.turn), whole.by_force
+
+
+@compiled
+def _motion(scene: Scene, spot: Place, by: Move, pose: Pose) -> _Motion:
+    closer, turn = scene.outline.narrowing * by.arclength, spot.bend * by.p + by.friction_angle
+    return _Motion(spot.speed * by.p, closer, turn, by.psi1, pose)
 
 
 @compiled
 def _equations(
-    scene: Scene,
     line: Line | None,
+    compliance: float,
     spot: Place,
-    force: float,
-    sin: float,
-    cos: float,
-    rod: tuple[Pose, Pose, Pose],
+    force: _Force,
+    here: Pose,
+    by_p: _Motion,
+    by_q: _Motion,
+    by_force: Pose,
     angle: float,
 ) -> _Equations:
-    """Equations for a contact force in the direction (sin, −cos), and a base at an angle before the turn of the
-    suspension."""
-    here, by_q, by_force = rod
-    compliance, by_psi1 = scene.rig.compliance, turning(scene.phase)
-    closer = sliding(scene.phase) * scene.outline.narrowing
-    sin_delta, cos_delta = spot.cos * sin - spot.sin * cos, spot.cos * cos + spot.sin * sin
+    """Equations of a base at an angle before the turn of the suspension."""
+    loaded = _Motion(0.0, 0.0, 0.0, 0.0, by_force)
     if line is None:
-        along, across = spot.x * cos + spot.y * sin, spot.y * cos - spot.x * sin
-        lever_by_q = closer * sin_delta
-        by_u = Equilibrium(spot.speed * cos_delta + spot.bend * across, lever_by_q - by_q.u, -by_force.u)
-        by_v = Equilibrium(-spot.speed * sin_delta - spot.bend * along, closer * cos_delta - by_q.v, -by_force.v)
-        moment_by = Equilibrium(force * by_u.p, force * lever_by_q, along)
-        travel_by = Equilibrium(
-            spot.bend + compliance * moment_by.p,
-            by_q.turn + by_psi1 + compliance * moment_by.q,
-            by_force.turn + compliance * along,
-        )
-        moment = force * along
+        along, across = spot.x * force.cos + spot.y * force.sin, spot.y * force.cos - spot.x * force.sin
+        p = _about_pivot(compliance, along, across, force, 0.0, by_p)
+        q = _about_pivot(compliance, along, across, force, 0.0, by_q)
+        f = _about_pivot(compliance, along, across, force, 1.0, loaded)
+        one, two, moment = along - here.u, across - here.v, force.size * along
         travel = angle + compliance * moment
-        return _Equations(along - here.u, across - here.v, by_u, by_v, travel, travel_by, moment, moment_by, spot.bend)
-    # The vector from the base to the contact, and its derivatives.
-    x, y = here.u * cos - here.v * sin, here.u * sin + here.v * cos
-    moment_by = Equilibrium(0.0, force * by_q.u, here.u + force * by_force.u)
-    moment = force * here.u
-    off = off_line(line, spot.x - x, spot.y - y, angle + compliance * moment)
-    by_p = components(line, spot.speed * spot.cos + spot.bend * y, spot.speed * spot.sin - spot.bend * x, spot.bend)
-    by_rod = components(
-        line,
-        -closer * spot.sin - by_q.u * cos + by_q.v * sin,
-        closer * spot.cos - by_q.u * sin - by_q.v * cos,
-        by_q.turn + by_psi1 + compliance * moment_by.q,
-    )
-    by_load = components(
-        line,
-        by_force.v * sin - by_force.u * cos,
-        -by_force.u * sin - by_force.v * cos,
-        by_force.turn + compliance * moment_by.force,
-    )
+    else:
+        p = _on_line(line, compliance, spot, force, here, 0.0, by_p)
+        q = _on_line(line, compliance, spot, force, here, 0.0, by_q)
+        f = _on_line(line, compliance, spot, force, here, 1.0, loaded)
+        moment = force.size * here.u
+        x, y = _from_base(here, force)
+        one, two, travel = off_line(line, spot.x - x, spot.y - y, angle + compliance * moment)
     return _Equations(
-        off.x,
-        off.y,
-        Equilibrium(by_p.x, by_rod.x, by_load.x),
-        Equilibrium(by_p.y, by_rod.y, by_load.y),
-        off.angle,
-        Equilibrium(by_p.angle, by_rod.angle, by_load.angle),
+        one,
+        two,
+        Equilibrium(p.one, q.one, f.one),
+        Equilibrium(p.two, q.two, f.two),
+        travel,
+        Equilibrium(p.travel, q.travel, f.travel),
         moment,
-        moment_by,
-        spot.bend,
+        Equilibrium(p.moment, q.moment, f.moment),
+        Equilibrium(by_p.turn, by_q.turn, 0.0),
     )
+
+
+@compiled
+def _about_pivot(
+    compliance: float, along: float, across: float, force: _Force, loading: float, by: _Motion
+) -> _Response:
+    """Response of a rod that turns about a pivot, from where the contact is along and across the lever of the force."""
+    sin, cos, pose = force.sin_gamma, force.cos_gamma, by.pose
+    lever = by.along * cos + by.closer * sin + by.turn * across
+    moment = force.size * lever + loading * along
+    return _Response(
+        lever - pose.u,
+        by.closer * cos - by.along * sin - by.turn * along - pose.v,
+        by.turn + by.psi1 + pose.turn + compliance * moment,
+        moment,
+    )
+
+
+@compiled
+def _from_base(pose: Pose, force: _Force) -> tuple[float, float]:
+    """Vector from the base to the contact."""
+    return pose.u * force.cos - pose.v * force.sin, pose.u * force.sin + pose.v * force.cos
+
+
+@compiled
+def _on_line(
+    line: Line, compliance: float, spot: Place, force: _Force, here: Pose, loading: float, by: _Motion
+) -> _Response:
+    """Response of a rod that is carried along a line."""
+    (x, y), (x_by, y_by) = _from_base(here, force), _from_base(by.pose, force)
+    moment = force.size * by.pose.u + loading * here.u
+    moved = components(
+        line,
+        by.along * spot.cos - by.closer * spot.sin - x_by + by.turn * y,
+        by.along * spot.sin + by.closer * spot.cos - y_by - by.turn * x,
+        by.turn + by.psi1 + by.pose.turn + compliance * moment,
+    )
+    return _Response(moved.x, moved.y, moved.angle, moment)
 
 
 @compiled
@@ -264,10 +279,10 @@ def settle(
         return nowhere()
     for _ in range(_MOST_STEPS):
         found, equations = balance(scene, at)
-        one, two, bend = equations.miss_one, equations.miss_two, equations.bend
+        one, two = equations.miss_one, equations.miss_two
         off = dot(normal, less(at, origin)) - level
         det = dot(normal, found.tangent)
-        first, second, third = _cross(equations.by_two, normal), _cross(normal, equations.by_one), found.tangent
+        first, second, third = cross(equations.by_two, normal), cross(normal, equations.by_one), found.tangent
         dp = (one * first.p + two * second.p + off * third.p) / det
         dq = (one * first.q + two * second.q + off * third.q) / det
         df = (one * first.force + two * second.force + off * third.force) / det
@@ -278,11 +293,12 @@ def settle(
         at = Equilibrium(at.p - share * dp, at.q - share * dq, at.force - share * df)
         if _is_astray(scene, at):
             break
-        if largest <= settled and abs(dp) * bend <= settled:
-            change, before = Equilibrium(dp, dq, df), found.at.force
+        change, before = Equilibrium(dp, dq, df), found.at.force
+        turn = -dot(equations.turn_by, change)
+        if largest <= settled and abs(dp) * (1.0 if scene.phase == STUCK else equations.turn_by.p) <= settled:
             travel = found.travel - dot(equations.travel_by, change)
             moment = found.holding_moment - dot(equations.moment_by, change)
-            share, turn = (-df / before if before > 0.0 else 0.0), -bend * dp
+            share = -df / before if before > 0.0 else 0.0
             force_x = found.force_x + share * found.force_x - turn * found.force_y
             force_y = found.force_y + share * found.force_y + turn * found.force_x
             return Balance(at, travel, moment, force_x, force_y, found.tangent, found.rates)
@@ -294,22 +310,59 @@ def _is_astray(scene: Scene, at: Equilibrium) -> bool:
     """Return whether a rod without a closed form is sought too far away: it takes long and leads nowhere."""
     if scene.beam.varied is None:
         return False
-    arclength = on_rod(scene.phase, at.q, 0.0)[1]
-    return not is_possible(scene.phase, at.q) or is_far_from_table(scene.beam, arclength, at.force)
+    contact = contact_at(scene, at)
+    return not is_possible(contact) or is_far_from_table(scene.beam, contact.arclength, at.force)
 
 
 @compiled
 def settle_at_limit(scene: Scene, start: Equilibrium) -> Balance:
     """Equilibrium where the phase ends."""
-    end = Equilibrium(0.0, limit(scene.phase, tangential_psi1(scene))[0], 0.0)
-    return settle(scene, start, end, _BY_Q, 0.0, SETTLED)
+    end = limit(scene, start.p)
+    there = Equilibrium(end.value if end.is_p else 0.0, 0.0 if end.is_p else end.value, 0.0)
+    return settle(scene, start, there, BY_P if end.is_p else BY_Q, 0.0, SETTLED)
 
 
 @compiled
 def settle_at(scene: Scene, p: float, start: Equilibrium) -> Balance:
     """Equilibrium at a parameter of the contour."""
     at = Equilibrium(p, start.q, start.force)
-    return settle(scene, at, at, _BY_P, 0.0, SETTLED)
+    return settle(scene, at, at, BY_P, 0.0, SETTLED)
+
+
+@compiled
+def unloaded(scene: Scene, start: Equilibrium, small: float) -> Balance:
+    """Equilibrium without force, by Newton's method from a guess.
+
+    If the contact sticks, its force has no direction there. Direction and tangent are extrapolated from a small force
+    and its double, with errors of the cube and the square of these, and of their rounding.
+    """
+    if slides(scene.phase):
+        return settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED)
+    one = settle(scene, Equilibrium(start.p, start.q, small), NO_FORCE, BY_FORCE, small, SETTLED)
+    two = settle(scene, Equilibrium(one.at.p, one.at.q, 2.0 * small), NO_FORCE, BY_FORCE, 2.0 * small, SETTLED)
+    by_one, by_two = times(1.0 / one.tangent.force, one.tangent), times(1.0 / two.tangent.force, two.tangent)
+    rates, others, back = _by_force(one), _by_force(two), times(0.5 * small, less(times(3.0, by_one), by_two))
+    return Balance(
+        Equilibrium(one.at.p - back.p, one.at.q - back.q, 0.0),
+        one.travel - 0.5 * small * (3.0 * rates.travel - others.travel),
+        0.0,
+        0.0,
+        0.0,
+        less(times(2.0, by_one), by_two),
+        Rates(
+            2.0 * rates.travel - others.travel,
+            2.0 * rates.moment - others.moment,
+            2.0 * rates.x - others.x,
+            2.0 * rates.y - others.y,
+        ),
+    )
+
+
+@compiled
+def _by_force(found: Balance) -> Rates:
+    """Derivatives by the force."""
+    by, rates = 1.0 / found.tangent.force, found.rates
+    return Rates(by * rates.travel, by * rates.moment, by * rates.x, by * rates.y)
 
 
 @compiled
@@ -318,24 +371,3 @@ def nowhere() -> Balance:
     nothing = Equilibrium(math.nan, math.nan, math.nan)
     rates = Rates(math.nan, math.nan, math.nan, math.nan)
     return Balance(nothing, math.nan, math.nan, math.nan, math.nan, nothing, rates)
-
-
-@compiled
-def _cross(a: Equilibrium, b: Equilibrium) -> Equilibrium:
-    return Equilibrium(a.q * b.force - a.force * b.q, a.force * b.p - a.p * b.force, a.p * b.q - a.q * b.p)
-
-
-@compiled
-def dot(a: Equilibrium, b: Equilibrium) -> float:
-    return a.p * b.p + a.q * b.q + a.force * b.force
-
-
-@compiled
-def less(a: Equilibrium, b: Equilibrium) -> Equilibrium:
-    """Difference a − b."""
-    return Equilibrium(a.p - b.p, a.q - b.q, a.force - b.force)
-
-
-@compiled
-def times(factor: float, a: Equilibrium) -> Equilibrium:
-    return Equilibrium(factor * a.p, factor * a.q, factor * a.force)

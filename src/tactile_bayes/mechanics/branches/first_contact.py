@@ -8,22 +8,9 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.equilibrium import (
-    BY_FORCE,
-    NO_FORCE,
-    SETTLED,
-    Balance,
-    Equilibrium,
-    Scene,
-    balance,
-    in_phase,
-    nowhere,
-    on_line,
-    settle,
-    tangential_psi1,
-    with_friction,
-)
-from tactile_bayes.mechanics.branches.line import Line, line_of, only_turns, pose_at
+from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, balance, nowhere, settle, unloaded
+from tactile_bayes.mechanics.branches.leg import HARDLY
+from tactile_bayes.mechanics.branches.line import Line, line_of, pose_at
 from tactile_bayes.mechanics.branches.outline import (
     Outline,
     Place,
@@ -36,8 +23,16 @@ from tactile_bayes.mechanics.branches.outline import (
     narrower,
     place,
 )
-from tactile_bayes.mechanics.branches.phase import touching
-from tactile_bayes.mechanics.branches.refusals import NOT_SLIPPING, slip
+from tactile_bayes.mechanics.branches.phase import contact_at, slip, stuck, tip_touches, touching
+from tactile_bayes.mechanics.branches.scene import (
+    BY_FORCE,
+    NO_FORCE,
+    Equilibrium,
+    Scene,
+    in_phase,
+    on_line,
+    with_friction,
+)
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import golden, newton_step
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
@@ -61,7 +56,7 @@ class _Sought(IntEnum):
 _TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reachability.TOUCHES), int(Reachability.TOO_FAR), int(Reachability.CUTS_PIVOT)
 _ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reachability.ENDS), int(Reachability.TOO_CLOSE), int(Reachability.RUNS_OUT)
 _BEGINS_INSIDE, _SLIPS_OFF = int(Reachability.BEGINS_INSIDE), int(Reachability.SLIPS_OFF)
-_TOUCHES_TWICE, _STICKS = int(Reachability.TOUCHES_TWICE), int(Reachability.STICKS)
+_TOUCHES_TWICE, _HEAD_ON = int(Reachability.TOUCHES_TWICE), int(Reachability.HEAD_ON)
 _CLEARANCE = CLEARANCE
 
 _MOST_MOVES = 50
@@ -90,6 +85,18 @@ _JUMP = 0.02
 _NOT_TURNED = 1e-3
 """Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried: as
 near as its first contact is found."""
+
+
+_HARDLY_SLIPS = 1e-5
+"""Slip per travel whose sense errors of a table may decide, ten times these."""
+
+_SLIGHT = 1e-3
+"""Travel [rad or L] on which the sense of a slip is decided that vanishes to first order, as that of straight rods
+does."""
+
+
+_RIGID = 1e-9
+"""Travel per force [L³/EI] that rounding makes of none: a contact at 0.02 L from the base gives 3e-6."""
 
 
 class Approach(NamedTuple):
@@ -144,7 +151,8 @@ def _missing(outline: Outline, beam: Beam, what: _Sought, p: float) -> tuple[flo
     at = place(outline, p)
     if what == _Sought.LEVER:
         along, facing = frame(at)
-        return along, at.speed + facing * at.bend
+        # What faces away from the base lies beyond the point upright over it.
+        return (along, at.speed + facing * at.bend) if facing > 0.0 else (at.x, at.speed * at.cos)
     if what == _Sought.WITHIN:
         at = narrower(outline, at, 1.0)
         along = frame(at)[0]
@@ -367,17 +375,15 @@ def _arrival(outline: Outline, beam: Beam, lines: Floats) -> tuple[Approach, int
 
 
 @compiled
-def beginning(scene: Scene, lines: Floats | None, slides: bool, first_step: float) -> Beginning:
-    """Beginning of a branch, on the first line that leads to contact if the drive carries the base.
-
-    Friction opposes the slip there if `slides`; otherwise it acts as in a forward sweep of a straight rod.
-    """
+def beginning(scene: Scene, lines: Floats | None, first_step: float) -> Beginning:
+    """Beginning of a branch, on the first line that leads to contact if the drive carries the base."""
     near, scene, line, seen = _arrive(scene, lines, first_step)
     if near.reach != _TOUCHES:
         return Beginning(near.reach, near, scene, line, nowhere())
-    reach, scene, state = _first_state(scene, lines, seen, near, slides)
-    least_psi1 = tangential_psi1(scene) - (0.0 if lines is None else _NOT_TURNED)
-    if reach == _TOUCHES and scene.phase == TIP and state.at.q < least_psi1:
+    reach, scene, state = _first_state(scene, lines, seen, near)
+    contact = contact_at(scene, state.at)
+    least = scene.outline.half_angle - (0.0 if lines is None else _NOT_TURNED)
+    if reach == _TOUCHES and tip_touches(scene.phase) and contact.psi1 + contact.friction_angle < least:
         reach = _TOUCHES_TWICE
     return Beginning(reach, near, scene, line, state)
 
@@ -387,37 +393,85 @@ def _arrive(scene: Scene, lines: Floats | None, first_step: float) -> tuple[Appr
     """First contact, the scene with the line of the drive on which it lies, and the outline relative to the base."""
     if lines is None:
         return _approach(scene.outline, scene.beam, first_step), scene, 0, scene.outline
-    near, k, travel = _arrival(scene.outline, scene.beam, lines)
+    (reach, distance, begin, tip_first, _, gap), k, travel = _arrival(scene.outline, scene.beam, lines)
+    near = Approach(reach, distance, begin, tip_first, _ends_along(scene.outline, lines), gap)
     pose = pose_at(line_of(lines, k), travel)
     return near, on_line(scene, lines, k), k, from_base(scene.outline, pose.x, pose.y)
 
 
 @compiled
-def _first_state(
-    scene: Scene, lines: Floats | None, seen: Outline, near: Approach, slides: bool
-) -> tuple[int, Scene, Balance]:
-    """State at first contact, with the friction that it has: it opposes the slip of the rod along the contour.
+def _ends_along(outline: Outline, lines: Floats) -> tuple[float, float]:
+    """Least and greatest parameter of the contour that a rod may reach along lines of a drive."""
+    low, high = math.inf, -math.inf
+    for k in range(lines.shape[0]):
+        if math.isnan(lines[k, 0]):
+            break
+        line = line_of(lines, k)
+        for travel in (line.travel, line.end):
+            pose = pose_at(line, travel)
+            of_pose = ends(from_base(outline, pose.x, pose.y))
+            low, high = min(low, of_pose[0]), max(high, of_pose[1])
+    return low, high
 
-    A tip that is carried head-on does not slip to first order: rounding would decide the sense.
-    """
+
+@compiled
+def _first_state(scene: Scene, lines: Floats | None, seen: Outline, near: Approach) -> tuple[int, Scene, Balance]:
+    """State at first contact, with the friction that it has."""
     scene = in_phase(scene, touching(near.tip_first))
     begin = _unloaded(scene, lines, seen, near)
     if scene.phase == TANGENTIAL and lines is not None and begin.at.q > 1.0:  # the approach is not exact
         near = Approach(near.reach, near.distance, near.begin, True, near.ends, near.gap)
         scene = in_phase(scene, TIP)
         begin = _unloaded(scene, lines, seen, near)
-    delta = scene.rig.friction_angle
-    if slides and delta > 0.0:
-        slipping = slip(scene, begin)
-        if scene.phase == TIP and not only_turns(scene.line) and not abs(slipping) > NOT_SLIPPING:
-            return _STICKS, scene, begin
-        if slipping > NOT_SLIPPING:
-            scene = with_friction(scene, -delta)
-            begin = _unloaded(scene, lines, seen, near)
-            if not slip(scene, begin) > 0.0:
-                return _STICKS, scene, begin
-    pushed = lines is None or begin.rates.travel * begin.tangent.force > 0.0
-    return _TOUCHES if pushed else _SLIPS_OFF, scene, begin
+    # A rod that turns about a pivot slides inward unless it is curved toward the object.
+    if scene.rig.friction_angle == 0.0 or (lines is None and scene.beam.most_curvature <= 0.0):
+        return _TOUCHES if lines is None or _is_pushed(begin) else _SLIPS_OFF, scene, begin
+    other = with_friction(scene, -scene.rig.friction_angle)
+    at_other = _unloaded(other, lines, seen, near)
+    held, at_held = _held(scene, begin)
+    slides, slides_back, sticks = _opposes(scene, begin), _opposes(other, at_other), held.anchor.arclength > 0.0
+    if slides + slides_back + sticks != 1:
+        slips_off = not _is_pushed(begin) and not _is_pushed(at_other) and not _is_head_on(begin)
+        return _SLIPS_OFF if slips_off else _HEAD_ON, scene, begin
+    if sticks:
+        return _TOUCHES, held, at_held
+    return (_TOUCHES, scene, begin) if slides else (_TOUCHES, other, at_other)
+
+
+@compiled
+def _is_pushed(begin: Balance) -> bool:
+    """True if the force grows from none with the travel."""
+    return begin.rates.travel * begin.tangent.force > 0.0 and not _is_head_on(begin)
+
+
+@compiled
+def _is_head_on(begin: Balance) -> bool:
+    """True if a straight rod is pushed along itself, so that it does not yield."""
+    return abs(begin.rates.travel) < _RIGID * abs(begin.tangent.force)
+
+
+@compiled
+def _opposes(scene: Scene, begin: Balance) -> bool:
+    """True if friction opposes the slip as the force grows from none."""
+    slipping = slip(scene, begin.at, begin.tangent) / begin.rates.travel
+    if abs(slipping) <= _HARDLY_SLIPS:
+        at, tangent, size = begin.at, begin.tangent, _SLIGHT / begin.rates.travel
+        force = size * tangent.force
+        start = Equilibrium(at.p + size * tangent.p, at.q + size * tangent.q, force)
+        later = settle(scene, start, NO_FORCE, BY_FORCE, force, SETTLED)
+        slipping = slip(scene, later.at, later.tangent) / later.rates.travel
+    return _is_pushed(begin) and math.copysign(1.0, scene.rig.friction_angle) * slipping <= 0.0
+
+
+@compiled
+def _held(scene: Scene, begin: Balance) -> tuple[Scene, Balance]:
+    """First contact that sticks, anchored nowhere if it would not."""
+    there, at = stuck(scene, begin.at)
+    held = unloaded(there, Equilibrium(at.p, 0.0, 0.0), abs(HARDLY * begin.tangent.force / begin.rates.travel))
+    if _is_pushed(held) and abs(held.at.q) < abs(scene.rig.friction_angle):
+        _, _, moment, force_x, force_y, tangent, rates = held
+        return there, Balance(held.at, begin.travel, moment, force_x, force_y, tangent, rates)
+    return in_phase(scene, scene.phase), begin
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Legs: parts of a branch of equilibria that are short enough for series, and where the branch changes on them.
+"""Legs: parts of a branch of equilibria that are short enough for series.
 
 A leg begins at an equilibrium and goes along the tangent there. Planes across the tangent cut the branch at the nodes
 of Chebyshev series of loads, contact and travel (numerical continuation by pseudo-arc length, Keller 1977). A position
@@ -15,31 +15,23 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.equilibrium import (
-    BY_FORCE,
-    NO_FORCE,
-    SETTLED,
-    Balance,
+from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, Rates, settle, unloaded
+from tactile_bayes.mechanics.branches.outline import place
+from tactile_bayes.mechanics.branches.phase import slides
+from tactile_bayes.mechanics.branches.scene import (
     Equilibrium,
-    Rates,
     Scene,
     dot,
     less,
-    settle,
-    tangential_psi1,
     times,
 )
-from tactile_bayes.mechanics.branches.line import Line
-from tactile_bayes.mechanics.branches.outline import place
-from tactile_bayes.mechanics.branches.phase import limit
-from tactile_bayes.mechanics.branches.series import crossing, two_values, value, weighted
+from tactile_bayes.mechanics.branches.series import two_values, weighted
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.numerics import chebyshev
 
 __all__ = [
     "ANGLE",
-    "DIP",
-    "LOST",
+    "HARDLY",
     "NUDGE",
     "PLACE",
     "RATE",
@@ -47,16 +39,9 @@ __all__ = [
     "Accuracy",
     "Leg",
     "LegSeries",
-    "change_of_phase",
-    "end_of_line",
-    "first_fall",
-    "first_knot",
     "guess",
     "leg_from",
     "leg_series",
-    "polished_fold",
-    "regained",
-    "release",
     "sample_leg",
     "settle_on",
     "share_of",
@@ -70,18 +55,9 @@ p, where it is monotone: five times these weights, or a fifth, change the Newton
 NUDGE = 1e-9
 """Distance beyond a knot of the contour, in its parameter, at which it is smooth."""
 
-DIP = 1e-4
-"""Least fall of the drive angle beyond a maximum that makes it the snap-off [rad]. After a smaller fall the rod hardly
-jumps, since the same object stops it at once."""
-
-LOST = -1.0
-"""Return value of `regained` where contact does not continue after a maximum of the drive angle."""
-
-_WEAK = 0.5
-"""Share of its force that a leg loses along its tangent for a release to be looked for on it."""
-
-_LAST = 1e-13
-"""Newton step, as a share of a leg, below which its interpolants have rounding errors only."""
+HARDLY = 1e-5
+"""Force from which a contact that sticks is extrapolated to none, over that of a leg: rounding leaves 1e-11 rad of its
+direction."""
 
 REST, PLACE, ANGLE, RATE = 3, 4, 5, 6
 """Rows of series after the three loads: the coordinate q of the rod, the contour's parameter, the travel (in a rotation
@@ -179,18 +155,35 @@ def _onward(nodes: Floats) -> Floats:
 def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -> Leg:
     """Leg from an equilibrium in the sense of a direction.
 
-    Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f.
+    Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f; where the
+    contact sticks, in that which changes most.
     """
-    spot, tangent = place(scene.outline, begin.at.p + math.copysign(NUDGE, onward.p)), begin.tangent
-    by_p, loading = spot.speed * spot.speed + spot.bend * spot.bend, 1.0 + begin.at.force
-    by_force = _BY_FORCE if scene.line is None else _BY_FORCE_ON_LINE
-    across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
+    tangent, loading = begin.tangent, 1.0 + begin.at.force
+    if slides(scene.phase):
+        spot = place(scene.outline, begin.at.p + math.copysign(NUDGE, onward.p))
+        by_p = spot.speed * spot.speed + spot.bend * spot.bend
+        by_force = _BY_FORCE if scene.line is None else _BY_FORCE_ON_LINE
+        across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
+    else:
+        across = _fastest(tangent, loading)
     size = length / math.sqrt(dot(across, tangent))
-    if dot(across, onward) < 0.0:
+    if dot(across if slides(scene.phase) else tangent, onward) < 0.0:
         size = -size
     along = times(size, tangent)
     scale = 1.0 / (size * dot(across, tangent))
     return Leg(begin.at, along, times(scale, across))
+
+
+@compiled
+def _fastest(tangent: Equilibrium, loading: float) -> Equilibrium:
+    """Direction across which a contact that sticks is followed. A rod that hardly yields along itself turns the force
+    through the cone at once, and at the edge, where the slip has vanished, that begins with the square of p."""
+    force = tangent.force / loading
+    if abs(tangent.q) > max(abs(tangent.p), abs(force)):
+        return Equilibrium(0.0, tangent.q, 0.0)
+    if abs(tangent.p) > abs(force):
+        return Equilibrium(tangent.p, 0.0, 0.0)
+    return Equilibrium(0.0, 0.0, force / loading)
 
 
 @compiled
@@ -255,12 +248,13 @@ def guess(work: LegSeries, way: float) -> Equilibrium:
 
 @compiled
 def sample_leg(
-    scene: Scene, leg: Leg, begin: Balance, before: Balance, known: float, work: LegSeries
+    scene: Scene, leg: Leg, begin: Balance, before: Balance, known: float, is_released: bool, work: LegSeries
 ) -> tuple[bool, Balance, Balance]:
     """Fit the series of a leg, unless the branch does not cut all planes, and return the equilibria at its last nodes.
 
     The search at a node starts from a polynomial through the nodes before it. If the series of a longer leg in the same
-    direction are at hand, of which this is the share `known` > 0, it starts from these.
+    direction are at hand, of which this is the share `known` > 0, it starts from these. At the end of one that is
+    released there is no force.
     """
     at_nodes, half = work.at_nodes, work.nodes.size
     settled = max(SETTLED, 0.1 * work.accuracy.last_step)
@@ -275,7 +269,10 @@ def sample_leg(
             else:
                 start = _cubic(leg, found, before, work.nodes[k])
             older, old = old, found
-            found = settle_on(scene, leg, work.nodes[k], start, settled)
+            if is_released and k == half - 1 and not slides(scene.phase):
+                found = _by_way(leg, unloaded(scene, start, HARDLY * leg.begin.force))
+            else:
+                found = settle_on(scene, leg, work.nodes[k], start, settled)
             if not math.isfinite(found.travel):
                 return False, begin, before
         at_nodes[0, k], at_nodes[0, half + k] = found.holding_moment, found.rates.moment
@@ -287,115 +284,3 @@ def sample_leg(
     for c in range(RATE):
         weighted(work.fit, at_nodes[c], work.series[c])
     return True, found, old
-
-
-@compiled
-def first_knot(leg: Leg, knots: Floats, low: float, work: LegSeries) -> tuple[float, float]:
-    """First knot or end of the contour that a leg passes, and about where."""
-    before, old = leg.begin.p, 0.0
-    for k in range(1, work.nodes.size):
-        after = work.at_nodes[PLACE, k]
-        for i in range(-1, knots.size):
-            knot = low if i < 0 else knots[i]
-            if (before - knot) * (after - knot) < 0.0 and abs(leg.begin.p - knot) > NUDGE:
-                return knot, old + (work.nodes[k] - old) * (before - knot) / (before - after)
-        before, old = after, work.nodes[k]
-    return math.nan, 2.0
-
-
-@compiled
-def change_of_phase(scene: Scene, work: LegSeries) -> float:
-    """Position at which the phase changes."""
-    rest, grid = work.series[REST], work.grid
-    end, sense = limit(scene.phase, tangential_psi1(scene))
-    weighted(work.on_grid, rest, work.sampled)
-    for cell in range(1, grid.size):
-        if sense * (work.sampled[cell] - end) > 0.0:
-            weighted(work.slopes, rest, work.slope)
-            left, right = grid[cell - 1], grid[cell]
-            if sense > 0.0:
-                left, right = right, left
-            return crossing(rest, work.slope, end, left, right, 0.5 * (left + right), work.accuracy.last_step)
-    return 2.0
-
-
-@compiled
-def release(scene: Scene, leg: Leg) -> float:
-    """Share of a leg at which the force vanishes; NaN if it hardly falls, or if that is not on the leg."""
-    if not leg.along.force < -_WEAK * leg.begin.force:
-        return math.nan
-    share = -leg.begin.force / leg.along.force
-    begin, along = leg.begin, leg.along
-    start = Equilibrium(begin.p + share * along.p, begin.q + share * along.q, 0.0)
-    share = share_of(leg, settle(scene, start, NO_FORCE, BY_FORCE, 0.0, SETTLED))
-    return share if 0.0 < share <= 1.0 else math.nan
-
-
-@compiled
-def end_of_line(line: Line | None, last: float, work: LegSeries) -> float:
-    """Position on a leg, up to a last one, at which the line of the drive ends. The series has the travel's rate."""
-    if line is None:
-        return 2.0
-    travel = work.series[ANGLE]
-    if value(travel, last) < line.end:
-        return 2.0
-    return crossing(travel, work.series[RATE], line.end, last, 0.0, 0.5 * last, work.accuracy.last_step)
-
-
-@compiled
-def first_fall(is_first: bool, work: LegSeries) -> float:
-    """Position at which the travel stops growing: 0 if it does not grow at all. Its rate is written to the series."""
-    rate, grid = work.series[RATE], work.grid
-    weighted(work.slopes, work.series[ANGLE], rate)
-    weighted(work.on_grid, rate, work.sampled)
-    for cell in range(1 if is_first else 0, grid.size):  # it always grows from first contact
-        if work.sampled[cell] <= 0.0:
-            if cell == 0:
-                return 0.0
-            weighted(work.slopes, rate, work.slope)
-            left, right = grid[cell - 1], grid[cell]
-            return crossing(rate, work.slope, 0.0, left, right, 0.5 * (left + right), work.accuracy.last_step)
-    return 2.0
-
-
-@compiled
-def polished_fold(scene: Scene, leg: Leg, stop: float, work: LegSeries) -> float:
-    """Position at which the exact derivative of the travel vanishes, by secants from the interpolant."""
-    weighted(work.slopes, work.series[RATE], work.slope)
-    bend = value(work.slope, stop)
-    at_stop, last = settle_on(scene, leg, stop, guess(work, stop), SETTLED).rates.travel, 2e-2
-    for _ in range(7):
-        step = at_stop / bend
-        if not abs(step) < 0.5 * last:
-            break
-        new = min(max(stop - step, 0.0), 1.0)
-        at_new = settle_on(scene, leg, new, guess(work, new), SETTLED).rates.travel
-        bend = (at_new - at_stop) / (new - stop)
-        stop, at_stop, last = new, at_new, abs(step)
-    return stop
-
-
-@compiled
-def regained(stop: float, most: float, work: LegSeries) -> float:
-    """Position after `stop` at which the travel exceeds a maximum again; `LOST` if it falls too far below it."""
-    travel, rate, grid = work.series[ANGLE], work.series[RATE], work.grid
-    weighted(work.on_grid, travel, work.sampled)
-    weighted(work.slopes, travel, rate)
-    weighted(work.slopes, rate, work.slope)
-    below = max(stop, 0.0)
-    falls = stop >= 0.0 or value(rate, below) < 0.0
-    for cell in range(grid.size):
-        above = grid[cell]
-        if above <= stop:
-            continue
-        rises = value(rate, above) > 0.0
-        lowest = above
-        if falls and rises and above > below:  # the whole dip may lie between two points of the grid
-            lowest = crossing(rate, work.slope, 0.0, above, below, 0.5 * (above + below), _LAST)
-        if value(travel, lowest) < most - DIP:
-            return LOST
-        if work.sampled[cell] > most:
-            below = lowest if lowest < above else below
-            return crossing(travel, rate, most, above, below, 0.5 * (above + below), _LAST)
-        below, falls = above, not rises
-    return 2.0

@@ -8,47 +8,66 @@ from typing import Any, NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.advance import LONGEST, Here, Setting, Step
-from tactile_bayes.mechanics.branches.equilibrium import (
-    SETTLED,
-    Balance,
-    Equilibrium,
-    Scene,
-    balance,
-    dot,
-    in_phase,
-    nowhere,
-    on_line,
-    settle,
-    settle_at_limit,
-    tangential_psi1,
-    times,
-)
-from tactile_bayes.mechanics.branches.leg import (
+from tactile_bayes.mechanics.branches.crossings import (
     LOST,
-    NUDGE,
-    LegSeries,
+    NOT_SLIPPING,
+    change_of_mode,
     change_of_phase,
     end_of_line,
     first_fall,
-    guess,
-    leg_from,
     polished_fold,
     regained,
+)
+from tactile_bayes.mechanics.branches.equilibrium import (
+    SETTLED,
+    Balance,
+    balance,
+    nowhere,
+    settle,
+    settle_at,
+    settle_at_limit,
+)
+from tactile_bayes.mechanics.branches.leg import (
+    NUDGE,
+    LegSeries,
+    guess,
+    leg_from,
     sample_leg,
     settle_on,
     share_of,
     shortened,
 )
 from tactile_bayes.mechanics.branches.line import Line
-from tactile_bayes.mechanics.branches.phase import following, limit
+from tactile_bayes.mechanics.branches.phase import (
+    ROLLING,
+    contact_at,
+    slides,
+    sliding_on,
+    slip,
+    stuck,
+    tip_touches,
+    touching,
+    turned_over,
+)
+from tactile_bayes.mechanics.branches.scene import (
+    Anchor,
+    Equilibrium,
+    Scene,
+    anchored,
+    dot,
+    in_phase,
+    on_line,
+    times,
+    with_friction,
+)
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 
-__all__ = ["KNOT", "OPEN", "Meeting", "fate_of", "go_on", "meet"]
+__all__ = ["KNOT", "OPEN", "Meeting", "fate_of", "go_on", "in_mode", "meet", "slid_back"]
 
-_SMOOTHLY, KNOT, _PHASE, _LINE = range(4)
-"""How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase, or the end
-of a line of the drive."""
+_SMOOTHLY, KNOT, _PHASE, _LINE, _MODE = range(5)
+"""How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase between tip
+and rod, the end of a line of the drive, or sliding or sticking ends."""
 
 OPEN = -1
 """In place of a `SnapOff` as long as the end of a path is not known."""
@@ -60,9 +79,12 @@ _NO_LOAD = 1e-8
 """Force [EI/L²] at the end of a leg on which a release was found that is zero. There may be another state without force
 on the plane across its end."""
 
-_NEVER, _FOLD, _CORNER, _THRUST, _RELEASE = (int(kind) for kind in SnapOff)
+_NEVER, _FOLD, _CORNER, _THRUST, _RELEASE, _JUMP = (int(kind) for kind in SnapOff)
 _RUNS_OUT = int(Reachability.RUNS_OUT)
 
+
+_HIDDEN = 1e-5
+"""Slip per travel in the wrong sense of a contact that has stuck for less than that."""
 
 _ROOM_PAST_LINE = 1.1
 """Largest travel of a leg on a line of the drive, over the travel up to its end: a path of 40 lines takes half the
@@ -96,6 +118,9 @@ def meet(here: Here, step: Step, in_dip: bool, is_first: bool, work: LegSeries) 
         kind, left = KNOT, step.at_knot
     if in_dip:
         return Meeting(kind, share, left, -1.0, here.begin, False)
+    way, at_mode = change_of_mode(scene, step.leg, share, work)
+    if way <= share:
+        kind, share, left = _MODE, way, at_mode
     stop = first_fall(is_first, work)
     over = end_of_line(scene.line, min(stop, share), work)
     if over <= 1.0:
@@ -133,7 +158,8 @@ def fate_of(step: Step, met: Meeting) -> int:
 
 @inlined
 def go_on(here: Here, setting: Setting, step: Step, met: Meeting, event: Any, work: LegSeries) -> Here:
-    """Where the branch goes on; NaN where it, the drive or the contour ends, which is written."""
+    """Where the branch goes on; NaN where it, the drive or the contour ends, or friction would not let it go on, which
+    is written."""
     if event.snap_off > _NEVER:
         position, begin = _regained_at(here, step, met, event.snap_angle, work)
         if position == LOST:
@@ -145,19 +171,83 @@ def go_on(here: Here, setting: Setting, step: Step, met: Meeting, event: Any, wo
         event.reach, event.snap_parameter = _RUNS_OUT, math.nan
     elif met.kind == _LINE and not _goes_on(setting.lines, here.line):
         event.snap_off = _NEVER
+    if met.kind == _SMOOTHLY:
+        scene = _rolled_on(here.scene, step.end.at)
+        return Here(scene, here.line, step.end, step.before_end, step.end.tangent, here.longest)
+    there = _behind(here, setting, step, met)
+    if event.snap_off > _NEVER:
+        return there
+    is_held, there = in_mode(there, met.kind == _MODE)
+    if not is_held:
+        event.snap_off = _JUMP
+        return _stopped(here)
+    return there
+
+
+@inlined
+def _behind(here: Here, setting: Setting, step: Step, met: Meeting) -> Here:
+    """Beginning of what follows a change of the phase, a knot, or the end of a line, in the same mode of friction."""
     if met.kind == _LINE:
         return _on_next_line(here, setting.lines, step, met)
-    scene, before, onward = here.scene, nowhere(), step.end.tangent
+    scene, begin, onward = here.scene, met.left, step.end.tangent
     if met.kind == _PHASE:
-        scene = in_phase(scene, following(scene.phase))
-        q, sense = limit(scene.phase, tangential_psi1(scene))
-        begin = balance(scene, Equilibrium(met.left.at.p, q, met.left.at.force))[0]
-        onward = Equilibrium(0.0, -sense, 0.0)
+        scene, at, onward = turned_over(scene, begin.at)
+        begin = balance(scene, at)[0]
     elif met.kind == KNOT:
         begin = nowhere() if step.knot == setting.ends[0] else _past(scene, step.at_knot, onward.p)
+    return Here(_rolled_on(scene, begin.at), here.line, begin, nowhere(), onward, here.longest)
+
+
+@compiled
+def _rolled_on(scene: Scene, at: Equilibrium) -> Scene:
+    """Scene of a rod that rolls, with its anchor where it has come to: the way from there is integrated anew."""
+    if scene.phase != ROLLING:
+        return scene
+    contact = contact_at(scene, at)
+    return anchored(scene, Anchor(contact.p, contact.arclength))
+
+
+@compiled
+def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
+    """Where a branch goes on sliding or sticking, and False if friction allows neither.
+
+    `changes` says whether sliding or sticking has ended. Otherwise a contact that slides does so as long as friction
+    opposes the slip, and one that sticks, sticks.
+    """
+    scene, line, begin, before, onward, longest = here
+    delta, was_sliding = scene.rig.friction_angle, slides(scene.phase)
+    if delta == 0.0 or not (changes or was_sliding) or not math.isfinite(begin.at.p):
+        return True, here
+    if was_sliding:
+        along = leg_from(scene, begin, onward, 1.0).along
+        if not changes and math.copysign(1.0, delta) * slip(scene, begin.at, along) <= NOT_SLIPPING:
+            return True, here
+        scene, at = stuck(scene, begin.at)
     else:
-        begin, before = step.end, step.before_end
-    return Here(scene, here.line, begin, before, onward, here.longest)
+        scene, at = sliding_on(scene, begin.at)
+    begin = balance(scene, at)[0]
+    onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
+    along, sense = leg_from(scene, begin, onward, 1.0).along, math.copysign(1.0, scene.rig.friction_angle)
+    off = along.q if was_sliding else slip(scene, begin.at, along)
+    # Where the slip has vanished, the force moves from the edge of the cone to second order.
+    return (changes and was_sliding) or sense * off <= NOT_SLIPPING, Here(scene, line, begin, before, onward, longest)
+
+
+@compiled
+def slid_back(here: Here) -> Here:
+    """Where a contact slides back that would stick for so little travel that rounding hides it, for a rod that is as
+    good as straight does not yield to a pull along it; NaN if it does not slide back."""
+    scene, line, begin, _, _, longest = here
+    contact, delta = contact_at(scene, begin.at), scene.rig.friction_angle
+    tip = tip_touches(scene.phase)
+    scene = with_friction(in_phase(scene, touching(tip)), -delta)
+    psi1 = contact.psi1 + contact.friction_angle + delta
+    at = Equilibrium(contact.p, psi1 if tip else contact.arclength, begin.at.force)
+    begin = settle_at(scene, contact.p, at)
+    onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
+    if math.copysign(1.0, delta) * slip(scene, begin.at, onward) < -_HIDDEN * abs(begin.rates.travel):
+        begin = nowhere()
+    return Here(scene, line, begin, nowhere(), onward, longest)
 
 
 @inlined
@@ -172,7 +262,7 @@ def _regained_at(here: Here, step: Step, met: Meeting, most: float, work: LegSer
     if step.end.at.force < 0.0:
         return LOST, here.begin
     if met.share < 1.0:
-        sample_leg(scene, shortened(step.leg, met.share), here.begin, nowhere(), met.share, work)
+        sample_leg(scene, shortened(step.leg, met.share), here.begin, nowhere(), met.share, bool(0), work)
         behind = min(behind / met.share, 1.0)
     found = regained(behind, most, work)
     if not 0.0 <= found <= 1.0:

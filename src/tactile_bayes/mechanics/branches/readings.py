@@ -8,23 +8,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.mechanics.branches.equilibrium import (
-    SETTLED,
-    Balance,
-    Equilibrium,
-    Scene,
-    balance,
-    in_phase,
-    on_line,
-    tangential_psi1,
-)
+from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, balance
 from tactile_bayes.mechanics.branches.leg import ANGLE, PLACE, RATE, REST, Leg, LegSeries, guess, settle_on
 from tactile_bayes.mechanics.branches.line import drive_angle_at
 from tactile_bayes.mechanics.branches.outline import on_object, place
-from tactile_bayes.mechanics.branches.phase import on_rod
+from tactile_bayes.mechanics.branches.phase import contact_at, slides, tip_touches
+from tactile_bayes.mechanics.branches.scene import (
+    Anchor,
+    Equilibrium,
+    Scene,
+    anchored,
+    in_phase,
+    on_line,
+    with_friction,
+)
 from tactile_bayes.mechanics.branches.series import at_all, copy_rows, crossing, two_values, value
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.poses.beam import bending
 
 __all__ = [
@@ -45,11 +46,11 @@ __all__ = [
 
 STATE_COLUMNS = (
     *("phase", "parameter", "x", "y", "slope_angle", "drive_angle"),
-    *("holding_moment", "force_x", "force_y", "arclength", "tip_angle", "travel", "friction_angle"),
+    *("holding_moment", "force_x", "force_y", "arclength", "tip_angle", "travel", "friction_angle", "sticks"),
 )
 STATE = np.dtype([(name, np.float64) for name in STATE_COLUMNS])
-"""A state in the sweep frame; the drive angle is that of the unloaded rod, without the turn of the suspension, and the
-friction angle has the sign of the sense in which friction acts."""
+"""A state in the sweep frame; the drive angle is that of the unloaded rod, without the turn of the suspension, the
+friction angle that from the contour's normal to the force, and `sticks` is 1 where the contact does not slip."""
 
 _NEAR, _MOST_STEPS = 1e-5, 6
 """Newton step, as a share of the leg, after which the search in series ends, and the largest number of steps."""
@@ -113,6 +114,8 @@ class Legs(NamedTuple):
     phase: Index
     line: Index
     """Number of the line of the drive."""
+    friction: Floats
+    """Angle of the friction, and the anchor of a contact that sticks, as in `Rig` and `Anchor`, shape (legs, 3)."""
     leg: Floats
     """As in `Leg`, and the equilibrium where its growing part ends, shape (legs, 4, 3)."""
     course: Floats
@@ -145,9 +148,12 @@ class Followed(NamedTuple):
 def legs_for(legs: int, order: int, samples: int) -> Legs:
     """Room for at most so many legs, with series of so many terms, and samples."""
     phase, line = np.empty((2, legs), dtype=np.intp)
+    friction = np.empty((legs, 3))
     leg, course, series = np.empty((legs, 4, 3)), np.empty((legs, 4)), np.empty((legs, RATE + 1, order))
     angles, wanted, twice, now, before = np.empty((5, samples))
-    return Legs(phase, line, leg, course, series, angles, wanted, twice, now, before, np.empty((ANGLE, samples)))
+    return Legs(
+        phase, line, friction, leg, course, series, angles, wanted, twice, now, before, np.empty((ANGLE, samples))
+    )
 
 
 @compiled
@@ -155,7 +161,8 @@ def store(
     k: int, scene: Scene, line: int, leg: Leg, end: Equilibrium, course: Course, work: LegSeries, legs: Legs
 ) -> None:
     """Keep a leg as number k."""
-    legs.phase[k], legs.line[k], rows = scene.phase, line, legs.leg[k]
+    legs.phase[k], legs.line[k], rows, friction = scene.phase, line, legs.leg[k], legs.friction[k]
+    friction[0], friction[1], friction[2] = scene.rig.friction_angle, scene.anchor.p, scene.anchor.arclength
     for c in range(3):
         rows[0, c], rows[1, c], rows[2, c], rows[3, c] = leg.begin[c], leg.along[c], leg.normal[c], end[c]
     for c in range(4):
@@ -167,9 +174,10 @@ def store(
 def recall(k: int, scene: Scene, lines: Floats | None, work: LegSeries, legs: Legs) -> Followed:
     """Leg number k, with its series in the workspace."""
     copy_rows(legs.series[k], work.series)
-    rows, course = legs.leg[k], legs.course[k]
+    rows, course, friction = legs.leg[k], legs.course[k], legs.friction[k]
     leg = Leg(_equilibrium(rows[0]), _equilibrium(rows[1]), _equilibrium(rows[2]))
-    there = on_line(in_phase(scene, legs.phase[k]), lines, legs.line[k])
+    there = anchored(on_line(in_phase(scene, legs.phase[k]), lines, legs.line[k]), Anchor(friction[1], friction[2]))
+    there = with_friction(there, friction[0])
     return Followed(there, leg, _equilibrium(rows[3]), Course(course[0], course[1], course[2], course[3]), work, legs)
 
 
@@ -197,8 +205,9 @@ def _bent(scene: Scene, way: float, series: Floats) -> float:
     """Largest change of curvature between pivot and contact at a position [1/L]."""
     moment, force_x = two_values(series[0], series[1], way)
     force_y, rest = two_values(series[2], series[REST], way)
+    at = Equilibrium(0.0 if slides(scene.phase) else value(series[PLACE], way), rest, 0.0)
     slope = drive_angle_at(scene.line, value(series[ANGLE], way)) - scene.rig.compliance * moment
-    return bending(scene.beam, slope, moment, force_x, force_y, on_rod(scene.phase, rest, 0.0)[1])
+    return bending(scene.beam, slope, moment, force_x, force_y, contact_at(scene, at).arclength)
 
 
 @compiled
@@ -206,19 +215,21 @@ def write_event(scene: Scene, at: Equilibrium, out: Any) -> None:
     """Write the state at an event of a path."""
     found = balance(scene, at)[0]
     moment, force_x, force_y = found.holding_moment, found.force_x, found.force_y
-    _write_state(scene, at.p, at.q, found.travel, moment, force_x, force_y, out)
+    _write_state(scene, at, found.travel, moment, force_x, force_y, out)
 
 
 @compiled
 def _write_state(
-    scene: Scene, p: float, q: float, travel: float, moment: float, force_x: float, force_y: float, out: Any
+    scene: Scene, at: Equilibrium, travel: float, moment: float, force_x: float, force_y: float, out: Any
 ) -> None:
-    at = place(scene.outline, p)
-    psi1, arclength = on_rod(scene.phase, q, tangential_psi1(scene))
-    out.phase, out.parameter, out.travel, out.arclength = scene.phase, p, travel, arclength
-    out.x, out.y = on_object(scene.outline, at)
-    out.slope_angle, out.friction_angle = math.atan2(at.sin, at.cos), scene.rig.friction_angle
-    out.tip_angle = out.slope_angle + (scene.rig.friction_angle + psi1)
+    contact = contact_at(scene, at)
+    there = place(scene.outline, contact.p)
+    out.phase = TIP if tip_touches(scene.phase) else TANGENTIAL
+    out.parameter, out.travel, out.arclength = contact.p, travel, contact.arclength
+    out.x, out.y = on_object(scene.outline, there)
+    out.slope_angle, out.friction_angle = math.atan2(there.sin, there.cos), contact.friction_angle
+    out.sticks = 0.0 if slides(scene.phase) else 1.0
+    out.tip_angle = out.slope_angle + (contact.friction_angle + contact.psi1)
     out.drive_angle = drive_angle_at(scene.line, travel) - scene.rig.compliance * moment
     out.holding_moment, out.force_x, out.force_y = moment, force_x, force_y
 
@@ -242,7 +253,7 @@ def write_samples(samples: Samples, part: Followed, wants_states: bool, out: Fou
                 if not math.isfinite(state.travel):
                     continue
                 at, moment, force_x, force_y = state.at, state.holding_moment, state.force_x, state.force_y
-            _write_state(scene, at.p, at.q, travel, moment, force_x, force_y, out.states[row])
+            _write_state(scene, at, travel, moment, force_x, force_y, out.states[row])
         loads = out.loads[row]
         loads[0], loads[1] = rig.sign * rig.moment_unit * moment, rig.sign * rig.force_unit * force_x
         loads[2] = rig.force_unit * force_y

@@ -19,18 +19,19 @@ from tactile_bayes.mechanics.branches.branch import (
     refuse,
 )
 from tactile_bayes.mechanics.branches.clearance import travel_into
-from tactile_bayes.mechanics.branches.equilibrium import Rig, Scene
 from tactile_bayes.mechanics.branches.first_contact import clear_angle
 from tactile_bayes.mechanics.branches.leg import Accuracy
 from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_of
 from tactile_bayes.mechanics.branches.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.branches.readings import STATE, STATE_COLUMNS, Found, Samples
+from tactile_bayes.mechanics.branches.scene import NOWHERE, Rig, Scene
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_of, varied_of
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLES, Tables, prepare
+from tactile_bayes.mechanics.poses.taylor import write_shape
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
-from tactile_bayes.mechanics.rods.profile import Profile
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 from tactile_bayes.tasks import in_parts
 
 if TYPE_CHECKING:
@@ -41,8 +42,9 @@ __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "shapes_of", "solve_swee
 _SAME_ANGLE = 1e-5
 """Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
 
-_TOUCHES, _STICKS = int(Reachability.TOUCHES), int(Reachability.STICKS)
-_BEGINS_INSIDE = int(Reachability.BEGINS_INSIDE)
+_TOUCHES, _TOO_FAR, _BEGINS_INSIDE = (
+    int(reach) for reach in (Reachability.TOUCHES, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
+)
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
 _EXACT = Accuracy(
@@ -62,6 +64,9 @@ _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
 
 _FAST = _EXACT._replace(resolved=1e-3, sharp=1e-6, first_step=1e-6, last_step=1e-4, exact=False)
 """Accuracy that noise requires, beside its tolerance."""
+
+_LAST_STEP_STUCK = 4e-16
+"""Last step where a rod may stick: what hardly slips is lost by coarser ones."""
 
 _EXACT_ORDER, _FAST_ORDER = 32, 12
 """Numbers of terms of the series of a leg."""
@@ -116,6 +121,8 @@ class Sweeps(NamedTuple):
     compliance: Floats
     rest_curvature: Floats
     """Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]; with a profile, what is added to its own."""
+    rest_shape: Floats
+    """Amplitudes of the modes of a profile, shape (sweeps, MOST_MODES)."""
     taper: Floats
     """Taper, for rods with a profile."""
     stem: Floats
@@ -185,7 +192,8 @@ def _as_sweeps(sweeps: Sweeps) -> NDArray[np.void]:
 def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
     """Structured type, so that compiled code takes one array instead of one for each name."""
     kinds = {**dict.fromkeys(_INDICES, np.intp), **dict.fromkeys(_FLAGS, np.bool_), **dict.fromkeys(_CODES, np.int8)}
-    return np.dtype([(name, kinds.get(name, np.float64)) for name in names], align=True)
+    shapes = {"rest_shape": (MOST_MODES,)}
+    return np.dtype([(name, kinds.get(name, np.float64), shapes.get(name, ())) for name in names], align=True)
 
 
 _SWEEP, _EVENTS = _side_by_side(Sweeps._fields), _side_by_side(Solutions._fields[3:])
@@ -240,7 +248,7 @@ def _scene(
     rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, moment, moment / sweep.relative_length)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
-    return Scene(outline, beam, rig, line, TIP)
+    return Scene(outline, beam, rig, line, TIP, NOWHERE)
 
 
 @compiled
@@ -261,8 +269,9 @@ def _beam(
     """Rod of a sweep, with coefficients for its friction, and for friction of the other sense if that may act."""
     if varied is None:
         return beam_of(sign * sweep.rest_curvature, varied, sweep.stem)
-    edges, curvature, rigidity, _, bend, _ = varied.profile
-    room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
+    edges, curvature, rigidity, _, bend, _, modes, shape = varied.profile
+    write_shape(modes, sweep.rest_shape, shape, curvature)
+    room = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign, modes, shape)
     angle, own, other = sweep.friction_angle, varied.sheet, varied.other_sheet
     slenderness, otherwise = 0.0, 0.0
     for table in known:
@@ -296,30 +305,11 @@ def _clear_angle(scene: Scene, lines: Floats | None, event: Any, accuracy: Accur
 
 @compiled
 def _is_inside_before(scene: Scene, lines: Floats | None, first: float) -> bool:
-    """True if a drive has carried the unloaded rod into the object before it touches there from this side."""
+    """True if a drive carries the unloaded rod into the object before it touches there from this side, if it does."""
     if lines is None:
         return False
     inside = travel_into(scene.outline, scene.beam, lines, line_of(lines, 0).travel, True)
     return -math.inf < inside < first - _SAME_ANGLE
-
-
-@compiled
-def _follow(
-    scene: Scene, room: Floats | None, samples: Samples, asks_sliding: bool, workspace: BranchWorkspace, found: Found
-) -> None:
-    """Follow a branch along which friction opposes the slip; in rotations it acts as if it did unless that is asked.
-
-    Where such a branch is refused for another reason, that is the reason.
-    """
-    yes, no = bool(1), bool(0)  # numba would compile all once for True and again for False
-    follow_branch(scene, room, samples, yes, workspace, found)
-    if found.event.reach == _STICKS and room is None:
-        where = found.event.snap_parameter
-        if asks_sliding:
-            samples = Samples(samples.angles[:0], samples.rows[:0], samples.relative)
-        follow_branch(scene, room, samples, no, workspace, found)
-        if asks_sliding and found.event.reach == _TOUCHES:
-            refuse(_STICKS, where, found.event)
 
 
 @cached
@@ -333,7 +323,6 @@ def _solve(
     room: Floats | None,
     line: Line | None,
     asks_clearance: bool,
-    asks_sliding: bool,
     workspace: BranchWorkspace,
     table: Floats,
     loads: Floats,
@@ -356,12 +345,14 @@ def _solve(
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
         samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
         found = Found(loads[c], all_states[c], event_states[i], event)
-        _follow(scene, room, samples, asks_sliding, workspace, found)
+        follow_branch(scene, room, samples, workspace, found)
         event.clear_angle = math.nan
         if asks_clearance and event.reach == _TOUCHES:
             event.clear_angle = _clear_angle(scene, room, event, accuracy)
-            if accuracy.exact and _is_inside_before(scene, room, event.first_angle):
-                event.reach = _BEGINS_INSIDE
+        if asks_clearance and accuracy.exact and event.reach in (_TOUCHES, _TOO_FAR):
+            first = event.first_angle if event.reach == _TOUCHES else math.inf
+            if _is_inside_before(scene, room, first):
+                refuse(_BEGINS_INSIDE, math.nan, event)
 
 
 def solve_sweeps(
@@ -376,7 +367,6 @@ def solve_sweeps(
     states: bool = False,
     polished: bool = True,
     asks_clearance: bool = True,
-    asks_sliding: bool = False,
 ) -> Solutions:
     """Follow the paths of sweeps, and compute loads, and states if wanted, of their samples.
 
@@ -385,14 +375,13 @@ def solve_sweeps(
     for loads with errors of some 1e-6 of the largest. `tolerance` are tolerated errors of moment and forces [EI/L and
     EI/L²], at least 1e-10 of the loads; without it events are exact, and loads have errors of some 1e-8 of the largest.
     States are exact if `polished`; otherwise they come from the series, with an error of 1e-10 of the largest.
-    `asks_sliding` says whether there is a path only where friction opposes the slip all along it, as it always does
-    where the base is carried; in rotations it otherwise acts as on a straight rod, which is wrong where a curved one
-    slides outward.
     """
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     else:
         accuracy, order = _FAST._replace(tolerance=tolerance), _FAST_ORDER
+        if segments.lines is not None and np.any(sweeps.friction_angle):
+            accuracy = accuracy._replace(last_step=_LAST_STEP_STUCK)
     count, rows = shape
     sweep = _as_sweeps(sweeps)
     loads, all_states = np.zeros((count, rows, 3)), np.zeros((count, rows if states else 0), dtype=STATE)
@@ -404,13 +393,12 @@ def solve_sweeps(
     def solve(part: slice) -> None:
         _solve(
             shapes,
-            varied_of(profile),
+            varied_of(None if profile is None else profile.shaped(np.zeros(MOST_MODES))),  # with arrays of its own
             known,
             sweep[part],
             segments,
             *_carried(segments.lines),
             asks_clearance,
-            asks_sliding,
             branch_workspace(accuracy, order, longest, shapes.knots.shape[1], lines),
             np.empty(shapes.tables.shape[1:]),
             loads,

@@ -79,7 +79,7 @@ def _between(varied: Varied | None, beam: Beam, begin: float, way: float, room: 
     left = min(_WHOLE - way, 1.0)
     if varied is None or room is None:
         return Beam(beam.curvature - left * (beam.curvature - begin), 1.0, math.inf, varied, 0.0, 1.0)
-    edges, bent, rigidity, taper, bend, sign = varied.profile
+    edges, bent, rigidity, taper, bend, sign, modes, shape = varied.profile
     bent_share, rigid_share = 1.0 - left, min(way, 1.0)
     for i in range(edges.size):
         for k in range(bent.shape[1]):
@@ -88,7 +88,7 @@ def _between(varied: Varied | None, beam: Beam, begin: float, way: float, room: 
             room.rigidity[i, k] = rigid_share * rigidity[i, k]
         room.rigidity[i, 0] += 1.0 - rigid_share
     bend = bent_share * bend + left * sign * begin
-    profile = Profile(edges, room.curvature, room.rigidity, rigid_share * taper, bend, sign)
+    profile = Profile(edges, room.curvature, room.rigidity, rigid_share * taper, bend, sign, modes, shape)
     varied = Varied(profile, varied.work, varied.sheet, 0.0, 1.0, varied.other_sheet, 0.0)
     return Beam(0.0, 1.0, math.inf, varied, 0.0, 1.0)
 

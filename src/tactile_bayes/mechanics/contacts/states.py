@@ -17,7 +17,17 @@ from tactile_bayes.mechanics.poses.arc import SHORT_COSINE, arc_at
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, by_kind, end_of_arc, lever_of_stem, mirrored_by
 from tactile_bayes.mechanics.poses.pose import pose
 from tactile_bayes.mechanics.poses.profile_shape import shape_along
-from tactile_bayes.mechanics.poses.taylor import EXACT, FARTHEST, FORWARD, State, advance, begin, moved, rise
+from tactile_bayes.mechanics.poses.taylor import (
+    EXACT,
+    FARTHEST,
+    FORWARD,
+    State,
+    advance,
+    arclength_to,
+    begin,
+    moved,
+    rise,
+)
 from tactile_bayes.mechanics.rods.profile import Profile
 
 __all__ = ["contact", "contact_of", "contact_pair", "write_contacts", "write_shapes"]
@@ -75,10 +85,10 @@ def _zeros_along(
     march = begin(profile, 0.0, FORWARD, state)
     while march.at < FARTHEST:
         before = march
-        step, march = advance(profile, before, FORWARD, FARTHEST, force, work, EXACT)
+        step, march, _ = advance(profile, before, FORWARD, FARTHEST, force, work, EXACT, None)
         x = rise(before.state, force, step, sense, 0.0, work)
         if x >= 0.0:
-            end, at = moved(before.state, force, step, x, work), before.at + x * step.length
+            end, at = moved(before.state, force, step, x, work), before.at + arclength_to(step, x)
             cos, sin = math.cos(beta), math.sin(beta)
             x, y = end.u * cos - end.v * sin, end.u * sin + end.v * cos
             if sense > 0.0:

@@ -175,8 +175,8 @@ def mirrored_beam(varied: Varied | None, beam: Beam) -> Beam:
 def with_sign(varied: Varied, sign: float) -> Varied:
     """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
     profile, work, own, slenderness, own_sign, other, other_slenderness = varied
-    edges, curvature, rigidity, taper, bend, _ = profile
-    turned = Profile(edges, curvature, rigidity, taper, bend, sign)
+    edges, curvature, rigidity, taper, bend, _, modes, shape = profile
+    turned = Profile(edges, curvature, rigidity, taper, bend, sign, modes, shape)
     return Varied(turned, work, own, slenderness, own_sign, other, other_slenderness)
 
 

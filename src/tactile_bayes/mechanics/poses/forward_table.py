@@ -6,7 +6,8 @@ All rods of a likelihood have one profile. Its table holds their pose, as seen f
     tangential contact:  s1 and f Λ(s1)², up to the tip, and beyond it: the last series of a phase may go on there,
 
 with the length Λ(s) = ∫ EI^(−1/2) ds of a uniform rod that bends as much; and in those of taper, addition to the rest
-curvature and friction angle that vary between the rods. These are the same throughout a sweep, and contracted once.
+curvature, friction angle, and amplitudes of the modes of the rest curvature that vary between the rods. These are the
+same throughout a sweep, and contracted once.
 
 Polynomials interpolate at Chebyshev nodes and at f = 0: there the deficit of the chord, from which the force follows,
 is of second order, and an error in it would be one of its square root in the force. They are not extrapolated.
@@ -39,8 +40,8 @@ from tactile_bayes.mechanics.poses.sheet import (
     pose_in,
     sheet,
 )
-from tactile_bayes.mechanics.poses.taylor import workspace
-from tactile_bayes.mechanics.rods.profile import Profile
+from tactile_bayes.mechanics.poses.taylor import workspace, write_shape
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 from tactile_bayes.numerics import chebyshev
 from tactile_bayes.tasks import in_parts
 
@@ -49,8 +50,20 @@ __all__ = ["GRADES", "NO_TABLE", "NO_TABLES", "Box", "ForwardTable", "Tables", "
 _WORST = 1e-5
 """Largest error of the pose with which a table is of use."""
 
-_OUTER, _OUTER_OF_BOTH, _BOTH = (5, 5, 7), (5, 5, MOST_NODES), 0.7
+_OUTER, _OUTER_OF_BOTH, _BOTH = (5, 5, 7), (5, 5, 12), 0.7
 """Nodes in a taper, bend and friction angle that vary, also for friction of either sense: angles of a wider range."""
+
+_POWERS = np.array(
+    [(i, j, k) for i in range(5) for j in range(3) for k in range(3 - j) if i <= (4, 2, 0)[j + k]], dtype=np.intp
+)
+"""Powers of the amplitudes of modes, over the largest: the first mode deflects a rod ten times as far as the others."""
+
+_SHAPES = np.array(
+    [(x, 0.0, 0.0) for x in (-1.0, -0.6, 0.0, 0.6, 1.0)]
+    + [(x, *yz) for x in (-0.7, 0.0, 0.7) for yz in ((0.7, 0.0), (-0.7, 0.0), (0.0, 0.7), (0.0, -0.7))]
+    + [(0.0, y, z) for y in (-0.7, 0.7) for z in (-0.7, 0.7)]
+)
+"""Amplitudes, over the largest, at which poses are calculated for least squares."""
 
 _NEGLIGIBLE, _AT_ONSET = 2e-7, 100.0
 """Size of terms that are left out, and how much smaller it is without a force."""
@@ -90,13 +103,15 @@ class Box(NamedTuple):
     taper: tuple[float, float]
     bend: tuple[float, float]
     friction_angle: tuple[float, float]
+    shape: float = 0.0
+    """Largest root of the sum of the squares of the amplitudes of modes."""
 
 
 class Terms(NamedTuple):
-    """Coefficients in taper, bend and friction angle that are not negligible."""
+    """Coefficients in taper, bend, friction angle and shape that are not negligible."""
 
     orders: Index
-    """Orders of the Chebyshev polynomials, shape (terms, 3)."""
+    """Orders of the Chebyshev polynomials, and of the row of `_POWERS`, shape (terms, 4)."""
     coefficients: Floats
     """Coefficients of a rod and of its mirror image, shape (2, terms, rows, columns)."""
 
@@ -114,6 +129,8 @@ class ForwardTable(NamedTuple):
     """Arc length, bearing and slope of the rod at rest at a distance, in one row."""
     box: Floats
     """Least and largest taper, bend and friction angle, shape (3, 2)."""
+    shape: float
+    """Largest amplitudes of modes, as in `Box`."""
     slenderness: float
     """Λ(1) without the taper."""
     psi1: tuple[float, float]
@@ -122,9 +139,9 @@ class ForwardTable(NamedTuple):
     """Logarithm of 1 + f Λ²/10 at the largest force."""
 
 
-_NONE = Terms(np.zeros((0, 3), dtype=np.intp), np.zeros((2, 0, 0, 0)))
+_NONE = Terms(np.zeros((0, 4), dtype=np.intp), np.zeros((2, 0, 0, 0)))
 
-NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 1.0, (0.0, 1.0), 1.0)
+NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 0.0, 1.0, (0.0, 1.0), 1.0)
 """Table without any rod."""
 
 Tables = tuple[ForwardTable, ForwardTable]
@@ -140,7 +157,8 @@ def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:
     A grade of 1 or 2 is a fine table. It has more terms, and smaller ranges of ψ1 and of the force, the smallest for 2,
     except that rods curved backward touch at larger ψ1: it holds rods of strong and uneven curvature, and costs more.
     """
-    middle = Box(*((0.5 * (low + high),) * 2 for low, high in box))
+    taper, bend, friction_angle = ((0.5 * (low + high),) * 2 for low, high in box[:3])
+    middle = Box(taper, bend, friction_angle)
     table = NO_TABLE
     for each in dict.fromkeys((middle, box)):  # a single rod tells soon where terms are too few for all
         table = _tabulated(profile, each, grade)
@@ -154,33 +172,35 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
     low, span = -box.friction_angle[1] - below, math.log1p(most / SCALE)
     wide = box.friction_angle[1] - box.friction_angle[0] > _BOTH
     counts = _OUTER_OF_BOTH if wide else _OUTER
-    shares = [chebyshev.nodes(n if end > begin else 1) for n, (begin, end) in zip(counts, box, strict=True)]
-    tapers, bends, deltas = (begin + (end - begin) * z for z, (begin, end) in zip(shares, box, strict=True))
-    outer = tapers.size, bends.size, deltas.size
+    shares = [chebyshev.nodes(n if end > begin else 1) for n, (begin, end) in zip(counts, box[:3], strict=True)]
+    tapers, bends, deltas = (begin + (end - begin) * z for z, (begin, end) in zip(shares, box[:3], strict=True))
+    shapes = box.shape * (_SHAPES if box.shape else _SHAPES[:1])
+    outer = tapers.size, bends.size, len(shapes), deltas.size
     slenderness = _slenderness(profile)
     ways, loading = chebyshev.nodes(rows), np.concatenate([[0.0], chebyshev.nodes(TERMS - 1)])
     forces = SCALE * np.expm1(span * loading)
-    tip, tangential = np.empty((2, *outer[:2], rows, TERMS, 3)), np.empty((2, *outer, 2, rows, TERMS, 3))
-    chord, distances = np.empty((2, outer[1], 3, TERMS)), chebyshev.nodes(TERMS)
+    tip, tangential = np.empty((2, *outer[:3], rows, TERMS, 3)), np.empty((2, *outer, 2, rows, TERMS, 3))
+    chord, distances = np.empty((2, *outer[1:3], 3, TERMS)), chebyshev.nodes(TERMS)
     psi1 = low + (high - low) * ways
-    rods = list(product(enumerate((1.0, -1.0)), enumerate(bends), enumerate(tapers)))
+    rods = list(product(enumerate((1.0, -1.0)), enumerate(bends), enumerate(shapes), enumerate(tapers)))
 
     def write(part: slice) -> None:
         work = workspace()
-        for (i, sign), (b, bend), (a, taper) in rods[part]:
-            rod, out = profile._replace(taper=taper, bend=bend, sign=sign), (tip[i, a, b], tangential[i, a, b])
+        for (i, sign), (b, bend), (c, shape), (a, taper) in rods[part]:
+            rod = profile.shaped(shape)._replace(taper=taper, bend=bend, sign=sign)
             # The rod at rest does not depend on the taper.
             known = psi1, ways, deltas, forces, slenderness, distances[: 0 if a else TERMS]
-            _write_rod(rod, *known, work, *out, chord[i, b])
+            _write_rod(rod, *known, work, tip[i, a, b, c], tangential[i, a, b, c], chord[i, b, c])
 
     in_parts(write, len(rods), 1)
     felt = np.where(forces > 0.0, forces < _THRUST, _AT_ONSET)[:, None]
     return ForwardTable(
-        _phase(tip[:, :, :, None], felt, loading),
+        _phase(tip[:, :, :, :, None], felt, loading),
         _phase(tangential[..., 0, :, :, :], felt, loading),
         _phase(tangential[..., 1, :, :, :], felt, loading),
-        _terms(chord[:, None, :, None, None], _AT_ONSET, (-1, distances)),
-        np.array(box, dtype=float),
+        _terms(chord[:, None, :, :, None, None], _AT_ONSET, (-1, distances)),
+        np.array(box[:3], dtype=float),
+        box.shape,
         slenderness,
         (low, high),
         span,
@@ -188,22 +208,26 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
 
 
 def _terms(values: Floats, relevance: Floats | float, *inner: tuple[int, Floats]) -> Terms:
-    """Terms from values at nodes, those in taper, bend and friction angle along the axes after the first."""
-    for axis in (1, 2, 3):
+    """Terms from values at nodes, those in taper, bend, shape and friction angle along the axes after the first."""
+    for axis in (1, 2, 4):
         values = np.moveaxis(chebyshev.coefficients(np.moveaxis(values, axis, -1)), 0, axis)
-    size = (relevance * np.abs(values)).max(axis=(0, 4, 5, 6))
+    if values.shape[3] > 1:
+        powers = np.linalg.pinv(np.prod(_SHAPES[:, None] ** _POWERS, axis=-1))
+        values = np.moveaxis(np.tensordot(powers, values, (1, 3)), 0, 3)
+    values = np.moveaxis(values, 3, 4)
+    size = (relevance * np.abs(values)).max(axis=(0, 5, 6, 7))
     orders = np.ascontiguousarray(np.argwhere(size > _NEGLIGIBLE))
     for axis, points in inner:
         fit = np.linalg.inv(np.vander(2.0 * points - 1.0, increasing=True))
         values = np.moveaxis(np.tensordot(fit, values, (1, axis)), 0, axis)
-    coefficients = values.reshape(*values.shape[:4], -1, COLUMNS)
+    coefficients = values.reshape(*values.shape[:5], -1, COLUMNS)
     return Terms(orders, np.ascontiguousarray(coefficients[:, *orders.T]))
 
 
 def _phase(values: Floats, relevance: Floats, loading: Floats) -> Terms:
     """Terms of a phase, from as few nodes in ψ1 or s1, along the axis −3, as leave out negligible terms only."""
     coefficients = chebyshev.coefficients(np.moveaxis(values, -3, -1))
-    needed = (np.maximum(relevance, 1.0) * np.abs(coefficients)).max(axis=(1, 2, 3, 4, 5, 6)) > _NEGLIGIBLE
+    needed = (np.maximum(relevance, 1.0) * np.abs(coefficients)).max(axis=tuple(range(1, 8))) > _NEGLIGIBLE
     count = min(-(-(1 + np.flatnonzero(needed)[-1]) // GROUP) * GROUP, needed.size)
     nodes = chebyshev.nodes(count)
     few = np.moveaxis(np.tensordot(chebyshev.polynomials(count, nodes), coefficients[:count], 1), 0, -3)
@@ -265,23 +289,51 @@ def _is_prepared(table: ForwardTable, profile: Profile, friction_angle: float, o
     low, high = table.psi1
     if not (own.least_psi1 == low and own.most_psi1 == high and own.span == table.span and own.sign == profile.sign):
         return False
+    for k in range(MOST_MODES):
+        if own.shape[k] != profile.shape[k]:
+            return False
     return own.taper == profile.taper and own.bend == profile.bend and own.friction_angle == friction_angle
+
+
+@compiled
+def _holds(table: ForwardTable, values: tuple[float, float, float], shape: Floats) -> bool:
+    """True if a table holds a rod of this taper, bend, friction angle and shape."""
+    square = 0.0
+    for k in range(MOST_MODES):
+        square += shape[k] * shape[k]
+    for c in range(3):
+        if not table.box[c, 0] - _ROUNDING <= values[c] <= table.box[c, 1] + _ROUNDING:
+            return False
+    return square <= table.shape * table.shape
+
+
+@compiled
+def _write_outer(table: ForwardTable, values: tuple[float, float, float], shape: Floats, outer: Floats) -> None:
+    """Write polynomials in taper, bend and friction angle, and in the amplitudes of modes."""
+    box = table.box
+    for c in range(3):
+        x = (2.0 * values[c] - box[c, 0] - box[c, 1]) / (box[c, 1] - box[c, 0]) if box[c, 1] > box[c, 0] else 0.0
+        outer[c, 0], outer[c, 1] = 1.0, x
+        for k in range(2, MOST_NODES):
+            outer[c, k] = 2.0 * x * outer[c, k - 1] - outer[c, k - 2]
+    for r in range(_POWERS.shape[0]):
+        outer[3, r] = 1.0
+        for k in range(MOST_MODES):
+            for _ in range(_POWERS[r, k] if table.shape > 0.0 else 0):
+                outer[3, r] *= shape[k] / table.shape
 
 
 @compiled
 def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet: NDArray[np.void]) -> bool:
     """Write the coefficients of one rod, unless they are there, and return False if the table does not hold it."""
-    own, box, values = sheet[0], table.box, (profile.taper, profile.bend, friction_angle)
+    own, values = sheet[0], (profile.taper, profile.bend, friction_angle)
     if _is_prepared(table, profile, friction_angle, own):
         return True
-    for c in range(3):
-        if not box[c, 0] - _ROUNDING <= values[c] <= box[c, 1] + _ROUNDING:
-            return False
-    for c in range(3):
-        x = (2.0 * values[c] - box[c, 0] - box[c, 1]) / (box[c, 1] - box[c, 0]) if box[c, 1] > box[c, 0] else 0.0
-        own.outer[c, 0], own.outer[c, 1] = 1.0, x
-        for k in range(2, MOST_NODES):
-            own.outer[c, k] = 2.0 * x * own.outer[c, k - 1] - own.outer[c, k - 2]
+    if not _holds(table, values, profile.shape):
+        return False
+    _write_outer(table, values, profile.shape, own.outer)
+    for k in range(MOST_MODES):
+        own.shape[k] = profile.shape[k]
     own.least_psi1, own.most_psi1 = table.psi1
     own.span, own.sign, own.friction_angle = table.span, profile.sign, friction_angle
     own.taper, own.bend = profile.taper, profile.bend
@@ -296,12 +348,12 @@ def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet:
 
 @compiled
 def _contract(terms: Terms, mirrored: int, outer: Floats, out: Floats) -> None:
-    """Write the sum over taper, bend and friction angle, from their polynomials."""
+    """Write the sum over taper, bend, friction angle and shape, from their polynomials."""
     orders, coefficients = terms.orders, terms.coefficients
     rows = coefficients.shape[2]
     out[:rows] = 0.0
     for k in range(orders.shape[0]):
-        weight = outer[0, orders[k, 0]] * outer[1, orders[k, 1]] * outer[2, orders[k, 2]]
+        weight = outer[0, orders[k, 0]] * outer[1, orders[k, 1]] * outer[2, orders[k, 2]] * outer[3, orders[k, 3]]
         for i in range(rows):
             for j in range(COLUMNS):
                 out[i, j] += weight * coefficients[mirrored, k, i, j]
@@ -311,15 +363,17 @@ def _contract(terms: Terms, mirrored: int, outer: Floats, out: Floats) -> None:
 def _write_errors(
     profile: Profile, table: ForwardTable, samples: Floats, work: Floats, sheet: NDArray[np.void], out: Floats
 ) -> None:
-    """Write the errors of the pose at points of all dimensions, given as shares, for contacts before the thrust, or of
-    the chord of the rod at rest, if they are larger."""
+    """Write the errors of the pose at points of all dimensions, given as shares, and amplitudes of modes, for contacts
+    before the thrust, or of the chord of the rod at rest, if they are larger."""
     box, at = table.box, samples
     for k in range(samples.shape[0]):
         taper = box[0, 0] + at[k, 0] * (box[0, 1] - box[0, 0])
         bend = box[1, 0] + at[k, 1] * (box[1, 1] - box[1, 0])
         delta = box[2, 0] + at[k, 2] * (box[2, 1] - box[2, 0])
         sign, tip = (1.0 if at[k, 3] < 0.5 else -1.0), at[k, 4] < 0.5
-        rod = Profile(profile.edges, profile.curvature, profile.rigidity, taper, bend, sign)
+        write_shape(profile.modes, at[k, 7:], profile.shape, profile.curvature)
+        edges, curvature, rigidity, _, _, _, modes, shape = profile
+        rod = Profile(edges, curvature, rigidity, taper, bend, sign, modes, shape)
         psi1, arclength = (at[k, 5] * (table.psi1[1] + delta) - delta, 1.0) if tip else (-delta, at[k, 5])
         length = length_of(table.slenderness, taper, arclength)[0]
         force = SCALE * math.expm1(table.span * at[k, 6]) / (length * length)
@@ -338,6 +392,9 @@ def _write_errors(
 
 
 def _errors(profile: Profile, table: ForwardTable) -> Floats:
-    out = np.empty(_CHECKS)
-    _write_errors(profile, table, np.random.default_rng(0).uniform(size=(_CHECKS, 7)), workspace(), sheet(), out)
+    out, rng = np.empty(_CHECKS), np.random.default_rng(0)
+    shares, ways = rng.uniform(size=(_CHECKS, 7)), rng.normal(size=(_CHECKS, MOST_MODES))
+    ways *= table.shape * rng.uniform(size=(_CHECKS, 1)) / np.linalg.norm(ways, axis=1, keepdims=True)
+    rod = profile.shaped(np.zeros(MOST_MODES))  # with arrays of its own
+    _write_errors(rod, table, np.concatenate([shares, ways], axis=1), workspace(), sheet(), out)
     return out

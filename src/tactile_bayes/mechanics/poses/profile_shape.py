@@ -19,12 +19,14 @@ from tactile_bayes.mechanics.poses.taylor import (
     March,
     State,
     advance,
+    arclength_to,
     begin,
+    bending_at,
     cell_at,
     moved,
     peak,
+    point_at,
     rest_curvature_at,
-    rigidity_in,
     rise,
 )
 from tactile_bayes.mechanics.rods.profile import Profile
@@ -86,11 +88,10 @@ def shape_along(
             state = before.state
             unloaded = State(state.psi, 0.0, state.u, state.v)
             before, acting, end = March(before.at, before.cell, unloaded, before.steps), 0.0, tip
-        step, march = advance(profile, before, FORWARD, end, acting, work, EXACT)
+        step, march, _ = advance(profile, before, FORWARD, end, acting, work, EXACT, None)
         for k in range(arclengths.size):
             if before.at < arclengths[k] <= march.at:
-                share = step.share * (arclengths[k] - before.at) / (march.at - before.at)
-                at = moved(before.state, acting, step, share, work)
+                at = moved(before.state, acting, step, point_at(step, arclengths[k] - before.at), work)
                 x[k], y[k] = at.u * cos - at.v * sin, at.u * sin + at.v * cos
 
 
@@ -111,7 +112,7 @@ def beyond_along(profile: Profile, arclength: float, work: Floats) -> tuple[floa
 @compiled
 def _at_rest(profile: Profile, march: March, until: float, work: Floats) -> March:
     while march.at < until:
-        _, march = advance(profile, march, FORWARD, until, 0.0, work, EXACT)
+        _, march, _ = advance(profile, march, FORWARD, until, 0.0, work, EXACT, None)
     return march
 
 
@@ -125,7 +126,7 @@ def chord_along(profile: Profile, stem: float, distance: float, work: Floats) ->
     found, farthest, at = beginning, 0.0, 0.0
     while march.at < FARTHEST:
         before = march
-        step, march = advance(profile, before, FORWARD, FARTHEST, 0.0, work, EXACT)
+        step, march, _ = advance(profile, before, FORWARD, FARTHEST, 0.0, work, EXACT, None)
         x = rise(before.state, 0.0, step, 0.0, distance, work)
         reaches = x >= 0.0
         if not reaches:
@@ -133,7 +134,7 @@ def chord_along(profile: Profile, stem: float, distance: float, work: Floats) ->
         end = moved(before.state, 0.0, step, x, work)
         far = math.hypot(end.u, end.v)
         if reaches or far > farthest:
-            found, farthest, at = end, far, before.at + x * step.length
+            found, farthest, at = end, far, before.at + arclength_to(step, x)
         if reaches:
             break
     if math.isnan(march.state.psi):
@@ -159,11 +160,8 @@ def largest_bending_along(
     end = min(contact, 1.0)
     strain = 0.0
     while march.at < end:
-        before = march
-        step, march = advance(profile, before, FORWARD, end, force, work, ROUGH)
+        step, march, _ = advance(profile, march, FORWARD, end, force, work, ROUGH, None)
         count = 2 + int(_SAMPLES * step.share * step.length)
         for k in range(count):
-            x = step.share * k / (count - 1)
-            bending = moved(before.state, force, step, x, work).load / rigidity_in(step, x, work)
-            strain = max(strain, abs(bending) * (1.0 - profile.taper * (before.at + x * step.length)))
+            strain = max(strain, abs(bending_at(step, step.share * k / (count - 1), work)))
     return math.nan if math.isnan(march.state.psi) else strain

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.pose import ACROSS, Chord, Pose
+from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
 __all__ = [
     "BEYOND",
@@ -30,7 +31,7 @@ __all__ = [
     "sheet",
 ]
 
-MOST_ROWS, TERMS, MOST_NODES = 28, 24, 12
+MOST_ROWS, TERMS, MOST_NODES = 28, 24, 14
 """Most terms in ψ1 or s1, terms in the force and in the distance of the rod at rest, and most nodes in what differs
 between rods."""
 
@@ -57,13 +58,14 @@ _SHEET = np.dtype(
         ),  # tip contact, tangential contact up to the tip, and beyond it
         ("at_rest", float, (2, 1, COLUMNS)),  # of the rod, and of its mirror image
         ("sums", float, (2, COLUMNS)),  # workspace for one pose
-        ("outer", float, (3, MOST_NODES)),  # polynomials in taper, bend and friction angle
+        ("outer", float, (4, MOST_NODES)),  # polynomials in taper, bend, friction angle and amplitudes of modes
         ("least_psi1", float),  # ranges of the table
         ("most_psi1", float),
         ("span", float),
         ("sign", float),  # the rod
         ("taper", float),
         ("bend", float),
+        ("shape", float, (MOST_MODES,)),
         ("friction_angle", float),
         ("rows", np.intp, (3,)),  # numbers of terms in ψ1 or s1 of the phases
     ],

@@ -1,18 +1,25 @@
 """Taylor series of a loaded rod along its arc length.
 
-In the frame of the contact force f (`pose`) a rod of rest curvature κ0(s) and rigidity B(s) = EI(s)/EI(0) obeys
+In the frame of the contact force f (`pose`) a rod of rest curvature κ0(s) and rigidity EI(s)/EI(0) = B(s) w⁴, with the
+width w = 1 − t s of a taper t, obeys
 
-    ψ' = ±κ0 + P/B,    P' = f cos ψ,    u' = cos ψ,    v' = sin ψ
+    ψ' = ±κ0 + P/(B w⁴),    P' = f cos ψ,    u' = cos ψ,    v' = sin ψ
 
 with + and P = M, the bending moment, from the pivot to the contact, and with − and P = −M from the contact to the
-pivot. Where κ0 and B are polynomials, the coefficients of all series about a point follow from one another:
+pivot. A cone is similar to its parts: with steps ds = w dx, the rate e of w' = −e w, and
 
-    q = P/B from B q = P,      cos ψ and sin ψ from (cos ψ)' = −ψ' sin ψ and (sin ψ)' = ψ' cos ψ.
+    p = P/w³,    C = cos ψ/w²,    S = sin ψ/w²,    U = u/w³,    V = v/w³
 
-A step goes as far as the last coefficients allow, and not beyond a cell of the profile. Derivatives by the state at the
-contact and by the force obey the linearised equations, whose series need no other products than
+its equations do not depend on the place, and their series need no products but those of a rod without a taper:
 
-    δψ' = δP/B,    δu' = −sin ψ δψ,    δv' = cos ψ δψ,    δP = f δu + u δf    (from the contact, where P = f u).
+    ψ' = ±w κ0 + q, B q = p,    p' = 3 e p + f C,    C' = 2 e C − ψ' S,    S' = 2 e S + ψ' C,
+    U' = 3 e U + C,    V' = 3 e V + S.
+
+Where κ0 and B are polynomials of s, all coefficients about a point follow from one another. A step goes as far as the
+last ones allow, and not beyond a cell of the profile. Derivatives by the state at the contact and by the force obey the
+linearised equations, with products of C and S alone: from the contact, where P = f u,
+
+    δψ' = δq, B δq = f δU + U δf,    δU' = 3 e δU − S δψ,    δV' = 3 e δV + C δψ.
 
 On a step the moment, or the distance from the pivot, may rise to a level: `rise`.
 """
@@ -27,7 +34,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
-from tactile_bayes.mechanics.rods.profile import Profile
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 
 __all__ = [
     "BACKWARD",
@@ -35,22 +42,24 @@ __all__ = [
     "FARTHEST",
     "FORWARD",
     "ROUGH",
+    "Followed",
     "March",
-    "Other",
-    "Slope",
+    "Slopes",
     "State",
     "Step",
     "advance",
+    "arclength_to",
     "begin",
+    "bending_at",
     "cell_at",
     "most_rest_curvature",
     "moved",
     "peak",
+    "point_at",
     "rest_curvature_at",
-    "rigidity_in",
     "rise",
-    "slopes_moved",
     "workspace",
+    "write_shape",
 ]
 
 _TERMS = 24
@@ -71,14 +80,14 @@ equilibria."""
 
 _INVERSE = 1.0 / np.arange(1.0, _TERMS + 1.0)
 
-_CURVATURE, _RIGIDITY, _QUOTIENT, _RATE, _SIN, _COS, _PSI, _U, _V = range(9)
-_PSI_Q, _PSI_O, _PSI_F, _U_Q, _U_O, _U_F, _V_F, _QUOTIENT_Q, _QUOTIENT_O, _QUOTIENT_F = range(9, 19)
-"""Columns of a workspace: coefficients, and those of derivatives by ψ1 or arc length, the other, and the force."""
+_RATE, _SIN, _COS, _PSI, _U, _V, _BENDING, _PSI_Q, _U_Q, _BENDING_Q = range(10)
+_PSI_F, _U_F, _V_F, _BENDING_F, _CURVATURE, _RIGIDITY, _POLYNOMIAL, _POWERS = range(10, 18)
+"""Columns of a workspace: coefficients, and those of derivatives by ψ1 or arc length, and the force."""
 
 
 def workspace() -> Floats:
     """Return an array to write series to."""
-    return np.zeros((_TERMS + 1, 19))
+    return np.zeros((_TERMS + 1, 18))
 
 
 _MOST_NEWTON_STEPS = 100
@@ -116,16 +125,18 @@ class March(NamedTuple):
     """Steps so far that ended inside a cell."""
 
 
-class Slope(NamedTuple):
-    """Derivative of a state."""
+class Slopes(NamedTuple):
+    """Derivatives of a state by ψ1 or the arc length of the contact, and by the force."""
 
-    psi: float
-    u: float
-    v: float
+    psi_q: float
+    u_q: float
+    psi_f: float
+    u_f: float
+    v_f: float
 
 
-Other = TypeVar("Other", Slope, None)
-"""A derivative that is followed, or left out."""
+Followed = TypeVar("Followed", Slopes, None)
+"""Derivatives, followed or left out."""
 
 
 class Step(NamedTuple):
@@ -135,8 +146,12 @@ class Step(NamedTuple):
     """Arc length at x = 1 [L]."""
     share: float
     terms: int
-    rigid: int
-    """Terms of the rigidity."""
+    width: float
+    """Width at its beginning."""
+    fall: float
+    """Logarithm of the width at x = 0 over that at x = 1."""
+    span: float
+    """∫ ds/w up to x = 1."""
 
 
 @compiled
@@ -146,6 +161,18 @@ def cell_at(profile: Profile, arclength: float, direction: float) -> int:
     while cell > 0 and (profile.edges[cell] > arclength or (direction < 0.0 and profile.edges[cell] == arclength)):
         cell -= 1
     return cell
+
+
+@compiled
+def write_shape(modes: Floats, amplitudes: Floats, shape: Floats, curvature: Floats) -> None:
+    """Write amplitudes of modes, and the rest curvature with them."""
+    for k in range(MOST_MODES):
+        shape[k] = amplitudes[k]
+    for i in range(curvature.shape[0]):
+        for j in range(curvature.shape[1]):
+            curvature[i, j] = modes[0, i, j]
+            for k in range(1, modes.shape[0]):
+                curvature[i, j] += shape[k - 1] * modes[k, i, j]
 
 
 @compiled
@@ -187,26 +214,52 @@ def _shift(rows: Floats, cell: int, offset: float, step: float, work: Floats, co
 
 
 @compiled
+def _along_step(work: Floats, column: int, count: int, fall: float, pace: float) -> int:
+    """Write a polynomial of the share of the arc length of a step as a series in x, and return the number of its terms.
+
+    That share g obeys g' = pace − fall · g, and so do its powers."""
+    if count < 2 or fall == 0.0:
+        return count
+    for k in range(count):
+        work[k, _POLYNOMIAL], work[k, _POWERS] = work[k, column], 0.0
+    work[0, _POWERS] = 1.0
+    for n in range(_TERMS):
+        work[n, column] = 0.0
+        for k in range(count):
+            work[n, column] += work[k, _POLYNOMIAL] * work[k, _POWERS]
+        for k in range(count - 1, 0, -1):
+            work[k, _POWERS] = k * _INVERSE[n] * (pace * work[k - 1, _POWERS] - fall * work[k, _POWERS])
+        work[0, _POWERS] = 0.0
+    return _TERMS
+
+
+@compiled
 def _expand(
-    profile: Profile, cell: int, arclength: float, direction: float, length: float, work: Floats
-) -> tuple[int, int]:
-    """Write rest curvature and rigidity about a point, and return the numbers of terms."""
-    offset, step = arclength - profile.edges[cell], direction * length
+    profile: Profile, taper: float, march: March, direction: float, length: float, work: Floats
+) -> tuple[Step, int, int, int]:
+    """Write rest curvature times width and rigidity from a point on, and return the numbers of their terms, and the
+    number from which on none is zero by chance."""
+    cell, offset, step = march.cell, march.at - profile.edges[march.cell], direction * length
+    beyond = cell == profile.edges.size - 1
+    width, lost = 1.0 - taper * (1.0 if beyond else march.at), 0.0 if beyond else taper * step
+    fall, pace = 0.0, 1.0
+    if lost != 0.0:
+        fall = -math.log1p(-lost / width)
+        pace = fall * width / lost
     bent = _shift(profile.curvature, cell, offset, step, work, _CURVATURE)
     work[0, _CURVATURE] += profile.bend
-    for k in range(bent):
-        work[k, _CURVATURE] *= direction * profile.sign
+    work[bent, _CURVATURE] = 0.0
+    for k in range(bent, -1, -1):
+        before = work[k - 1, _CURVATURE] if k > 0 else 0.0
+        work[k, _CURVATURE] = direction * profile.sign * (width * work[k, _CURVATURE] - lost * before)
+    bent += 1
+    while bent > 0 and work[bent - 1, _CURVATURE] == 0.0:
+        bent -= 1
     rigid = _shift(profile.rigidity, cell, offset, step, work, _RIGIDITY)
-    if profile.taper != 0.0:
-        beyond = cell == profile.edges.size - 1
-        width, rate = 1.0 - profile.taper * (1.0 if beyond else arclength), 0.0 if beyond else -profile.taper * step
-        for _ in range(4):
-            work[rigid, _RIGIDITY] = 0.0
-            for k in range(rigid, 0, -1):
-                work[k, _RIGIDITY] = width * work[k, _RIGIDITY] + rate * work[k - 1, _RIGIDITY]
-            work[0, _RIGIDITY] *= width
-            rigid += 1
-    return bent, rigid
+    least = max(bent, rigid, 3)
+    bent = _along_step(work, _CURVATURE, bent, fall, pace)
+    rigid = _along_step(work, _RIGIDITY, rigid, fall, pace)
+    return Step(length, 1.0, _TERMS, width, fall, pace * length / width), bent, rigid, least
 
 
 @compiled
@@ -220,22 +273,14 @@ def _divided(work: Floats, rigid: int, inverse: float, n: int, term: float, colu
 
 
 @compiled
-def _size(work: Floats, n: int, length: float, quotient: int) -> float:
-    """Size of the terms of an order, of an unloaded rod too: its derivatives by the force are those of a loaded one."""
-    return max(abs(work[n, _RATE]), abs(work[n, _SIN]), abs(work[n, _COS]), abs(length * work[n, quotient]))
-
-
-@compiled
-def _write_start(start: State, by_q: Slope | None, other: Slope | None, by_force: Slope | None, work: Floats) -> None:
+def _write_start(start: State, slopes: Slopes | None, width: float, work: Floats) -> None:
     """Write the first terms of series."""
-    work[0, _SIN], work[0, _COS], work[0, _PSI] = math.sin(start.psi), math.cos(start.psi), start.psi
-    work[0, _U], work[0, _V] = start.u, start.v
-    if by_q is not None:
-        work[0, _PSI_Q], work[0, _U_Q] = by_q.psi, by_q.u
-    if other is not None:
-        work[0, _PSI_O], work[0, _U_O] = other.psi, other.u
-    if by_force is not None:
-        work[0, _PSI_F], work[0, _U_F], work[0, _V_F] = by_force.psi, by_force.u, by_force.v
+    square, cube = 1.0 / (width * width), 1.0 / (width * width * width)
+    work[0, _SIN], work[0, _COS], work[0, _PSI] = square * math.sin(start.psi), square * math.cos(start.psi), start.psi
+    work[0, _U], work[0, _V] = cube * start.u, cube * start.v
+    if slopes is not None:
+        work[0, _PSI_Q], work[0, _U_Q], work[0, _PSI_F] = slopes.psi_q, cube * slopes.u_q, slopes.psi_f
+        work[0, _U_F], work[0, _V_F] = cube * slopes.u_f, cube * slopes.v_f
 
 
 @compiled
@@ -247,66 +292,106 @@ def series(
     force: float,
     work: Floats,
     remainder: float,
-    by_q: Slope | None,
-    other: Slope | None,
-    by_force: Slope | None,
+    slopes: Slopes | None,
 ) -> Step:
     """Write the series of a state from a point of a cell on, over at most a length, and those of its derivatives.
 
     These begin at the contact, where P = f u; None is left out.
     """
-    bent, rigid = _expand(profile, march.cell, march.at, direction, length, work)
-    inverse, least, start = 1.0 / work[0, _RIGIDITY], max(bent, rigid, 3), march.state
-    load, quotient, size, before = start.load, _QUOTIENT if by_force is None else _QUOTIENT_F, 0.0, 0.0
-    _write_start(start, by_q, other, by_force, work)
+    is_loaded = force != 0.0 or march.state.load != 0.0 or slopes is not None
+    taper = profile.taper if is_loaded else 0.0  # the shape at rest does not depend on it
+    step, bent, rigid, least = _expand(profile, taper, march, direction, length, work)
+    _write_start(march.state, slopes, step.width, work)
+    inverse, width, span = 1.0 / work[0, _RIGIDITY], step.width, step.span
+    square, twice, thrice = width * width, 2.0 * step.fall, 3.0 * step.fall
+    cube = square * width
+    load, size, before = march.state.load / cube, 0.0, 0.0
     for n in range(_TERMS):
-        rate = _divided(work, rigid, inverse, n, load, _QUOTIENT)
-        if n < bent:
-            rate += work[n, _CURVATURE]
-        work[n, _RATE] = length * rate
-        sin, cos, sin_q, sin_o, sin_f, cos_f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        share, at_sin, at_cos, u, v = _INVERSE[n], work[n, _SIN], work[n, _COS], work[n, _U], work[n, _V]
+        bending = _divided(work, rigid, inverse, n, load, _BENDING)
+        rate = span * (bending + work[n, _CURVATURE] if n < bent else bending)
+        work[n, _RATE] = rate
+        sin, cos, sin_q, sin_f, cos_f = 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(n + 1):
             j = n - k
             sin += work[k, _RATE] * work[j, _SIN]
             cos += work[k, _RATE] * work[j, _COS]
-            if by_q is not None:
+            if slopes is not None:
                 sin_q += work[k, _SIN] * work[j, _PSI_Q]
-            if other is not None:
-                sin_o += work[k, _SIN] * work[j, _PSI_O]
-            if by_force is not None:
                 sin_f += work[k, _SIN] * work[j, _PSI_F]
                 cos_f += work[k, _COS] * work[j, _PSI_F]
-        share = _INVERSE[n]
-        way = share * length
-        work[n + 1, _PSI] = share * work[n, _RATE]
-        work[n + 1, _U], work[n + 1, _V] = way * work[n, _COS], way * work[n, _SIN]
-        work[n + 1, _SIN], work[n + 1, _COS] = share * cos, -share * sin
-        load = force * work[n + 1, _U]
-        if by_q is not None:
-            rate_q = _divided(work, rigid, inverse, n, force * work[n, _U_Q], _QUOTIENT_Q)
-            work[n + 1, _PSI_Q], work[n + 1, _U_Q] = way * rate_q, -way * sin_q
-        if other is not None:
-            rate_o = _divided(work, rigid, inverse, n, force * work[n, _U_O], _QUOTIENT_O)
-            work[n + 1, _PSI_O], work[n + 1, _U_O] = way * rate_o, -way * sin_o
-        if by_force is not None:
-            rate_f = _divided(work, rigid, inverse, n, force * work[n, _U_F] + work[n, _U], _QUOTIENT_F)
-            work[n + 1, _PSI_F], work[n + 1, _U_F], work[n + 1, _V_F] = way * rate_f, -way * sin_f, way * cos_f
-        before, size = size, _size(work, n, length, quotient)
+        work[n + 1, _PSI] = share * rate
+        work[n + 1, _U], work[n + 1, _V] = share * (thrice * u + span * at_cos), share * (thrice * v + span * at_sin)
+        work[n + 1, _SIN], work[n + 1, _COS] = share * (twice * at_sin + cos), share * (twice * at_cos - sin)
+        load = share * (thrice * load + force * span * at_cos)
+        if slopes is not None:
+            u_q, u_f, v_f = work[n, _U_Q], work[n, _U_F], work[n, _V_F]
+            bending_q = _divided(work, rigid, inverse, n, force * u_q, _BENDING_Q)
+            bending = _divided(work, rigid, inverse, n, force * u_f + u, _BENDING_F)
+            work[n + 1, _PSI_Q], work[n + 1, _PSI_F] = share * span * bending_q, share * span * bending
+            work[n + 1, _U_Q] = share * (thrice * u_q - span * sin_q)
+            work[n + 1, _U_F] = share * (thrice * u_f - span * sin_f)
+            work[n + 1, _V_F] = share * (thrice * v_f + span * cos_f)
+        # Of an unloaded rod too: its derivatives by the force are those of a loaded one.
+        moved, turned = cube * max(abs(u), abs(v)), square * max(abs(at_sin), abs(at_cos))
+        before, size = size, max(abs(rate), abs(span * bending), moved, turned)
         if n >= least and max(size, before) <= remainder:
-            return Step(length, 1.0, n + 1, rigid)
+            return Step(length, 1.0, n + 1, width, step.fall, span)
     size = max(size, before) / remainder
-    return Step(length, min(1.0, size ** (-1.0 / (_TERMS - 1))) if size < math.inf else math.nan, _TERMS, rigid)
+    share = min(1.0, size ** (-1.0 / (_TERMS - 1))) if size < math.inf else math.nan
+    return Step(length, share, _TERMS, width, step.fall, span)
+
+
+@compiled
+def arclength_to(step: Step, x: float) -> float:
+    """Arc length from the beginning of a step to a point of it."""
+    return step.length * (math.expm1(-step.fall * x) / math.expm1(-step.fall) if step.fall != 0.0 else x)
+
+
+@compiled
+def point_at(step: Step, arclength: float) -> float:
+    """Point x of a step at an arc length from its beginning."""
+    share = arclength / step.length
+    return -math.log1p(share * math.expm1(-step.fall)) / step.fall if step.fall != 0.0 else share
+
+
+@compiled
+def width_at(step: Step, x: float) -> float:
+    """Width at a point of a step."""
+    return step.width * math.exp(-step.fall * x) if step.fall != 0.0 else step.width
+
+
+@compiled
+def bending_at(step: Step, x: float, work: Floats) -> float:
+    """Change of curvature at a point of a step, times the width."""
+    bending = 0.0
+    for n in range(step.terms - 1, -1, -1):
+        bending = bending * x + work[n, _BENDING]
+    return bending
 
 
 @compiled
 def moved(start: State, force: float, step: Step, x: float, work: Floats) -> State:
     """State at a point of a step."""
-    psi, u, v = 0.0, 0.0, 0.0
-    for n in range(step.terms, 0, -1):
-        psi = (psi + work[n, _PSI]) * x
-        u = (u + work[n, _U]) * x
-        v = (v + work[n, _V]) * x
-    return State(start.psi + psi, start.load + force * u, start.u + u, start.v + v)
+    psi, u, v, width = 0.0, 0.0, 0.0, width_at(step, x)
+    for n in range(step.terms, -1, -1):
+        psi, u, v = psi * x + work[n, _PSI], u * x + work[n, _U], v * x + work[n, _V]
+    cube = width * width * width
+    return State(psi, start.load + force * (cube * u - start.u), cube * u, cube * v)
+
+
+@compiled
+def _slopes_moved(step: Step, slopes: Followed, work: Floats) -> Followed:
+    """Derivatives at the end of a step."""
+    if slopes is None:
+        return None
+    x, psi_q, u_q, psi_f, u_f, v_f = step.share, 0.0, 0.0, 0.0, 0.0, 0.0
+    for n in range(step.terms, -1, -1):
+        psi_q, u_q = psi_q * x + work[n, _PSI_Q], u_q * x + work[n, _U_Q]
+        psi_f, u_f, v_f = psi_f * x + work[n, _PSI_F], u_f * x + work[n, _U_F], v_f * x + work[n, _V_F]
+    width = width_at(step, x)
+    cube = width * width * width
+    return Slopes(psi_q, cube * u_q, psi_f, cube * u_f, cube * v_f)
 
 
 @compiled
@@ -324,54 +409,25 @@ def advance(
     force: float,
     work: Floats,
     remainder: float,
-    by_q: Slope | None = None,
-    other: Slope | None = None,
-    by_force: Slope | None = None,
-) -> tuple[Step, March]:
-    """Write the series of a step toward an arc length, and return the step and its end; NaN after too many steps."""
+    slopes: Followed,
+) -> tuple[Step, March, Followed]:
+    """Write the series of a step toward an arc length, and return the step, its end, and the derivatives there.
+
+    The end is NaN after too many steps."""
     beside = march.cell if direction < 0.0 else march.cell + 1
     edge = math.inf if beside == profile.edges.size else profile.edges[beside]
     end = max(edge, until) if direction < 0.0 else min(edge, until)
     length = direction * (end - march.at)
-    step = series(profile, march, direction, length, force, work, remainder, by_q, other, by_force)
-    state = moved(march.state, force, step, step.share, work)
+    step = series(profile, march, direction, length, force, work, remainder, slopes)
+    state, slopes = moved(march.state, force, step, step.share, work), _slopes_moved(step, slopes, work)
     if step.share < 1.0:
         steps = march.steps + 1
         if steps == _MOST_STEPS:
-            return step, March(math.nan, march.cell, _NOWHERE, steps)
-        return step, March(march.at + direction * step.share * length, march.cell, state, steps)
-    if end != edge:
-        return step, March(end, march.cell, state, march.steps)
-    return step, March(end, march.cell + (-1 if direction < 0.0 else 1), state, march.steps)
-
-
-@compiled
-def rigidity_in(step: Step, x: float, work: Floats) -> float:
-    """Rigidity at a point of a step."""
-    rigidity = 0.0
-    for n in range(step.rigid - 1, -1, -1):
-        rigidity = rigidity * x + work[n, _RIGIDITY]
-    return rigidity
-
-
-@compiled
-def slopes_moved(step: Step, other: Other, work: Floats) -> tuple[Slope, Other, Slope]:
-    """Derivatives at the end of a step, of v only that by the force; None is left out."""
-    x, psi, u, psi_f, u_f, v_f = step.share, 0.0, 0.0, 0.0, 0.0, 0.0
-    for n in range(step.terms, -1, -1):
-        psi, u = psi * x + work[n, _PSI_Q], u * x + work[n, _U_Q]
-        psi_f, u_f, v_f = psi_f * x + work[n, _PSI_F], u_f * x + work[n, _U_F], v_f * x + work[n, _V_F]
-    return Slope(psi, u, 0.0), _other_moved(step, other, work), Slope(psi_f, u_f, v_f)
-
-
-@compiled
-def _other_moved(step: Step, other: Other, work: Floats) -> Other:
-    if other is None:
-        return None
-    psi, u = 0.0, 0.0
-    for n in range(step.terms, -1, -1):
-        psi, u = psi * step.share + work[n, _PSI_O], u * step.share + work[n, _U_O]
-    return Slope(psi, u, 0.0)
+            return step, March(math.nan, march.cell, _NOWHERE, steps), slopes
+        at = march.at + direction * arclength_to(step, step.share)
+        return step, March(at, march.cell, state, steps), slopes
+    cell = march.cell if end != edge else march.cell + (-1 if direction < 0.0 else 1)
+    return step, March(end, cell, state, march.steps), slopes
 
 
 @compiled
@@ -380,10 +436,10 @@ def _value_and_slope(
 ) -> tuple[float, float]:
     """The moment times its sense, 1 or −1, less the level; with a sense of 0 that of the squared distance."""
     at = moved(start, force, step, x, work)
-    cos, sin = math.cos(at.psi), math.sin(at.psi)
+    cos, sin, rate = math.cos(at.psi), math.sin(at.psi), step.span * width_at(step, x)
     if sense != 0.0:
-        return sense * at.load - level, sense * force * step.length * cos
-    return at.u * at.u + at.v * at.v - level * level, 2.0 * step.length * (at.u * cos + at.v * sin)
+        return sense * at.load - level, sense * force * rate * cos
+    return at.u * at.u + at.v * at.v - level * level, 2.0 * rate * (at.u * cos + at.v * sin)
 
 
 @compiled

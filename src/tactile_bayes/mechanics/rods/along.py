@@ -18,7 +18,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics import chebyshev
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["MISS", "Along", "GivenAlong", "along"]
+__all__ = ["MISS", "Along", "GivenAlong", "along", "modes_along", "text_along"]
 
 _ORDER = 12
 """Coefficients of the polynomials that represent a function."""
@@ -77,9 +77,24 @@ class Along:
         rows = value * powers * np.array(self.coefficients)
         return Along(tuple((length * np.array(self.edges)).tolist()), tuple(map(tuple, rows.tolist())))
 
-    def plus(self, value: float) -> Along:
-        """Return the property with a number added to all values."""
-        return Along(self.edges, tuple((row[0] + value, *row[1:]) for row in self.coefficients))
+    def plus(self, value: float | Along) -> Along:
+        """Return the property with a number, or another property, added to all values."""
+        if not isinstance(value, Along):
+            return Along(self.edges, tuple((row[0] + value, *row[1:]) for row in self.coefficients))
+        edges = np.union1d(self.edges, value.edges)
+        one, other = (each.on(edges) for each in (self, value))
+        terms = max(one.shape[1], other.shape[1])
+        rows = sum(np.pad(each, ((0, 0), (0, terms - each.shape[1]))) for each in (one, other))
+        return Along(tuple(edges.tolist()), tuple(map(tuple, np.asarray(rows).tolist())))
+
+    def on(self, edges: Floats) -> Floats:
+        """Return coefficients on finer cells between edges, shape (edges − 1, terms)."""
+        cells = np.searchsorted(self.edges, edges[:-1], side="right") - 1
+        rows, offsets = np.array(self.coefficients)[cells], edges[:-1] - np.array(self.edges)[cells]
+        for i in range(rows.shape[1] - 1):
+            for k in range(rows.shape[1] - 2, i - 1, -1):
+                rows[:, k] += offsets * rows[:, k + 1]
+        return rows
 
     @property
     def text(self) -> str:
@@ -119,6 +134,25 @@ def along(name: str, given: Any, length: float, positive: bool = False, miss: fl
     if callable(given):
         return _of_function(_Named(given, name, positive), length, miss)
     return _of_table(name, given, length, positive)
+
+
+def modes_along(name: str, given: Any, length: float, most: int) -> tuple[Along, ...]:
+    """Return so many properties of a rod, or fewer, as polynomials; a text is that of `text_along`."""
+    if isinstance(given, str):
+        try:
+            given = [_read(name, json.dumps(each)) for each in read_json(given, name)["modes"]]
+        except (TypeError, KeyError) as error:
+            raise ParameterError(f"{name} is {given[:40]!r}: give modes as JSON, each with polynomials") from error
+    if not isinstance(given, list | tuple) or len(given) > most or any(as_number(each) is not None for each in given):
+        raise refused(name, given, f"give at most {most}, each as a function of s, or as arrays (s, values)")
+    return tuple(along(name, each, length) for each in given)  # type: ignore[misc]
+
+
+def text_along(value: Any) -> Any:
+    """Return properties along a rod as the text that states them, and all else as it is."""
+    if isinstance(value, tuple):
+        return json.dumps({"modes": [json.loads(each.text) for each in value]})
+    return value.text if isinstance(value, Along) else value
 
 
 def _read(name: str, text: str) -> Along:

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_array, check_number, check_positive
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.rods.along import MISS, Along, along
-from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER, Profile, Rods, profile_of
+from tactile_bayes.mechanics.rods.along import MISS, Along, along, modes_along
+from tactile_bayes.mechanics.rods.profile import MOST_MODES, STEEPEST_TAPER, Profile, Rods, profile_of
 from tactile_bayes.mechanics.rods.surface import Surface
+from tactile_bayes.numerics import chebyshev
 
 __all__ = ["LARGEST_STRAIN", "Rod"]
 
@@ -28,8 +29,8 @@ _MOST_TURN = math.pi
 _POINTS = 2001
 """Points of a rod at rest."""
 
-_NEGLIGIBLE = 1e-4
-"""Error of a traced rest curvature over its standard deviation that is negligible."""
+_NEGLIGIBLE = 1e-2
+"""Error of a traced rest curvature over its standard deviation, and of modes over their size, that is negligible."""
 
 LARGEST_STRAIN = 0.1
 """Bending strain up to which a rod is slender and its bending moment is proportional to its curvature."""
@@ -70,6 +71,10 @@ class Rod:
         Length of a rigid, straight piece between the pivot and the rod, in the direction of its base [m], as of a
         clamp that sits on a hinge; at most that of the rod. Drive angle, moment and forces are those at the pivot, and
         a compliant suspension yields there; arc lengths begin where the rod does. Contact is with the rod alone.
+    rest_shape_modes : sequence of callable or (s, curvature)
+        What is uncertain of the course of the rest curvature, if it was measured (`from_shape`): at most three
+        independent deviations from it, each as large as its standard deviation [1/m]. Their amplitudes are the unknowns
+        `rest_shape_1` to `rest_shape_3` of a rig.
 
     Raises
     ------
@@ -99,6 +104,7 @@ class Rod:
     rigidity_profile: Any = None
     rest_curvature_deviation: float = 0.0
     stem: float = 0.0
+    rest_shape_modes: Any = ()
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
@@ -118,6 +124,8 @@ class Rod:
             uniform = isinstance(of_rod, float) and of_rod == 1.0
             object.__setattr__(self, "rigidity_profile", None if uniform else of_rod)
         object.__setattr__(self, "rest_curvature", along("the rod's rest_curvature", self.rest_curvature, self.length))
+        modes = modes_along("the rod's rest_shape_modes", self.rest_shape_modes, self.length, MOST_MODES)
+        object.__setattr__(self, "rest_shape_modes", modes)
         correction = "give zero, for an unknown one, or a positive number [1/m]"
         check_number("the rod's rest_curvature_deviation", self.rest_curvature_deviation, correction, least=0.0)
         correction = f"give a length [m] from 0, for none, to that of the rod, {self.length:g}"
@@ -155,7 +163,7 @@ class Rod:
     def __repr__(self) -> str:
         optional = ("elastic_strain", None), ("rest_curvature", 0.0), ("taper", 0.0), ("rest_curvature_deviation", 0.0)
         shown = [(name, getattr(self, name)) for name in ("length", "flexural_rigidity", "diameter")]
-        for name, default in (*optional, ("rigidity_profile", None), ("stem", 0.0)):
+        for name, default in (*optional, ("rigidity_profile", None), ("stem", 0.0), ("rest_shape_modes", ())):
             if getattr(self, name) != default:
                 shown.append((name, getattr(self, name)))
         return f"Rod({', '.join(f'{name}={value!r}' for name, value in shown)})"
@@ -217,9 +225,10 @@ class Rod:
     ) -> Rod:
         """Rod whose rest curvature follows from points traced along it while nothing touches it.
 
-        The rest curvature is the posterior mean for a smooth random function of the arc length, an integrated Wiener
-        process; how smooth it is follows from the points (`traced`). It is interpolated with an error of a
-        ten-thousandth of its standard deviation.
+        The rest curvature is the posterior mean for a smooth random function of the arc length, integrated white noise;
+        how smooth it is follows from the points (`traced`). What they leave open are its modes, the principal
+        components of the deflections that it causes. It is interpolated with an error of a hundredth of its standard
+        deviation.
 
         Parameters
         ----------
@@ -242,7 +251,7 @@ class Rod:
         Returns
         -------
         Rod
-            With `rest_curvature_deviation`.
+            With `rest_curvature_deviation` and `rest_shape_modes`.
 
         Raises
         ------
@@ -265,11 +274,10 @@ class Rod:
         whole, rigidity = (1.0, 1.0) if flexural_rigidity is None else (traced.length, flexural_rigidity)
         s = np.linspace(0.0, 1.0, _POINTS)
         negligible = _NEGLIGIBLE * traced.deviation(s).min() / max(float(np.abs(traced.rest_curvature(s)).max()), 1.0)
-        curvature = along(
-            "rest_curvature",
-            lambda s: traced.rest_curvature(s / whole) / whole,
-            whole,
-            miss=max(float(negligible), MISS),
+        series, misses = [traced.coefficients, *traced.modes(MOST_MODES)], [max(float(negligible), MISS), _NEGLIGIBLE]
+        curvature, *modes = (
+            along("rest_curvature", lambda s, c=c: chebyshev.evaluate(c, s / whole) / whole, whole, miss=misses[k > 0])
+            for k, c in enumerate(series)
         )
         return cls(
             whole,
@@ -280,6 +288,7 @@ class Rod:
             rigidity_profile=rigidity_profile,
             rest_curvature_deviation=traced.deviation_of_mean / whole,
             stem=stem * whole / traced.length,
+            rest_shape_modes=modes,
         )
 
     def mirrored(self, side: ArrayLike) -> Rods:
@@ -302,6 +311,7 @@ class Rod:
             rigidity_profile=rigidity,
             rest_curvature_deviation=self.rest_curvature_deviation / self.curvature_unit,
             stem=self.stem / self.length_unit,
+            rest_shape_modes=[m.scaled(1.0 / self.length, 1.0 / self.curvature_unit) for m in self.rest_shape_modes],
         )
 
     def shape_in_words(self, unit: str) -> list[str]:
@@ -340,7 +350,19 @@ class Rod:
             rigidity_profile=rigidity.scaled(longer, 1.0) if isinstance(rigidity, Along) else rigidity,
             rest_curvature_deviation=self.rest_curvature_deviation / longer,
             stem=self.stem if stem is None else stem,
+            rest_shape_modes=[mode.scaled(longer, 1.0 / longer) for mode in self.rest_shape_modes],
         )
+
+    def shaped(self, amplitudes: ArrayLike) -> Rod:
+        """Return the rod of which the amplitudes of the modes of its rest curvature are known, shape (modes,)."""
+        if not np.any(amplitudes):
+            return self
+        curvature = self.rest_curvature
+        if not isinstance(curvature, Along):
+            curvature = Along((0.0, self.length), ((curvature,),))
+        for z, mode in zip(np.asarray(amplitudes).tolist(), self.rest_shape_modes, strict=True):
+            curvature = curvature.plus(mode.scaled(1.0, z))
+        return replace(self, rest_curvature=curvature, rest_curvature_deviation=0.0, rest_shape_modes=())
 
     @property
     def is_uniform(self) -> bool:
@@ -371,7 +393,8 @@ class Rod:
     def as_profile(self) -> Profile:
         """Return rest curvature and rigidity along the rod, dimensionless, of an arc too."""
         own = self.in_lengths()
-        return profile_of(own.rest_curvature, 1.0 if own.rigidity_profile is None else own.rigidity_profile, own.taper)
+        rigidity = 1.0 if own.rigidity_profile is None else own.rigidity_profile
+        return profile_of(own.rest_curvature, rigidity, own.taper, own.rest_shape_modes)
 
     @property
     def surface(self) -> Surface:

@@ -1,25 +1,27 @@
-"""Rest curvature of a rod from points traced along it while nothing touches it.
+"""Rest curvature of a rod from points traced along it while nothing touches it, and how far it may be from that.
 
-The prior of the rest curvature is an integrated Wiener process in the arc length, with a vague level and trend: its
-second derivative is white noise, so that the posterior mean is a smoothing spline (Wahba 1978, doi
+The rest curvature is a vague level and trend in the arc length, and white noise that is integrated once, twice or three
+times: how smooth it is, is unknown. With two integrals the posterior mean is a smoothing spline (Wahba 1978, doi
 10.1111/j.2517-6161.1978.tb01050.x). With the pivot and the direction of the base the curvature determines the
-centreline, from which the points have normally distributed distances; these are linearised at the posterior mean. How
-smooth the curvature is follows from the strength of the noise. It is marginalised, as is the scatter of the points
-unless it is given: the logarithm of their ratio is uniform, from where the noise no longer matters.
+centreline, from which the points have normally distributed distances; these are linearised at the posterior mean.
+Number of integrals, strength of the noise and scatter of the points, unless it is given, are marginalised on a grid,
+with priors that are broad in their logarithms.
 """
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.polynomial.legendre import legvander
+from numpy.polynomial.legendre import leggauss, legvander
 from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid
-from scipy.special import chdtrc
+from scipy.special import chdtrc, chdtri
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_numbers, check_positive
@@ -35,10 +37,22 @@ _FREE = 4
 """Unknowns without a prior: the offset of the base and its direction, level and trend of the curvature."""
 
 _TERMS = 20
-"""Terms of the curvature, if there are points enough to estimate their scatter beside so many."""
+"""Terms of the curvature."""
 
-_STRENGTHS = np.geomspace(0.1, 1e17, 400)
-"""Strengths of the noise over that which moves points by a root mean square of their scatter."""
+_INTEGRALS = (1, 2, 3)
+"""Numbers of integrals that make the curvature from white noise."""
+
+_STRENGTHS = np.geomspace(1e-2, 1e18, 161)
+"""Root mean squares of what level and trend leave of the curvature [1/L], over the scatter [L]."""
+
+_USUAL_STRENGTH, _USUAL_SCATTER = 1.0, 1e-3
+"""Middles of the priors of both: each is within a factor of ten with a probability of a half."""
+
+_QUANTILES = 9
+"""Values of a scatter that is not given, for each strength."""
+
+_FINE = 201
+"""Points of the rod at which the curvature is measured."""
 
 _NODES = 48
 """Nodes at which slopes of the centreline are interpolated."""
@@ -100,6 +114,21 @@ class TracedRod:
         """Standard deviation of the mean rest curvature [1/L]."""
         mean = chebyshev.integral(np.eye(self.coefficients.size)).sum(axis=0)
         return float(np.sqrt(mean @ self.covariance @ mean))
+
+    def modes(self, count: int) -> Floats:
+        """Coefficients of independent deviations of the rest curvature, each its standard deviation, shape (count, n).
+
+        They are the principal components of the deflections ∫ (c − s) κ0 ds at points c: these are what a force there
+        feels of the curvature, whose work is that of the moment that the force causes.
+        """
+        points, weights = leggauss(2 * self.coefficients.size)
+        each = np.eye(self.coefficients.size)
+        deflections = chebyshev.evaluate(chebyshev.integral(chebyshev.integral(each)), 0.5 * (points + 1.0)[:, None])
+        sizes, axes = np.linalg.eigh(self.covariance)
+        root = axes * np.sqrt(np.maximum(sizes, 0.0))
+        *_, right = np.linalg.svd(np.sqrt(weights)[:, None] * (deflections @ root))
+        modes = root @ right[:count].T
+        return np.asarray(modes * np.where(chebyshev.integral(modes).sum(axis=0) < 0.0, -1.0, 1.0)).T
 
 
 def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None, length: float | None = None) -> TracedRod:
@@ -208,12 +237,12 @@ def _start_of(points: Floats) -> _Start:
 
 
 class _Posterior(NamedTuple):
-    """Unknowns of a linear model, with the strength of the noise marginalised."""
+    """Offset and direction of the base, and curvature, with all else marginalised."""
 
     mean: Floats
     covariance: Floats
     weights: Floats
-    """Posterior probabilities of `_STRENGTHS`."""
+    """Posterior probabilities of strengths, for each number of integrals."""
     squares: Floats
     """Sums of squares that each leaves to the scatter."""
     freedom: int
@@ -221,48 +250,88 @@ class _Posterior(NamedTuple):
     @property
     def scatter(self) -> float:
         """Estimated scatter."""
-        return math.sqrt(float(self.weights @ self.squares) / self.freedom)
+        return math.exp(0.5 * float(np.sum(self.weights * np.log(self.squares / self.freedom))))
 
     def probability_below(self, scatter: float) -> float:
         """Return the probability that the scatter is smaller than a value, if it was not given."""
-        return float(self.weights @ chdtrc(self.freedom, self.squares / scatter**2))
+        return float(np.sum(self.weights * chdtrc(self.freedom, self.squares / scatter**2)))
 
 
-def _posterior(by: Floats, target: Floats, scatter: float | None) -> _Posterior:
-    """Posterior of a linear model, whose first unknowns are free and whose others are white noise."""
-    count, terms = by.shape[0], by.shape[1] - _FREE
-    freedom = count - _FREE
-    turn, upper = np.linalg.qr(by[:, :_FREE], mode="complete")
-    rotated, data = turn.T @ by[:, _FREE:], turn.T @ target
-    left, sizes, right = np.linalg.svd(rotated[_FREE:])
-    seen = left.T @ data[_FREE:]
+class _Known(NamedTuple):
+    """What is known of the noise for each strength, over the scatter; in the directions that the points distinguish."""
+
+    onto: Floats
+    """Offset, direction and curvature by the noise in these directions."""
+    means: Floats
+    variances: Floats
+    squares: Floats
+    log_evidence: Floats
+
+
+def _known(turned: Floats, noise: Floats, onto: Floats, freedom: int) -> _Known:
+    """Return what points say of noise, from its effect on them, and `onto` what it determines."""
+    left, sizes, right = np.linalg.svd(turned)
+    seen, terms = left.T @ noise, turned.shape[1]
     sizes, along = (np.pad(of[:terms], (0, max(0, terms - freedom))) for of in (sizes, seen))
-    rest = max(float(np.sum(seen[terms:] ** 2)), freedom * _ROUNDING**2)
-    strengths = _STRENGTHS[:, None] / sizes[0]
-    variances = 1.0 + (strengths * sizes) ** 2
-    squares = rest + np.sum(along**2 / variances, axis=1)
+    narrowed = 1.0 + np.multiply.outer(_STRENGTHS, sizes) ** 2
+    squares = max(float(np.sum(seen[terms:] ** 2)), freedom * _ROUNDING**2) + np.sum(along**2 / narrowed, axis=1)
+    variances = _STRENGTHS[:, None] ** 2 / narrowed
+    return _Known(onto @ right.T, variances * sizes * along, variances, squares, -0.5 * np.log(narrowed).sum(axis=1))
+
+
+def _log_prior(values: Floats, usual: float) -> Floats:
+    """Log-density of a positive number, by a Cauchy distribution of its decimal logarithm about that of a usual one."""
+    return np.asarray(-np.log1p(np.log10(values / usual) ** 2))
+
+
+def _posterior(by: Floats, target: Floats, kernels: Sequence[Floats], scatter: float | None) -> _Posterior:
+    """Posterior of a linear model whose unknowns are free in the first ones, and beside them images of white noise."""
+    freedom = by.shape[0] - _FREE
+    turn, upper = np.linalg.qr(by[:, :_FREE], mode="complete")
+    data, turned = turn.T @ target, [turn.T @ by @ kernel for kernel in kernels]
+    free = np.eye(by.shape[1], _FREE) @ np.linalg.inv(upper[:_FREE])
+    known = [
+        _known(each[_FREE:], data[_FREE:], kernel - free @ each[:_FREE], freedom)
+        for each, kernel in zip(turned, kernels, strict=True)
+    ]
+    squares = np.array([k.squares for k in known])[..., None]
+    log_weights = np.array([k.log_evidence for k in known])[..., None]
+    # Given the strength, a sum of squares over the square of the scatter has a chi-square distribution.
+    shares = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
+    deviations = np.sqrt(squares / chdtri(freedom, shares)) if scatter is None else np.full_like(squares, scatter)
     fit = freedom * np.log(squares) if scatter is None else squares / scatter**2
-    evidence = -0.5 * (fit + np.log(variances).sum(axis=1))
-    weights = np.exp(evidence - evidence.max())
+    beside = _log_prior(deviations, _USUAL_SCATTER) if scatter is None else 0.0
+    log_weights = log_weights - 0.5 * fit + beside + _log_prior(_STRENGTHS[:, None] * deviations, _USUAL_STRENGTH)
+    weights = np.exp(log_weights - log_weights.max())
     weights /= weights.sum()
-    variance = squares / (freedom - 2) if scatter is None else np.full_like(squares, scatter**2)
-    means = strengths**2 * sizes / variances * along
-    mean = weights @ means
-    inner = (weights[:, None] * (means - mean)).T @ (means - mean)
-    inner += np.diag((weights * variance) @ (strengths**2 / variances))
-    inverse = np.linalg.inv(upper[:_FREE])
-    onto = np.concatenate([-inverse @ rotated[:_FREE], np.eye(terms)]) @ right.T
-    free = np.concatenate([inverse, np.zeros((terms, _FREE))])
-    covariance = onto @ inner @ onto.T + weights @ variance * (free @ free.T)
-    return _Posterior(free @ data[:_FREE] + onto @ mean, covariance, weights, squares, freedom)
+    variance, weights = (weights * deviations**2).sum(axis=-1), weights.sum(axis=-1)
+    mean, covariance = free @ data[:_FREE], variance.sum() * (free @ free.T)
+    parts = [k.onto @ (share @ k.means) for k, share in zip(known, weights, strict=True)]
+    for k, share, spread in zip(known, weights, variance, strict=True):
+        inner = (share[:, None] * k.means).T @ k.means + np.diag(spread @ k.variances)
+        covariance += k.onto @ inner @ k.onto.T
+    rough = np.sum(parts, axis=0)
+    return _Posterior(mean + rough, covariance - np.outer(rough, rough), weights, squares[..., 0], freedom)
 
 
-def _smooth(terms: int) -> Floats:
-    """Chebyshev coefficients of the level, the trend, and the double integrals of orthonormal polynomials."""
-    nodes = chebyshev.nodes(terms - 2)
-    white = legvander(2.0 * nodes - 1.0, terms - 3) * np.sqrt(2.0 * np.arange(terms - 2) + 1.0)
-    rough = chebyshev.integral(chebyshev.integral(chebyshev.coefficients(white.T)))
-    return np.concatenate([np.eye(terms)[:, :2], rough], axis=1)
+@functools.cache
+def _kernels(terms: int) -> list[Floats]:
+    """Offset, direction and Chebyshev coefficients of the curvature by white noise in orthonormal polynomials.
+
+    What level and trend leave of the curvature has a root mean square of one.
+    """
+    fine = np.linspace(0.0, 1.0, _FINE)
+    trend, found = np.vander(fine, 2), []
+    for integrals in _INTEGRALS:
+        nodes = chebyshev.nodes(terms - integrals)
+        white = legvander(2.0 * nodes - 1.0, nodes.size - 1) * np.sqrt(2.0 * np.arange(nodes.size) + 1.0)
+        curvature = chebyshev.coefficients(white.T)
+        for _ in range(integrals):
+            curvature = chebyshev.integral(curvature)
+        values = chebyshev.polynomials(terms, fine) @ curvature
+        rest = values - trend @ np.linalg.lstsq(trend, values)[0]
+        found.append(np.pad(curvature, ((2, 0), (0, 0))) / math.sqrt(np.sum(rest**2) / _FINE))
+    return found
 
 
 class _Fit(NamedTuple):
@@ -284,15 +353,14 @@ def _fitted(given: Floats, scatter: float | None, whole: float | None = None) ->
     length = start.length if whole is None else whole
     traced = start.length / length
     feet = traced * start.feet
-    terms = min(_TERMS, given.shape[0] - _FREE) if scatter is None else _TERMS
-    smooth, nodes = _smooth(terms), chebyshev.nodes(terms)
+    terms, nodes, kernels = _TERMS, chebyshev.nodes(_TERMS), _kernels(_TERMS)
     guess = Chebyshev.fit(np.linspace(0.0, traced, start.slopes.size), start.slopes, _FREE, domain=[0.0, 1.0])
     offset, base, curvature = 0.0, float(guess(0.0)), np.zeros(terms)
     curvature[:_FREE] = guess.deriv().coef
-    turns = chebyshev.integral(smooth)
+    turns = chebyshev.integral(np.eye(terms))
     at_nodes = chebyshev.polynomials(terms + 1, chebyshev.nodes(_NODES)) @ turns
     for _ in range(_MOST_STEPS):
-        before = np.concatenate([[offset, base], np.linalg.solve(smooth, curvature)])
+        before = np.concatenate([[offset, base], curvature])
         slope = base + at_nodes @ before[2:]
         cos, sin = np.cos(slope), np.sin(slope)
         kinds = np.concatenate([[cos, sin], -sin * at_nodes.T, cos * at_nodes.T])
@@ -308,16 +376,16 @@ def _fitted(given: Floats, scatter: float | None, whole: float | None = None) ->
                 ways[:, 2 + terms :] * cos[:, None] - ways[:, 2 : 2 + terms] * sin[:, None],
             ]
         )
-        found = _posterior(by, aside + by @ before, None if scatter is None else scatter / length)
+        found = _posterior(by, aside + by @ before, kernels, None if scatter is None else scatter / length)
         step = found.mean - before
-        step[2:], feet = smooth @ step[2:], np.clip(feet + ahead, -0.5, 1.5)
+        feet = np.clip(feet + ahead, -0.5, 1.5)
         settled = bool(max(np.abs(step).max(), np.abs(ahead).max()) < _SETTLED)
         # From lengths of the last guess to those of this one.
         share = float(feet[-1]) if whole is None else 1.0
         feet, length, offset, base = feet / share, length * share, (offset + step[0]) / share, base + step[1]
         curvature = share * chebyshev.coefficients(chebyshev.evaluate(curvature + step[2:], share * nodes))
         if settled:
-            return _Fit(length, feet - feet[0], curvature, smooth @ found.covariance[2:, 2:] @ smooth.T, found)
+            return _Fit(length, feet - feet[0], curvature, found.covariance[2:, 2:], found)
         if not np.abs(curvature).max() < _WILD:
             break
     raise ParameterError(

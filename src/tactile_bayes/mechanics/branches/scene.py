@@ -1,0 +1,135 @@
+"""What an equilibrium depends on: contour, rod, rig, drive, and the phase of contact; and its coordinates."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.branches.line import Line, line_of
+from tactile_bayes.mechanics.branches.outline import Outline
+from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.poses.beam import Beam, rubbed_otherwise
+
+__all__ = [
+    "BY_FORCE",
+    "BY_P",
+    "BY_Q",
+    "NOWHERE",
+    "NO_FORCE",
+    "Anchor",
+    "Equilibrium",
+    "Rig",
+    "Scene",
+    "anchored",
+    "cross",
+    "dot",
+    "in_phase",
+    "less",
+    "on_line",
+    "times",
+    "with_friction",
+]
+
+
+class Equilibrium(NamedTuple):
+    """Coordinates of an equilibrium, or a direction in their space. What p and q are depends on the phase: see
+    `phase`."""
+
+    p: float
+    q: float
+    force: float
+
+
+BY_P, BY_Q, BY_FORCE = Equilibrium(1.0, 0.0, 0.0), Equilibrium(0.0, 1.0, 0.0), Equilibrium(0.0, 0.0, 1.0)
+NO_FORCE = Equilibrium(0.0, 0.0, 0.0)
+
+
+class Rig(NamedTuple):
+    """Parameters of the loads other than rod and contour."""
+
+    friction_angle: float
+    """Angle from the contour's normal to the force of a contact that slides, ± arctan μ [rad]: > 0 where it slides to
+    lesser parameters. Of one that sticks, that of the last that slid."""
+    compliance: float
+    """Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]."""
+    offset: float
+    """Encoder offset in the sweep frame [rad]."""
+    sign: float
+    """−1 in backward sweeps, else 1."""
+    moment_unit: float
+    force_unit: float
+    """EI/L and EI/L² of the rod, in the units of loads."""
+
+
+class Anchor(NamedTuple):
+    """A contact of object and rod that does not slip."""
+
+    p: float
+    """Parameter of the contour."""
+    arclength: float
+
+
+NOWHERE = Anchor(0.0, 0.0)
+
+
+class Scene(NamedTuple):
+    """All that an equilibrium depends on: one contour in the sweep frame, the rod, the rig, and the phase."""
+
+    outline: Outline
+    beam: Beam
+    rig: Rig
+    line: Line | None
+    """Drive that carries the base, which is at the origin at its beginning; None for a rotation about a pivot."""
+    phase: int
+    anchor: Anchor
+    """Where it sticks, if it does."""
+
+
+@compiled
+def in_phase(scene: Scene, phase: int) -> Scene:
+    """Scene in a phase of contact."""
+    return Scene(scene.outline, scene.beam, scene.rig, scene.line, phase, scene.anchor)
+
+
+@compiled
+def anchored(scene: Scene, anchor: Anchor) -> Scene:
+    """Scene with another place where it sticks."""
+    return Scene(scene.outline, scene.beam, scene.rig, scene.line, scene.phase, anchor)
+
+
+@compiled
+def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
+    """Scene with another line of the drive."""
+    if lines is None:
+        return scene
+    return Scene(scene.outline, scene.beam, scene.rig, line_of(lines, k), scene.phase, scene.anchor)
+
+
+@compiled
+def with_friction(scene: Scene, angle: float) -> Scene:
+    """Scene with friction of an angle, which acts in either sense."""
+    own, compliance, offset, sign, moment_unit, force_unit = scene.rig
+    rig = Rig(angle, compliance, offset, sign, moment_unit, force_unit)
+    beam = scene.beam if angle == own else rubbed_otherwise(scene.beam)
+    return Scene(scene.outline, beam, rig, scene.line, scene.phase, scene.anchor)
+
+
+@compiled
+def cross(a: Equilibrium, b: Equilibrium) -> Equilibrium:
+    return Equilibrium(a.q * b.force - a.force * b.q, a.force * b.p - a.p * b.force, a.p * b.q - a.q * b.p)
+
+
+@compiled
+def dot(a: Equilibrium, b: Equilibrium) -> float:
+    return a.p * b.p + a.q * b.q + a.force * b.force
+
+
+@compiled
+def less(a: Equilibrium, b: Equilibrium) -> Equilibrium:
+    """Difference a − b."""
+    return Equilibrium(a.p - b.p, a.q - b.q, a.force - b.force)
+
+
+@compiled
+def times(factor: float, a: Equilibrium) -> Equilibrium:
+    return Equilibrium(factor * a.p, factor * a.q, factor * a.force)

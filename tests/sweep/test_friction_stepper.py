@@ -1,0 +1,183 @@
+"""The stepper of rods with friction against the package where friction has no history, and against itself elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from helpers.friction_cases import drawn_case
+from helpers.friction_contact import Flexible
+from helpers.friction_scans import scanned
+from helpers.friction_stepper import contour_of, step_through
+
+LOADS = ("holding_moment", "force_x", "force_y")
+CIRCLE = {"family": "circle", "r": 0.4, "q": 0.6}
+PARABOLA = {"family": "parabola", "a": 0.6, "q": 0.45, "x_c": 0.1}
+TAPERED = {"taper": 0.5, "curvature": (-0.2, 0.3)}
+TURNED = [[0.0, 0.0, 0.4], [0.0, 0.0, 2.2]]
+CARRIED = [[0.8, -0.1, 1.2], [-0.4, -0.15, 1.5]]
+
+
+def case_of(rod, contour, friction, poses, step=0.02):
+    return {"rod": rod, "contour": contour, "friction": friction, "poses": poses, "step": step}
+
+
+def agree(case, tolerance):
+    """Loads at all samples, and the travels of first contact and of the end."""
+    scan, found = scanned(case), step_through(case)
+    record, (sweep,) = scan.record, scan.sweeps
+    n = min(record.sizes["sample"], found["travel"].size)
+    touching = found["kind"][:n] != "none"
+    assert touching.any()
+    for name in LOADS:
+        np.testing.assert_allclose(found[name][:n], record[name].values[:n], atol=tolerance)
+    phase = np.where(record.truth_contact_phase.values[:n] == "tip", "tip", "flank")
+    assert np.array_equal(found["kind"][:n][touching], phase[touching])
+    assert found.events[0][0] == pytest.approx(sweep.first_contact.travel, abs=1e-9)
+    ends = [t for t, word in found.events if word in ("snap-off", "release")]
+    if sweep.snap_off.kind != "never":
+        assert ends[0] == pytest.approx(sweep.snap_off.travel, abs=2e-6)
+    else:
+        assert not ends
+
+
+@pytest.mark.parametrize("poses", [TURNED, CARRIED], ids=["turned", "carried"])
+@pytest.mark.parametrize("rod", [{}, TAPERED], ids=["straight", "tapered and curved"])
+@pytest.mark.parametrize("friction", [0.0, 0.6])
+def test_one_way_it_slides_as_the_package_says(rod, friction, poses):
+    agree(case_of(rod, PARABOLA, friction, poses), 1e-8)
+
+
+def test_without_friction_it_goes_back_as_the_package_says():
+    for poses in (TURNED, CARRIED):
+        agree(case_of(TAPERED, PARABOLA, 0.0, [*poses, poses[0]]), 1e-8)
+    agree(case_of({}, {"family": "ellipse", "a": 0.4, "b": 0.25, "q": 0.7}, 0.0, CARRIED), 1e-8)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_states_are_equilibria_inside_the_cone(seed):
+    case = drawn_case(np.random.default_rng(seed))
+    found, delta = step_through(case), math.atan(case["friction"])
+    off = found["force_angle"] - found["slope_angle"]
+    for name, sign in (("stick", 0.0), ("slip+", -1.0), ("slip-", 1.0)):
+        chosen = off[found["mode"] == name]
+        assert np.all(np.abs(chosen) <= delta + 1e-9) if name == "stick" else np.allclose(chosen, sign * delta)
+    assert np.all(found["clearance"] > -1e-7)
+    assert np.all(np.diff(found["dissipated"]) >= -1e-12)
+    for i in np.flatnonzero(found["kind"] != "none")[::40]:
+        assert np.allclose(integrated_end(case, found, i), 0.0, atol=1e-8)
+
+
+def integrated_end(case, found, i):
+    """Miss of the contact point, its bending moment and, in flank contact, the slope there, by integration."""
+    rod, (fx, fy) = Flexible(**case["rod"]), (found["force_x"][i], found["force_y"][i])
+
+    def bend(s, z):
+        flexible, _, curved, _ = rod.along(np.asarray(s))
+        return [math.cos(z[2]), math.sin(z[2]), curved + flexible * z[3], fy * math.cos(z[2]) - fx * math.sin(z[2])]
+
+    start = [found[name][i] for name in ("base_x", "base_y", "drive_angle")] + [-found["holding_moment"][i]]
+    x, y, slope, moment = solve_ivp(
+        bend, (0.0, found["contact_arclength"][i]), start, method="DOP853", rtol=1e-11, atol=1e-12
+    ).y[:, -1]
+    tangent = math.sin(slope - found["slope_angle"][i]) if found["kind"][i] == "flank" else 0.0
+    return [x - found["contact_x"][i], y - found["contact_y"][i], moment, tangent]
+
+
+@pytest.mark.parametrize("rod", [{}, TAPERED], ids=["straight", "tapered and curved"])
+def test_work_is_stored_or_dissipated(rod):
+    """To second order in the step, on a way that slips, sticks, and slips back."""
+    poses = [TURNED[0], TURNED[1], [0.0, 0.0, 1.2], TURNED[1]]
+    steps = (0.02, 0.01)
+    coarse, fine = (np.abs(step_through(case_of(rod, PARABOLA, 0.4, poses, step)).imbalance).max() for step in steps)
+    assert fine < 3e-4
+    assert fine < 0.4 * coarse
+
+
+def test_steps_need_not_be_fine():
+    """Where slip ends, which a step meets only to its size, the place of the contact is lost to second order."""
+    case = case_of({"curvature": (0.4,)}, PARABOLA, 0.8, [[0.0, 0.0, 0.3], [0.0, 0.0, 0.82]])
+    exact = step_through(case)
+    assert [word for _, word in exact.events] == ["touch tip", "tip slip+", "tip stick"]
+    for step in (0.04, 0.02, 0.01):
+        coarse = step_through(case | {"step": step}, resolution=1.0)
+        assert abs(coarse["contact_x"][-1] - exact["contact_x"][-1]) < 0.05 * step**2
+
+
+def test_much_friction_never_lets_it_slip():
+    """A curved tip stays on its point, and a flank that is unloaded rolls."""
+    tip = step_through(
+        case_of({"curvature": (0.4,)}, PARABOLA, 1e3, [[0.0, 0.0, 0.2], [0.0, 0.0, 0.6], [0.0, 0.0, 0.3]])
+    )
+    touching = tip["kind"] == "tip"
+    assert set(tip["mode"][touching]) == {"stick"}
+    assert np.ptp(tip["contact_x"][touching]) < 1e-12
+    flank = step_through(case_of({}, CIRCLE, 1e3, [*TURNED, [0.0, 0.0, 1.9]]))
+    back = (flank["kind"] == "flank") & (flank["mode"] == "stick")
+    assert back.sum() > 10
+    rolled = contour_of(CIRCLE).a * flank["slope_angle"][back] - flank["contact_arclength"][back]
+    assert np.ptp(rolled) < 1e-11
+    for found in (tip, flank):
+        assert np.ptp(found["dissipated"][found["mode"] == "stick"]) < 1e-12
+    assert np.abs(tip.imbalance).max() < 5e-4
+
+
+def test_a_closed_loop_costs_what_is_dissipated():
+    there, here = [0.0, 0.0, 2.0], [0.0, 0.0, 1.5]
+    found = step_through(case_of(TAPERED, PARABOLA, 0.4, [TURNED[0], there, here, there, here, there], 0.01))
+    first, second, third = (np.argmin(np.abs(found["travel"] - travel)) for travel in (1.6, 2.6, 3.6))
+    for name in (*LOADS, "contact_x", "stored"):
+        assert found[name][first] == pytest.approx(found[name][second], abs=1e-9)
+        assert found[name][second] == pytest.approx(found[name][third], abs=1e-9)
+    loop = found["dissipated"][third] - found["dissipated"][second]
+    assert loop > 0.05
+    assert found["work"][third] - found["work"][second] == pytest.approx(loop, abs=1e-4)
+
+
+def test_a_small_turn_back_and_forth_changes_nothing():
+    way = [TURNED[0], [0.0, 0.0, 1.8], [0.0, 0.0, 1.795], [0.0, 0.0, 1.8]]
+    found = step_through(case_of({"taper": 0.3}, PARABOLA, 0.5, way, 0.005))
+    there = int(np.argmin(np.abs(found["travel"] - 1.4)))
+    assert found["mode"][there + 1] == "stick"
+    assert found["force_angle"][there + 1] < found["force_angle"][there] - 0.05
+    for name in (*LOADS, "dissipated", "work"):
+        assert found[name][-1] == pytest.approx(found[name][there], abs=2e-6)
+
+
+def test_a_mirrored_case_is_mirrored():
+    case = case_of(TAPERED, PARABOLA, 0.3, [*CARRIED, CARRIED[0]])
+    curvature = tuple(-value for value in TAPERED["curvature"])
+    mirror = [[-x, y, math.pi - angle] for x, y, angle in case["poses"]]
+    other = case_of({"taper": 0.5, "curvature": curvature}, PARABOLA | {"x_c": -0.1}, 0.3, mirror)
+    one, two = step_through(case), step_through(other)
+    for name, sign in (("holding_moment", -1.0), ("force_x", -1.0), ("force_y", 1.0), ("dissipated", 1.0)):
+        np.testing.assert_allclose(one[name], sign * two[name], atol=1e-9)
+    swapped = {"slip+": "slip-", "slip-": "slip+"}
+    assert [swapped.get(mode, mode) for mode in two["mode"]] == one["mode"].tolist()
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.8])
+def test_an_upright_rod_on_a_stage_slides_from_first_contact(friction):
+    """To first order its tip needs no motion along the object, to second 0.6 d² down, and the force is 3 d across."""
+    case = case_of(
+        {},
+        {"family": "circle", "r": 0.3, "q": 0.9},
+        friction,
+        [[0.6, 0.0, 0.5 * math.pi], [-0.6, 0.0, 0.5 * math.pi]],
+        0.01,
+    )
+    found = step_through(case, alternatives=True)
+    assert [word for _, word in found.events] == ["touch tip", "tip slip-", "snap-off"]
+    begin = found.events[0][0]
+    at = int(np.argmin(np.abs(found["travel"] - begin - 0.01)))
+    d = found["travel"][at] - begin
+    assert found["contact_y"][at] - 1.0 == pytest.approx(-0.6 * d**2, rel=0.03)
+    assert found["force_x"][at] == pytest.approx(-3.0 * d, rel=0.03)
+
+
+def test_a_straight_rod_that_is_pushed_along_itself_jams():
+    case = case_of({}, {"family": "circle", "r": 0.4, "q": 1.1}, 0.5, [[0.05, -0.3, 1.57], [0.05, 0.3, 1.57]])
+    assert step_through(case).events[-1][1] == "jammed"
