@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, settle, unloaded
+from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, nowhere, settle, unloaded
 from tactile_bayes.mechanics.branches.leg import (
     ANGLE,
     HARDLY,
@@ -106,13 +106,13 @@ def _through(row: int, wanted: float, sense: float, cell: int, work: LegSeries) 
 @compiled
 def change_of_mode(scene: Scene, leg: Leg, last: float, work: LegSeries) -> tuple[float, Balance]:
     """Position on a leg, up to a last one, at which sliding or sticking ends, and the equilibrium there."""
-    delta, begin = scene.rig.friction_angle, settle_on(scene, leg, 0.0, leg.begin, SETTLED)
+    delta = scene.rig.friction_angle
     if delta == 0.0:
-        return 2.0, begin
+        return 2.0, nowhere()
     if slides(scene.phase):
         way = _end_of_sliding(scene, leg, last, work)
         if way > last:
-            return 2.0, begin
+            return 2.0, nowhere()
         return way, settle_on(scene, leg, way, guess(work, way), SETTLED)
     weighted(work.on_grid, work.series[REST], work.sampled)
     most = abs(delta) + (_BEYOND if abs(leg.begin.q) < abs(delta) - _BEYOND else _BEYOND_BEGIN)
@@ -126,7 +126,7 @@ def change_of_mode(scene: Scene, leg: Leg, last: float, work: LegSeries) -> tupl
             start = guess(work, way)
             found = settle(scene, start, Equilibrium(0.0, edge, 0.0), BY_Q, 0.0, SETTLED)
             return min(max(share_of(leg, found), 0.0), last), found
-    return 2.0, begin
+    return 2.0, nowhere()
 
 
 @inlined
@@ -206,9 +206,7 @@ def first_fall(is_first: bool, work: LegSeries) -> float:
         if work.sampled[cell] <= 0.0:
             if cell == 0:
                 return 0.0
-            weighted(work.slopes, rate, work.slope)
-            left, right = grid[cell - 1], grid[cell]
-            return crossing(rate, work.slope, 0.0, left, right, 0.5 * (left + right), work.accuracy.last_step)
+            return _through(RATE, 0.0, -1.0, cell, work)
     return 2.0
 
 

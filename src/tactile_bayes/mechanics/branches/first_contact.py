@@ -471,7 +471,7 @@ def _held(scene: Scene, begin: Balance) -> tuple[Scene, Balance]:
     if _is_pushed(held) and abs(held.at.q) < abs(scene.rig.friction_angle):
         _, _, moment, force_x, force_y, tangent, rates = held
         return there, Balance(held.at, begin.travel, moment, force_x, force_y, tangent, rates)
-    return in_phase(scene, scene.phase), begin
+    return scene, begin
 
 
 @compiled
