@@ -289,7 +289,7 @@ def density_of(record: xr.Dataset, cell: LoadCell, which, *, prior="flat", frict
     units = rod.load_units
     readings = LoneSamples(cell.dimensionless(rod), np.stack([record[name].values for name in CHANNELS], -1) / units)
     base = np.stack([record.base_x.values, record.base_y.values], axis=-1)
-    options = {"turning": frame_of(record) == "turning", "delta": float(np.arctan(friction)), "prior": prior}
+    options = {"turning": frame_of(record) == "turning", "friction": friction, "prior": prior}
     return ContactDensity(samples, readings, base, **options).take(np.atleast_1d(which))
 
 

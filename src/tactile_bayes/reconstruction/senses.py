@@ -7,6 +7,8 @@ import xarray as xr
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.fitting import fit_contacts, raw_contacts
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
 from tactile_bayes.reconstruction.estimate import Estimate
 from tactile_bayes.reconstruction.histories import least_turn, turned_sweeps
@@ -14,20 +16,27 @@ from tactile_bayes.reconstruction.samples import Samples
 from tactile_bayes.record import carried_sweeps
 from tactile_bayes.record.sweep_segments import turning_points
 
-__all__ = ["fits_better", "slopes_by_friction", "with_likelier_senses"]
+__all__ = ["fits_better", "of_any_sense", "slopes_by_friction", "with_likelier_senses"]
 
 _NO_CONTACT = 25.0  # bound on the misfit of a loaded sample; the value for a sample without a contact
+_OFF = 4.0  # misfit from which a sample does not slide in the sense that is taken
 _TWENTY_TO_ONE = 6.0  # difference of misfits at which one of two sides is twenty times as likely
 
 
 def with_likelier_senses(samples: Samples, measured: xr.Dataset, cell: LoadCell, friction: float) -> Samples:
-    """Return samples with the ways of drives with a history along which they slide the other way, if they fit clearly
-    better so, and with those of which the sense is sure: a way of the drive has one."""
+    """Return samples with the senses in which they slide, and with those of which it is sure.
+
+    A rod that is turned about a pivot slides as it is turned, and one that is carried as if it were turned on; the
+    other way where a way of the drive fits clearly better so.
+    """
     if not friction:
         return samples
     sense, is_sure = samples.sense.copy(), ~_is_bent(samples)
+    carried = measured.sweep.isin(carried_sweeps(measured)).values
     for rows in _ways(measured, cell):
-        part = samples.take(rows)
+        if not carried[rows[0]] and samples.reading.drive_angle[rows[-1]] < samples.reading.drive_angle[rows[0]]:
+            sense[rows] *= -1.0
+        part = samples.take(rows)._replace(sense=sense[rows])
         sense[rows] *= -1.0 if fits_better(part._replace(sense=-part.sense), part, friction) else 1.0
         is_sure[rows] = False
     return samples._replace(sense=sense, is_sure=is_sure)
@@ -58,18 +67,56 @@ def fits_better(one: Samples, other: Samples, friction: float) -> bool:
     """Return whether the misfit of samples is clearly smaller than that of others; False without a noise level."""
     if not (are_weighed(one) and are_weighed(other)):
         return False
-    misfits = []
-    for samples in (one, other):
-        found = constrained_estimate(samples, samples.friction_angles(friction)).misfit
-        none = np.nan if found is None else found
-        misfits.append(float(np.minimum(np.nan_to_num(none, nan=_NO_CONTACT), _NO_CONTACT)[samples.loaded].sum()))
-    return misfits[0] < misfits[1] - _TWENTY_TO_ONE
+    return _misfit(one, friction) < _misfit(other, friction) - _TWENTY_TO_ONE
+
+
+def _misfit(samples: Samples, friction: float) -> float:
+    """Return the sum of squared deviations of loaded samples, with 2 log n for each change between the phases.
+
+    Without it, a sense in which noisy samples have both phases to choose from would fit better.
+    """
+    with np.errstate(over="ignore"):
+        usable = np.isfinite(samples.reading.loads**2).all(axis=1)
+    some = samples.take(np.flatnonzero(samples.loaded & ~samples.cut_off & usable))
+    if not some.side.size:
+        return 0.0
+    fit = fit_contacts(some.reading, some.friction_angles(friction), some.rods)
+    each = np.full((2, some.side.size), _NO_CONTACT)
+    for phase, of_phase in zip((TIP, TANGENTIAL), each, strict=True):
+        np.fmin(of_phase, fit.misfit, out=of_phase, where=(fit.phase == phase) | fit.at_edge)
+        np.fmin(of_phase, fit.misfit + fit.rival, out=of_phase, where=fit.other_phase == phase)
+    change, sums = 2.0 * np.log(some.side.size), np.zeros(2)
+    for of_sample in each.T:
+        sums = np.minimum(sums, sums[::-1] + change) + of_sample
+    return float(sums.min())
+
+
+def of_any_sense(samples: Samples, friction: float) -> tuple[Samples, Estimate]:
+    """Return samples with the senses in which they touch, and their most likely contacts.
+
+    Where a sense is not sure and does not fit, the rod sticks, and the contact is that of the raw method; or it slides
+    the other way, if the force lies outside the cone of friction there.
+    """
+    found = constrained_estimate(samples, samples.friction_angles(friction))
+    assert found.misfit is not None
+    with np.errstate(invalid="ignore"):
+        off = ~samples.is_sure & ~(found.misfit <= _OFF) & (friction > 0.0)
+    if not off.any():
+        return samples, found
+    raw = raw_contacts(samples.reading, np.zeros(off.size), samples.rods, samples.has_noise)
+    of_force = (raw.place[:, 2] - raw.tip_angle + samples.rod.surface.half_angle) / np.arctan(friction)
+    off &= raw.place[:, 3] < 1.0
+    samples = samples._replace(sense=np.where(off, np.clip(of_force, -1.0, 1.0), samples.sense))
+    found = constrained_estimate(samples, samples.friction_angles(friction))
+    if found.covariance is not None:
+        found.covariance[np.abs(samples.sense) < 1.0] = raw.covariance[np.abs(samples.sense) < 1.0]
+    return samples, found
 
 
 def slopes_by_friction(estimate: Estimate, samples: Samples, friction: float) -> Floats:
-    """Return the slope angle, and the other end of those that friction allows, dimensionless, shape (n, 2).
+    """Return the ends of the slope angles that friction allows, dimensionless, shape (n, 2).
 
     The force lies within the cone of friction about the contour's normal, at an edge of it if the rod slides.
     """
-    slope = estimate.place[:, 2]
-    return np.stack([slope, slope + np.where(samples.is_sure, 0.0, samples.sense * 2.0 * np.arctan(friction))], axis=1)
+    slope, most = estimate.place[:, 2], np.where(samples.is_sure, 0.0, np.arctan(friction))
+    return np.stack([slope + (samples.sense - 1.0) * most, slope + (samples.sense + 1.0) * most], axis=1)

@@ -18,11 +18,10 @@ from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
 from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.reconstruction.axial_score import axial_score
-from tactile_bayes.reconstruction.constrained import constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
 from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
-from tactile_bayes.reconstruction.senses import fits_better, slopes_by_friction, with_likelier_senses
+from tactile_bayes.reconstruction.senses import fits_better, of_any_sense, slopes_by_friction, with_likelier_senses
 from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_doubts, with_sides
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
 from tactile_bayes.record.schema import column_attributes
@@ -31,7 +30,7 @@ from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["contacts_of", "reconstruct"]
 
-_METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
+_METHODS = ("raw", "constrained")
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 _PHYSICAL = ("m", "N", "N m", "1/m")  # units of what is dimensionless in a dimensionless record
 # Signs by which backward contacts are mirrored: contact point, slope angle and arc length.
@@ -78,9 +77,10 @@ def reconstruct(
         "ambiguous" or "either phase", else NaN. least_slope_angle and greatest_slope_angle are the ends between which
         friction leaves the slope, for the force as it is read: the rod may slide either way or stick where it is
         carried, its drive turns back in contact, or it is curved toward the object. There the ends are two friction
-        angles apart, and the slope angle is the one for sliding, the other way where that fits clearly better, judged
-        for each way of the drive. Elsewhere both are the slope angle. Points of a straight rod without a diameter do
-        not depend on it by the raw method; the constrained one takes the rod to slide.
+        angles apart, and by the raw method the slope angle is the one for sliding, the other way where that fits
+        clearly better, judged for each way of the drive. The constrained one takes the rod to stick where sliding is
+        off by more than two standard deviations and the force lies within the cone of friction: such a contact is that
+        of the raw method, with the slope of the rod. Elsewhere both ends are the slope angle.
 
         With method="constrained" also misfit, the residual sum of squared deviations in standard deviations, and
         edge_distance, the distance of the contact from the change between tip and tangential contact in standard
@@ -171,7 +171,10 @@ def contacts_of(found: Corrected, method: Literal["raw", "constrained"]) -> xr.D
     measured, doubtful = _with_likelier_sides(measured, cell, compliance, friction)
     samples = samples_of(measured, cell, compliance)
     samples = with_likelier_senses(samples, measured, cell, friction)
-    estimate = _METHODS[method](samples, samples.friction_angles(friction))
+    if method == "constrained":
+        samples, estimate = of_any_sense(samples, friction)
+    else:
+        estimate = raw_estimate(samples, samples.friction_angles(friction))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
     contacts = kept.assign(_variables(estimate, samples, measured, friction)).assign_attrs(
         method=method,
@@ -296,7 +299,7 @@ def _check(estimate: Estimate, samples: Samples, cell: LoadCell, friction: float
     if estimate.misfit is None or estimate.edge_distance is None:
         return {}
     with np.errstate(invalid="ignore"):
-        clear = estimate.edge_distance > _CLEAR
+        clear = (estimate.edge_distance > _CLEAR) & (np.abs(samples.sense) == 1.0)  # if it sticks, the force fits any
     total, count = float(estimate.misfit[clear].sum()), int(np.count_nonzero(clear))
     shared = cell.drift is not None or any(cell.bias_uncertainty)
     probability = np.nan if shared or not count else float(chdtrc(count, total))

@@ -43,11 +43,18 @@ class ContactDensity:
 
     The prior is a density over contact point and slope angle; on a phase's sheet of (force, ψ1, s1, drive angle) it is
     multiplied by the volume that the sheet's coordinates span. `base` are the pivots, (n, 2), in the record's unit of
-    length.
+    length. A sample touches with the angle of friction times its `sense`, which lies between −1 and 1 if it sticks.
     """
 
     def __init__(
-        self, samples: Samples, readings: LoneSamples, base: Floats, *, turning: bool, delta: float, prior: ContactPrior
+        self,
+        samples: Samples,
+        readings: LoneSamples,
+        base: Floats,
+        *,
+        turning: bool,
+        friction: float,
+        prior: ContactPrior,
     ) -> None:
         if not (callable(prior) or (isinstance(prior, str) and prior in ("flat", "polar"))):
             raise ParameterError(
@@ -55,10 +62,11 @@ class ContactDensity:
                 "slope_angle that returns a log-density"
             )
         self.samples = samples
-        self.delta = delta
+        self.delta = samples.friction_angles(friction)
         self.base = base
         self._readings = readings
         self._turning = turning
+        self._friction = friction
         self._prior = prior
 
     @property
@@ -68,20 +76,19 @@ class ContactDensity:
 
     @property
     def ways(self) -> Floats:
-        """Ranges of the way: tip, tangential and, unless rods are straight, over-turned tip, (branches, 2)."""
-        normal = 0.5 * np.pi + self.delta
-        branches = [(0.0, normal), (-1.0, 0.0), (normal, np.pi)]
-        return np.array(branches[:2] if self.samples.rods.are_straight else branches)
+        """Ranges of the way: tip, tangential and, unless rods are straight, over-turned tip, (branches, n, 2)."""
+        normal, none = 0.5 * np.pi + self.delta, np.zeros(self.delta.size)
+        branches = [(none, normal), (none - 1.0, none), (normal, none + np.pi)]
+        return np.stack(branches[:2] if self.samples.rods.are_straight else branches).swapaxes(1, 2)
 
     def take(self, where: Index) -> ContactDensity:
         """Return the density of some of the samples."""
         some, readings, base = self.samples.take(where), self._readings.take(where), self.base[where]
-        return ContactDensity(some, readings, base, turning=self._turning, delta=self.delta, prior=self._prior)
+        return ContactDensity(some, readings, base, turning=self._turning, friction=self._friction, prior=self._prior)
 
     def at(self, coordinates: Floats, phase: NDArray[np.int8]) -> Evaluated:
         """Evaluate contacts from coordinates, shape (..., n, 4), and phase, shape (..., n); −inf if impossible."""
         shape = coordinates.shape[:-1]
-        flat = coordinates.reshape(-1, 4)
         tip = phase.reshape(-1) == TIP
         rod = self._states(coordinates)
         reading, side = self.samples.reading, self.samples.side
@@ -95,14 +102,14 @@ class ContactDensity:
         with np.errstate(divide="ignore", invalid="ignore"):
             volume = np.log(np.where(tip, rod.volume_tip, rod.volume_tangential))
             facing = np.abs(alpha - self._surface.half_angle) < 0.5 * np.pi
-            possible = (flat[:, PSI1] >= -self.delta) & (flat[:, PSI1] <= np.pi - self.delta)
-            possible &= (arclength <= 1.0) & facing
-            possible &= np.isfinite(volume)
+            possible = ((arclength <= 1.0) & facing & np.isfinite(volume)).reshape(shape)
+            turn = coordinates[..., PSI1] + self.delta
+            possible &= (turn >= 0.0) & (turn <= np.pi)
             density = volume.reshape(shape) + self._readings.log_density(loads) + self._log_prior(rod.place, shape)
             if self.has_free_angle:
                 off = (angle - reading.drive_angle) / reading.angle_deviation
                 density -= 0.5 * off**2 + np.log(np.sqrt(2.0 * np.pi) * reading.angle_deviation)
-        density = np.where(possible.reshape(shape) & ~np.isnan(density), density, -np.inf)
+        density = np.where(possible & ~np.isnan(density), density, -np.inf)
         return Evaluated(density, rod.place.reshape(4, *shape))
 
     def contacts(self, coordinates: Floats) -> Floats:
@@ -113,8 +120,8 @@ class ContactDensity:
     def _states(self, coordinates: Floats) -> ContactStates:
         """Return contacts from coordinates, shape (..., n, 4), one after the other."""
         rods = self.samples.rods
-        each = np.broadcast_to(rods.curvature, coordinates.shape[:-1]).ravel()
-        return contact_states(coordinates.reshape(-1, 4), self.delta, rods._replace(curvature=each))
+        each, delta = (np.broadcast_to(of, coordinates.shape[:-1]).ravel() for of in (rods.curvature, self.delta))
+        return contact_states(coordinates.reshape(-1, 4), delta, rods._replace(curvature=each))
 
     def to_lab_frame(self, contact: Floats) -> Floats:
         """Return contacts on the object's surface, in the laboratory frame and the record's units, (4, ..., n)."""

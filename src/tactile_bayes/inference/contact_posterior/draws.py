@@ -7,8 +7,9 @@ from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import logsumexp
 
-from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.proposal import ContactProposal
 from tactile_bayes.inference.densities import Mixture, Proposal, effective_number, flattened, normalised
@@ -19,7 +20,16 @@ from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.numerics.random_numbers import spawn
 from tactile_bayes.numerics.selection import resampled
 
-__all__ = ["CHAINS", "LEAST_DRAWS", "ContactDraws", "ContactWeights", "draw_contacts", "weigh_contacts"]
+__all__ = [
+    "CHAINS",
+    "LEAST_DRAWS",
+    "ContactDraws",
+    "ContactWeights",
+    "MixedDraws",
+    "draw_contacts",
+    "mixed",
+    "weigh_contacts",
+]
 
 CHAINS = 4  # number of chains
 LEAST_DRAWS = 400.0  # smallest number of effective draws
@@ -33,6 +43,7 @@ _NEGLIGIBLE = 600.0  # logarithm of a ratio of weights from which the smaller is
 # after one round, one after four.
 _KERNELS, _KERNEL_WIDTH, _KERNEL_DRAWS = 64, 0.5, 20
 _ROUNDS = 8  # of kernels at most
+_SELDOM = 1e-3  # probability of a way up to which its diagnostics do not count
 
 
 class ContactWeights(NamedTuple):
@@ -59,6 +70,15 @@ class ContactDraws(NamedTuple):
     log_evidence: Floats
     pareto_k: Floats
     effective_draws: Floats
+
+
+class MixedDraws(NamedTuple):
+    """Draws of samples from those of the ways in which each may touch, with their diagnostics; see `mixed`."""
+
+    samples: Index  # numbers of the n samples
+    picked: Index  # for each draw the way that it is of, shape (chains, draws, n)
+    of_ways: ContactDraws
+    stats: dict[str, Floats]  # the diagnostics of `ContactDraws`, shape (n,)
 
 
 def draw_contacts(
@@ -95,6 +115,28 @@ def _drawn(weights: ContactWeights, draws: int, rng: np.random.Generator) -> Con
     tangential[lost], points[:, :, lost] = np.nan, np.nan
     _, _, k, effective, evidence = weights
     return ContactDraws(points, weights.certified, tangential, evidence, k, effective)
+
+
+def mixed(found: ContactDraws, rows: Index, log_prior: Floats, rng: np.random.Generator) -> MixedDraws:
+    """Return draws of samples, of which each way has the number of its sample, and the logarithm of its prior."""
+    samples, first = np.unique(rows, return_index=True)
+    points, *others = found
+    picked = np.tile(first, (*points.shape[:2], 1))
+    stats = {name: of[first].astype(float) for name, of in zip(found._fields[1:], others, strict=True)}
+    for i, ways in enumerate(np.split(np.arange(rows.size), first[1:])):
+        logs = found.log_evidence[ways] + log_prior[ways]
+        if ways.size == 1 or not np.isfinite(logs).any():
+            continue
+        shares = normalised(np.where(np.isfinite(logs), logs, -np.inf))
+        for chain in range(CHAINS):
+            picked[chain, :, i] = ways[rng.permutation(resampled(shares, points.shape[1], rng))]
+        often = shares > _SELDOM
+        stats["log_evidence"][i] = logsumexp(logs[often])
+        stats["tangential_probability"][i] = shares[often] @ found.tangential_probability[ways][often]
+        stats["converged"][i] = found.converged[ways][often].all()
+        stats["pareto_k"][i] = found.pareto_k[ways][often].max()
+        stats["effective_draws"][i] = 1.0 / np.sum(shares[often] ** 2 / found.effective_draws[ways][often])
+    return MixedDraws(samples, picked, found, stats)
 
 
 def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequence) -> ContactWeights:
@@ -145,7 +187,7 @@ def _kernels(points: Floats, logs: Floats, rng: np.random.Generator) -> Mixture:
 
 def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
     """Return normal approximations on all branches: means (branches, n, k), covariances, and shares (branches, n)."""
-    reading, delta = density.samples.reading, np.full(density.samples.side.size, density.delta)
+    reading, delta = density.samples.reading, density.delta
     rods = density.samples.rods
     branches = [(TIP, False), (TANGENTIAL, False), (TIP, True)][: len(density.ways)]
     free = [DRIVE_ANGLE] if density.has_free_angle else []
@@ -153,7 +195,7 @@ def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
     least = np.full(delta.size, np.inf)  # sum of squares
     for phase, is_over in branches:
         sheet = fit_sheet(reading, delta, phase, rods, is_over)
-        way, shift = (PSI1, density.delta) if phase == TIP else (ARCLENGTH, -1.0)
+        way, shift = (PSI1, delta) if phase == TIP else (ARCLENGTH, -1.0)
         order = [way, FORCE, *free]
         mean = sheet.coordinates[:, order]
         mean[:, 0] += shift

@@ -14,7 +14,7 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import check_function, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
-from tactile_bayes.inference.contact_posterior.draws import CHAINS, LEAST_DRAWS, ContactDraws, draw_contacts
+from tactile_bayes.inference.contact_posterior.draws import CHAINS, LEAST_DRAWS, MixedDraws, draw_contacts, mixed
 from tactile_bayes.inference.importance import LARGEST_K
 from tactile_bayes.inference.misfit import NO_LOAD
 from tactile_bayes.inference.record_likelihood.shortening import thinned
@@ -31,6 +31,10 @@ __all__ = ["density_of", "infer_contacts"]
 
 _MIN_MISFIT_PROBABILITY = 1e-4  # probability of a misfit below which the message reports that the loads do not fit
 _MOST_DRAWS = 10**6  # largest number of draws for each sample
+# Directions of the force over the angle of friction, and their prior probabilities: mostly a rod slides as the drive
+# goes, and an interval of 90 % of the slope, with that at its end, holds only if that is likely.
+_SENSES = np.array([1.0, -1.0, -0.8, -0.4, 0.0, 0.4, 0.8])
+_OF_SENSES = np.array([0.8, 0.1, 0.02, 0.02, 0.02, 0.02, 0.02])
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 
 
@@ -140,12 +144,15 @@ def infer_contacts(
     if compliance:
         raise ParameterError("infer_contacts knows no compliant suspension: say that suspension_compliance is 0")
     measured, cell = thinned(measured, cell)
-    density, loaded = density_of(measured, cell, friction, prior)
-    if not loaded.size:
+    density, rows, log_prior = density_of(measured, cell, friction, prior)
+    if not rows.size:
         raise InferenceError(NO_LOAD)
+    for_draws, for_ways = spawn(seed, 2)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
-        found = draw_contacts(density, draws, spawn(seed, 1)[0], progress)
-        tree = xr.DataTree.from_dict(_groups(measured, density, loaded, found))
+        found = mixed(
+            draw_contacts(density, draws, for_draws, progress), rows, log_prior, np.random.default_rng(for_ways)
+        )
+        tree = xr.DataTree.from_dict(_groups(measured, density, found))
     chance = _misfit_probability(measured, cell, friction)
     tree.attrs = {
         "inference_library": "tactile-bayes",
@@ -157,9 +164,9 @@ def infer_contacts(
         "friction": friction,
         "draws": draws,
         "dependence": "samples are independent of one another",
-        "converged": int(found.converged.all()),
+        "converged": int(found.stats["converged"].all()),
         "misfit_probability": chance,
-        "message": _message(found, chance, measured.attrs.get("blocks")),
+        "message": _message(found.stats["converged"], chance, measured.attrs.get("blocks")),
         "units": measured.attrs["units"],
         "approximations": "; ".join(_approximations(cell)),
     }
@@ -175,8 +182,11 @@ def _misfit_probability(measured: xr.Dataset, cell: LoadCell, friction: float) -
 
 def density_of(
     measured: xr.Dataset, cell: LoadCell, friction: float, prior: ContactPrior
-) -> tuple[ContactDensity, Index]:
-    """Return the density of the loaded samples, and their numbers."""
+) -> tuple[ContactDensity, Index, Floats]:
+    """Return the density of the loaded samples, with their numbers and prior probabilities' logarithms.
+
+    Where a sample may also stick, or slide the other way, it stands there once for each direction of the force.
+    """
     samples = with_likelier_senses(samples_of(measured, cell), measured, cell, friction)
     if cell.degrees_of_freedom <= 2.0:  # proposals take a covariance
         about = samples_of(measured, replace(cell, degrees_of_freedom=np.inf))
@@ -189,15 +199,14 @@ def density_of(
     base = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
     turning = frame_of(measured) == "turning"
     loaded = np.flatnonzero(samples.loaded & ~samples.cut_off)
-    senses = np.unique(samples.sense[loaded])
-    if senses.size > 1:
-        raise ParameterError(
-            "the rod slides along the object both ways, on different ways of the drive: give them one by one, each "
-            "as a sweep of its own"
-        )
-    sense = float(senses[0]) if senses.size else 1.0
-    delta = rod.surface.friction_angle(sense * float(np.arctan(friction)))
-    return ContactDensity(samples, readings, base, turning=turning, delta=delta, prior=prior).take(loaded), loaded
+    number = np.where(samples.is_sure[loaded] | (friction == 0.0), 1, _SENSES.size)
+    rows = np.repeat(loaded, number)
+    which = np.arange(rows.size) - np.repeat(np.cumsum(number) - number, number)
+    log_prior = np.where(np.repeat(number, number) > 1, np.log(_OF_SENSES[which]), 0.0)
+    readings, base, samples = readings.take(rows), base[rows], samples.take(rows)
+    samples = samples._replace(sense=samples.sense * _SENSES[which])
+    density = ContactDensity(samples, readings, base, turning=turning, friction=friction, prior=prior)
+    return density, rows, log_prior
 
 
 def _everywhere(values: Floats, loaded: Index, size: int) -> Floats:
@@ -207,8 +216,8 @@ def _everywhere(values: Floats, loaded: Index, size: int) -> Floats:
     return spread
 
 
-def _groups(measured: xr.Dataset, density: ContactDensity, loaded: Index, found: ContactDraws) -> dict[str, xr.Dataset]:
-    size, points, units = measured.sizes["sample"], found.points, measured.attrs["units"]
+def _groups(measured: xr.Dataset, density: ContactDensity, found: MixedDraws) -> dict[str, xr.Dataset]:
+    size, points, units = measured.sizes["sample"], found.of_ways.points, measured.attrs["units"]
     coordinates, _ = density.unfold(points)
     columns = {
         name: (values, column_attributes(name, units))
@@ -220,24 +229,23 @@ def _groups(measured: xr.Dataset, density: ContactDensity, loaded: Index, found:
     columns["tangential"] = points[..., 0] < 0.0, {"units": "1", "long_name": "whether the contact is tangential"}
     dims, sample = ("chain", "draw", "sample"), {"sample": np.arange(size)}
     coords = {"chain": np.arange(points.shape[0]), "draw": np.arange(points.shape[1]), **sample}
-    variables = {name: (dims, _everywhere(v, loaded, size), attrs) for name, (v, attrs) in columns.items()}
+    variables = {
+        name: (dims, _everywhere(np.take_along_axis(values, found.picked, -1), found.samples, size), attrs)
+        for name, (values, attrs) in columns.items()
+    }
     observed = [name for name in ("drive_angle", *CHANNELS) if name in measured]
+    numbers = {name: _everywhere(values, found.samples, size) for name, values in found.stats.items()}
+    numbers["converged"] = np.nan_to_num(numbers["converged"]).astype(np.int8)
     return {
         "posterior": xr.Dataset(variables, coords=coords),
         "observed_data": measured[observed].assign_coords(sample),
         "constant_data": measured[list(_CONSTANT)].assign_coords(sample),
-        "sample_stats": _stats(size, loaded, found).assign_coords(sample),
+        "sample_stats": xr.Dataset({name: ("sample", values) for name, values in numbers.items()}, sample),
     }
 
 
-def _stats(size: int, loaded: Index, found: ContactDraws) -> xr.Dataset:
-    numbers = {name: _everywhere(values, loaded, size) for name, values in found._asdict().items() if name != "points"}
-    numbers["converged"] = np.nan_to_num(numbers["converged"]).astype(np.int8)
-    return xr.Dataset({name: ("sample", values) for name, values in numbers.items()})
-
-
-def _message(found: ContactDraws, chance: float, blocks: str | None) -> str:
-    message, failed = f"{found.converged.size} contacts", np.count_nonzero(~found.converged)
+def _message(converged: Floats, chance: float, blocks: str | None) -> str:
+    message, failed = f"{converged.size} contacts", np.count_nonzero(converged == 0.0)
     if failed:
         why = f"Pareto's k̂ above {LARGEST_K:g} or fewer than {LEAST_DRAWS:g} effective draws"
         message += f"; not converged: {failed} ({why}), see sample_stats"

@@ -18,7 +18,7 @@ class ContactProposal:
     """Mixture of normal densities on each branch, for each of n samples.
 
     Shapes: mean (branches, n, k) of way, force and drive angle, if it is free; share (branches, n), 0 without an
-    approximation; ways (branches, 2).
+    approximation; ways (branches, n, 2).
     """
 
     def __init__(self, mean: Floats, covariance: Floats, share: Floats, ways: Floats) -> None:
@@ -26,7 +26,7 @@ class ContactProposal:
         self._root = np.linalg.cholesky(covariance)
         farthest = _MAX_DISTANCE * self._root[..., 0, 0]
         self._mean = mean.copy()
-        self._mean[..., 0] = np.clip(mean[..., 0], ways[:, :1] - farthest, ways[:, 1:] + farthest)
+        self._mean[..., 0] = np.clip(mean[..., 0], ways[..., 0] - farthest, ways[..., 1] + farthest)
 
     def draw(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
         """Draw `count` points for every sample, (count, n, k), in the shares of branches, with log-densities."""
@@ -37,7 +37,7 @@ class ContactProposal:
         who = np.broadcast_to(np.arange(size), branch.shape)
         mean, root = self._mean[branch, who], self._root[branch, who]
         width = np.where(rng.random((count, size)) < _SHARES[0], *_WIDTHS)
-        ends = np.moveaxis(self._ways[branch], -1, 0), (0.0, np.inf), (-np.inf, np.inf)
+        ends = np.moveaxis(self._ways[branch, who], -1, 0), (0.0, np.inf), (-np.inf, np.inf)
         points, steps = np.empty((count, size, k)), np.empty((count, size, k))
         logs = np.zeros((2, count, size)) + np.log(_SHARES / _WIDTHS**k)[:, None, None]
         for j, (low, high) in zip(range(k), ends, strict=False):
