@@ -17,6 +17,7 @@ SWEPT = {
     "turned back": (PARABOLA, tb.Motion(0.0, 0.0, [0.4, 2.2, 0.4])),
     "turned back from the other side": (PARABOLA, tb.Motion(0.0, 0.0, [2.9, 1.2, 2.9])),
 }
+PLACE = ("contact_x", "contact_y", "slope_angle")
 ROUNDING = 1e-9
 
 
@@ -71,3 +72,29 @@ def test_a_rod_curved_toward_the_object_may_slide_outward_first():
     low, high = (contacts[f"{end}_slope_angle"].values[loaded] for end in ("least", "greatest"))
     assert np.all((low - ROUNDING < truth) & (truth < high + ROUNDING))
     assert np.all(high > low)
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.5])
+@pytest.mark.parametrize(("contour", "drive"), SWEPT.values(), ids=SWEPT)
+def test_contacts_under_noise_hold_whether_the_rod_slides_or_sticks(contour, drive, friction):
+    cell = tb.LoadCell(force_noise=0.02, moment_noise=0.01)
+    rig = Rig(load_cell=cell, unknown={"friction": friction})
+    record = cell.measure(tb.scan(contour, rig, drive=drive).record, rng=1).isel(sample=slice(None, None, 4))
+    truth = np.stack([record[f"truth_{name}"].values for name in PLACE])
+    contacts = tb.reconstruct(record, rig, method="constrained")
+    good = contacts.status.values == "ok"
+    assert np.count_nonzero(good) > 7
+    off = np.stack(
+        [
+            (contacts[name].values - at) / contacts[f"{name}_sd"].values
+            for name, at in zip(PLACE[:2], truth[:2], strict=True)
+        ]
+    )
+    np.testing.assert_array_less(np.abs(off[:, good]), 4.0)
+    draws = tb.infer_contacts(record, rig, rng=1)["posterior"]
+    every = np.stack([draws[name].values.reshape(-1, record.sizes["sample"]) for name in PLACE])
+    low, high = np.quantile(every, [0.025, 0.975], axis=1)
+    touched = np.isfinite(low).all(axis=0) & np.isfinite(truth).all(axis=0)
+    held = ((low <= truth) & (truth <= high))[:, touched]
+    assert held.shape[1] > 15
+    np.testing.assert_array_less(0.8, held.mean(axis=1))
