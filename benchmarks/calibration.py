@@ -2,7 +2,12 @@
 
 Truths are drawn from the default priors of a family and of the unknowns of the rig, at the usual noise, a tenth of
 it and three times as much; see `tactile_bayes.calibrate`. Results are kept in results/calibration, so that a run that
-was stopped goes on. With the argument "published", the tables are those of the replicates in data/calibration.
+was stopped goes on; a number stands for that of replicates. With the argument "published", the tables are those of the
+replicates in data/calibration.
+
+By name, and at the usual noise only, there are also drives on which a rod may stick: "stage" and "stage-both", an
+upright whisker that is carried past one way and both, with a known coefficient of friction in truth, as in "stage-0.3",
+and "turned", a rotation that turns back in contact.
 """
 
 from __future__ import annotations
@@ -11,7 +16,7 @@ import json
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -29,6 +34,9 @@ class Family(NamedTuple):
     title: str
     replicates: int
     """Number at the usual noise; half as many at others."""
+    drive: tuple[tb.Translation | tb.Motion, ...] | None = None
+    friction: float | None = None
+    """Coefficient of friction in truth, if it is not drawn."""
 
 
 class Noise(NamedTuple):
@@ -47,6 +55,18 @@ FAMILIES = {
     "parabola/power-law": Family("parabola/power-law", 200),
     "shape-free": Family("shape-free", 100),
 }
+FORTH = tb.Translation((0.75, 0.0), np.pi, 0.5 * np.pi, 1.5)
+BACK = tb.Translation((-0.75, 0.0), 0.0, 0.5 * np.pi, 1.5)
+STICKING = {
+    "stage-0": Family("upright, one way, no friction", 200, (FORTH,), 0.0),
+    "stage-0.3": Family("upright, one way, μ = 0.3", 200, (FORTH,), 0.3),
+    "stage-both-0": Family("upright, both ways, no friction", 200, (FORTH, BACK), 0.0),
+    "stage-both-0.3": Family("upright, both ways, μ = 0.3", 200, (FORTH, BACK), 0.3),
+    "turned": Family("rotations that turn back", 200, (tb.Motion(0.0, 0.0, np.radians([-30.0, 100.0, 60.0, 210.0])),)),
+}
+"""Parabolas, past which the drive goes in another way."""
+
+EVERY = {**FAMILIES, **STICKING}
 NOISES = {
     "usual": Noise("at the usual noise", 0.05, 0.02),
     "tenth": Noise("at a tenth of the noise", 0.005, 0.002),
@@ -89,7 +109,7 @@ def table(noise: str, calibrations: dict[str, xr.Dataset]) -> str:
         [
             row(
                 NOISES[noise].title,
-                (f"{one.sizes['replicate']} {FAMILIES[family].title}" for family, one in calibrations.items()),
+                (f"{one.sizes['replicate']} {EVERY[family].title}" for family, one in calibrations.items()),
             ),
             "|" + "---|" * (len(found) + 1),
             *(held(name) for name in CLAIMS),
@@ -106,18 +126,26 @@ def _share(claim: xr.Dataset) -> str:
     return f"{100 * float(claim.coverage):.1f} ± {100 * float(claim.coverage_error):.1f} %"
 
 
-def calibrated(family: str, noise: str) -> xr.Dataset:
-    replicates = FAMILIES[family].replicates // (1 if noise == "usual" else 2)
+def calibrated(family: str, noise: str, replicates: int | None) -> xr.Dataset:
+    one = EVERY[family]
+    replicates = replicates or one.replicates // (1 if noise == "usual" else 2)
     rig, out = tb.Rig(load_cell=load_cell(noise)), OUT / folder_of(family, noise)
-    found = tb.calibrate(family, rig, replicates=replicates, rng=SEED, out=out)
+    known: dict[str, Any] = {} if one.drive is None else {"drive": one.drive}
+    if one.friction is not None:
+        known["truth"] = tb.Rig(unknown={"friction": one.friction})
+    found = tb.calibrate("parabola" if one.drive else family, rig, replicates=replicates, rng=SEED, out=out, **known)
     print(f"{family}, {noise} noise: {found.attrs['verdict']}", flush=True)
     return found
 
 
 def main(*chosen: str) -> None:
-    families = [name for name in FAMILIES if name in chosen] or FAMILIES
-    for noise in [name for name in NOISES if name in chosen] or NOISES:
-        made = published(noise) if "published" in chosen else {name: calibrated(name, noise) for name in families}
+    count = next((int(word) for word in chosen if word.isdigit()), None)
+    families = [name for name in EVERY if name in chosen] or list(FAMILIES)
+    noises = ["usual"] if set(families) & set(STICKING) else [name for name in NOISES if name in chosen] or list(NOISES)
+    for noise in noises:
+        made = (
+            published(noise) if "published" in chosen else {name: calibrated(name, noise, count) for name in families}
+        )
         print(f"\n{table(noise, made)}\n", flush=True)
 
 
