@@ -7,17 +7,15 @@ import signal
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import typer.testing
 from hypothesis import settings
 
 from helpers.contour_posteriors import QUICK
-from tactile_bayes.contours import Circle
-from tactile_bayes.mechanics.rods.rod import Rod
+from helpers.forward_models import compile_share
 from tactile_bayes.rig import Rig
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
-from tactile_bayes.sweep import Translation, scan
+from tactile_bayes.sweep import scan
 
 os.environ["MPLBACKEND"] = "Agg"  # figures need no screen
 
@@ -30,22 +28,11 @@ def pytest_configure(config):
         settings.load_profile("few")
 
 
-CARRIED = Translation(base=(0.9, 0.0), heading=np.pi, drive_angle=1.5, travel=1.8)
-FORWARD_MODELS = (
-    {"rig": Rig(rod=Rod(taper=0.5)), "drive": [CARRIED]},
-    {"drive": [CARRIED]},
-    {"direction": "forward"},
-    {"rig": Rig(rod=Rod(taper=0.5)), "direction": "forward"},
-)
-"""Arguments of sweeps for which numba compiles different functions, a quarter of a minute each."""
-
-
 def pytest_sessionstart(session):
     """Of processes that share the tests, each compiles others of the forward models, which are cached on disk."""
     worker = getattr(session.config, "workerinput", None)
     if worker is not None and worker["workercount"] > 1:
-        for arguments in FORWARD_MODELS[int(worker["workerid"][2:]) :: worker["workercount"]]:
-            scan(Circle(0.1, 0.6, 0.1), **arguments)
+        compile_share(int(worker["workerid"][2:]), worker["workercount"])
 
 
 SAMPLING = re.compile(

@@ -1,0 +1,28 @@
+"""Sweeps for which numba compiles different functions, most of a minute each: `python -m helpers.forward_models`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_bayes.contours import Circle
+from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.rig import Rig
+from tactile_bayes.sweep import Translation, scan
+
+_CARRIED = Translation(base=(0.9, 0.0), heading=np.pi, drive_angle=1.5, travel=1.8)
+_KINDS = (
+    {"rig": Rig(rod=Rod(taper=0.5)), "direction": "forward"},
+    {"rig": Rig(rod=Rod(taper=0.5)), "drive": [_CARRIED]},
+    {"direction": "forward"},
+    {"drive": [_CARRIED]},
+)
+
+
+def compile_share(number: int = 0, of: int = 1) -> None:
+    """Compile one share of the forward models, which are cached on disk."""
+    for arguments in _KINDS[number::of]:
+        scan(Circle(0.1, 0.6, 0.1), **arguments)
+
+
+if __name__ == "__main__":
+    compile_share()
