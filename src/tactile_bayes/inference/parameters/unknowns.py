@@ -256,7 +256,7 @@ def _hidden_backlash(measured: xr.Dataset, rig: Rig, cell: LoadCell) -> set[str]
     turned_back = turned_sweeps(measured, cell)
     if not turned_back:
         return set()
-    if rig.is_named("backlash"):
+    if rig.is_named("backlash") and not isinstance(rig.said["backlash"], float):
         raise ParameterError(
             f"backlash cannot be inferred beside friction where a drive turns back in contact, as in sweep "
             f"{min(turned_back)}: state the backlash of the encoder (drive_angle_backlash of the load cell)"
