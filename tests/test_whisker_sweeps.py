@@ -12,29 +12,29 @@ from tactile_bayes.inference.family import Gauge
 from tactile_bayes.rig import Rig
 
 RIG = {
-    "moment_gain": 0.928,
-    "moment_curve_quadratic": 586.0,
-    "moment_curve_cubic": 2.034e6,
-    "suspension_compliance": 1330.0,
-    "drive_angle_offset": -0.036,
-    "friction": 0.498,
-    "rest_curvature": -29.93,
-    "gauge_x": 0.261e-3,
-    "gauge_y": 3.284e-3,
+    "moment_gain": 0.926,
+    "moment_curve_quadratic": 598.5,
+    "moment_curve_cubic": 2.0346e6,
+    "suspension_compliance": 1334.3,
+    "drive_angle_offset": -0.0318,
+    "friction": 0.4985,
+    "rest_curvature": -30.067,
+    "gauge_x": 0.2563e-3,
+    "gauge_y": 3.2783e-3,
 }
 """The posterior mean of `python -m benchmarks.whisker_sweeps`."""
 
 ON_STEM = {
-    "moment_gain": 0.8916,
-    "moment_curve_quadratic": 403.4,
-    "moment_curve_cubic": 1.945e6,
-    "suspension_compliance": 1578.0,
-    "drive_angle_offset": -0.02553,
-    "friction": 0.3927,
-    "rest_curvature": -32.77,
-    "stem": 4.598e-3,
-    "gauge_x": 0.284e-3,
-    "gauge_y": 2.957e-3,
+    "moment_gain": 0.8914,
+    "moment_curve_quadratic": 417.2,
+    "moment_curve_cubic": 1.955e6,
+    "suspension_compliance": 1586.0,
+    "drive_angle_offset": -0.02128,
+    "friction": 0.3999,
+    "rest_curvature": -32.94,
+    "stem": 4.532e-3,
+    "gauge_x": 0.2639e-3,
+    "gauge_y": 2.915e-3,
 }
 """The likeliest rig with a stem before the whisker, with the benchmark's priors and white noise of 7 counts."""
 

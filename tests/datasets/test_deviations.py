@@ -45,6 +45,7 @@ NEVER_DRAWN = {
     *GROUPS["gauge"],
     *GROUPS["discrepancy"],
     *GROUPS["rest_shape"],
+    "taper_error",
     "noise_scale",
     "moment_noise",
     "force_noise",

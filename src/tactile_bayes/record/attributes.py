@@ -17,7 +17,15 @@ from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, UNITS, Frame
 from tactile_bayes.record.storable import not_storable
 from tactile_bayes.record.table import Source
 
-_SHAPE = ("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviation", "stem", "rest_shape_modes")
+_SHAPE = (
+    "rest_curvature",
+    "taper",
+    "rigidity_profile",
+    "rest_curvature_deviation",
+    "stem",
+    "rest_shape_modes",
+    "taper_deviation",
+)
 """Properties by which a rod differs from a straight, uniform one."""
 
 _POINTS, _SAME = 101, 1e-9

@@ -28,7 +28,7 @@ class Points(NamedTuple):
     """Points of a file."""
 
     pieces: list[Floats]
-    """Shape (n, 2) each, in their order, in metres if the file states a unit of length."""
+    """Shape (n, 2) each, or (n, 3) with a column beside x and y, in their order, in metres if a unit is stated."""
     unit: str
     """"m", "1" for rod lengths, or "" if the file states none."""
 
@@ -39,7 +39,7 @@ class Points(NamedTuple):
         return self.pieces
 
 
-def read_points(path: str | os.PathLike[str]) -> Points:
+def read_points(path: str | os.PathLike[str], *, beside: str = "") -> Points:
     """Read the points of a contour.
 
     Parameters
@@ -49,6 +49,8 @@ def read_points(path: str | os.PathLike[str]) -> Points:
         "x [mm]", or in lines "# column x: number [mm]"; "L" stands for rod lengths. Or a DXF drawing, of which the
         lines, polylines, arcs, circles, ellipses and splines in model space are read, on layers that are shown; this
         takes the package ezdxf.
+    beside : str
+        Name of a further column of lengths, which is read if a CSV file has it.
 
     Returns
     -------
@@ -70,10 +72,13 @@ def read_points(path: str | os.PathLike[str]) -> Points:
     except UnicodeDecodeError as error:
         raise ParameterError(f"{path}: {not_utf8(error)}") from error
     described = dict(filter(None, map(column_described, lines)))
-    names, rows = _table_of([line for line in lines if line.strip() and not line.lstrip().startswith("#")], path)
+    wanted = ("x", "y", beside) if beside else ("x", "y")
+    names, rows = _table_of(
+        [line for line in lines if line.strip() and not line.lstrip().startswith("#")], path, wanted
+    )
     scales = [_scale(described.get(name) or stem_and_unit(name)[1] or "", path) for name in names]
     if len({unit for _, unit in scales}) > 1:
-        raise ParameterError(f"{path}: {names[0]!r} and {names[1]!r} state different units: write x [mm],y [mm]")
+        raise ParameterError(f"{path}: {', '.join(map(repr, names))} state different units: write x [mm],y [mm]")
     return Points([rows * [scale for scale, _ in scales]], scales[0][1])
 
 
@@ -87,33 +92,34 @@ def _scale(unit: str, path: object) -> tuple[float, str]:
     return float(found.scale), "m"
 
 
-def _table_of(lines: Sequence[str], path: object) -> tuple[list[str], Floats]:
-    """Return the names of x and y, and their numbers, shape (n, 2); the first line may hold names."""
+def _table_of(lines: Sequence[str], path: object, wanted: Sequence[str]) -> tuple[list[str], Floats]:
+    """Return the names of the wanted columns that there are, and their numbers; the first line may hold names."""
     sample = "".join(lines[:2])
     delimiter = next((mark for mark in ";\t," if mark in sample), " ")
     rows = [
         [cell.strip() for cell in row]
         for row in csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
     ]
-    names, places = ["x", "y"], (0, 1)
-    if rows and _pair(rows[0], places, delimiter) is None:
+    names, places = ["x", "y"], [0, 1]
+    if rows and _point(rows[0], places, delimiter) is None:
         stems = [stem_and_unit(name)[0].lower() for name in rows[0]]
         if "x" in stems and "y" in stems:
-            places = (stems.index("x"), stems.index("y"))
+            places = [stems.index(name) for name in wanted if name in stems]
         elif len(stems) > 2:
             raise ParameterError(f"{path}: none of its columns are x and y ({', '.join(rows[0])}): name them so")
         names = [rows[0][place] if place < len(rows[0]) else "" for place in places]
         rows = rows[1:]
-    pairs = [_pair(row, places, delimiter) for row in rows]
-    if None in pairs:
-        bad = rows[pairs.index(None)]
+    points = [_point(row, places, delimiter) for row in rows]
+    if None in points:
+        bad = rows[points.index(None)]
         raise ParameterError(f"{path}: {delimiter.join(bad)!r} is no point: give x and y, like 0.1,0.52")
-    if not pairs:
+    if not points:
         raise ParameterError(f"{path}: there are no points in it: give lines of x and y, like 0.1,0.52")
-    return names, np.array(pairs, dtype=float)
+    return names, np.array(points, dtype=float)
 
 
-def _pair(row: Sequence[str], places: tuple[int, int], delimiter: str) -> tuple[float, float] | None:
+def _point(row: Sequence[str], places: Sequence[int], delimiter: str) -> list[float] | None:
     cells = [row[place] if place < len(row) else "" for place in places]
-    one, two = (number_in(cell if delimiter == "," else cell.replace(",", ".")) for cell in cells)
-    return (one, two) if one is not None and two is not None and np.isfinite([one, two]).all() else None
+    found = [number_in(cell if delimiter == "," else cell.replace(",", ".")) for cell in cells]
+    numbers = [number for number in found if number is not None and np.isfinite(number)]
+    return numbers if len(numbers) == len(cells) else None

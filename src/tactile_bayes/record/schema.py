@@ -159,6 +159,7 @@ ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
         "rod_rigidity_profile": "1",
         "rod_stem": "m",
         "rod_rest_shape_modes": "1/m",
+        "rod_taper_deviation": "1",
         **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
     }
 )

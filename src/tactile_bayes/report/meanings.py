@@ -44,6 +44,7 @@ _MEANINGS = {
     **{f"rest_shape_{k}": f"amplitude of mode {k} of the rest curvature" for k in range(1, MOST_MODES + 1)},
     "stem": "length of the rigid piece between pivot and rod",
     "length": "length of the rod",
+    "taper_error": "error of the measured taper, in its standard deviations",
     "taper": "part of its diameter that the rod loses toward its tip",
     "suspension_compliance": "rotation of the pivot per holding moment",
     "gap width": "width of the arc that no sweep touches",

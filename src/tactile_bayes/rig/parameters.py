@@ -180,6 +180,14 @@ _ROWS = (
         )
         for k in range(1, MOST_MODES + 1)
     ),
+    Parameter(
+        "taper_error",
+        "error of the measured taper, in its standard deviations",
+        "1",
+        "normal",
+        1.0,
+        hidden="unless diameters were measured along the rod",
+    ),
     Parameter("taper", "part by which the diameter falls to the tip", "1", "normal", 0.05, None, 0.0, STEEPEST_TAPER),
     Parameter(
         "stem",
@@ -273,7 +281,16 @@ GROUPS = {
 }
 """Names that stand for several parameters; "base" stands for the shifts of all pivots but the first."""
 
-STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction", "rest_shape")
+STANDARD = (
+    "rigidity_scale",
+    "drive_angle_offset",
+    "bias",
+    "lever",
+    "backlash",
+    "friction",
+    "rest_shape",
+    "taper_error",
+)
 """What is unknown of a real rig, unless it is said to be known."""
 
 MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem")

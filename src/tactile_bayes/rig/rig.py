@@ -29,7 +29,7 @@ from tactile_bayes.tasks.documents import read_toml
 
 __all__ = ["Rig", "rig_of", "rod_with"]
 
-_SHAPE = ("rest_curvature", "taper", "stem", "length", *GROUPS["rest_shape"])
+_SHAPE = ("rest_curvature", "taper", "taper_error", "stem", "length", *GROUPS["rest_shape"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,8 @@ class Rig:
         Parameters of the rig, or groups of them (`tactile-bayes rig --parameters` lists them), in the units of the
         record: a number is known; a frozen distribution of scipy.stats is unknown, and "default" stands for the default
         distribution. What is not named is unknown if it is unknown of a real rig: `rigidity_scale`,
-        `drive_angle_offset`, `bias`, `lever`, `backlash`, `friction` and, of a traced rod, `rest_shape`, each where the
+        `drive_angle_offset`, `bias`, `lever`, `backlash`, `friction`, of a traced rod `rest_shape`, and of one whose
+        diameter was measured along it `taper_error`, each where the
         record shows it; everything else is as stated. "nothing": all is as stated, without friction.
     calibration : RigPrior, optional
         Joint distribution of parameters that a known object has shown, from `calibrate_rig`.
@@ -311,4 +312,6 @@ def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
     names = GROUPS["rest_shape"][: len(rod.rest_shape_modes)]
     rod, length = rod.shaped([rig.get(name, 0.0) for name in names]), rig.get("length", rod.length)
     curvature = rig.get("rest_curvature", rod.mean_rest_curvature * rod.length / length)
-    return rod.reshaped(curvature, rig.get("taper", rod.taper), rig.get("stem"), length)
+    return rod.reshaped(
+        curvature, rig.get("taper", rod.tapered_by(rig.get("taper_error", 0.0))), rig.get("stem"), length
+    )

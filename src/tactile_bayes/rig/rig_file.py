@@ -59,7 +59,7 @@ ROD_UNITS = {
     "stem": "m",
 }
 TABLES = {
-    "rod": (*ROD_UNITS, "rigidity_profile", "rest_shape_modes", "shape"),
+    "rod": (*ROD_UNITS, "rigidity_profile", "rest_shape_modes", "taper_deviation", "shape"),
     "load_cell": ("frame", *LOAD_CELL_UNITS, *SEVERAL),
     "file": (*MEASURED, *(name for name in COLUMNS if name not in MEASURED), "split_sweeps", "missing"),
     "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
@@ -182,7 +182,9 @@ def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
         for name, unit in ROD_UNITS.items()
         if name in said
     }
-    numbers |= {name: said[name] for name in ("rigidity_profile", "rest_shape_modes") if name in said}
+    numbers |= {
+        name: said[name] for name in ("rigidity_profile", "rest_shape_modes", "taper_deviation") if name in said
+    }
     modulus = numbers.pop("youngs_modulus", None)
     if modulus is not None:
         if "flexural_rigidity" in numbers or "diameter" not in numbers:
@@ -191,14 +193,16 @@ def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
             )
         numbers["flexural_rigidity"] = modulus * math.pi * numbers["diameter"] ** 4 / 64.0
     if "shape" in said:
-        check_kind("rod.shape", said["shape"], str, "give the path of a CSV file with columns x and y")
+        check_kind("rod.shape", said["shape"], str, "give the path of a CSV file with columns x, y, diameter")
         if "flexural_rigidity" not in numbers:
             raise ParameterError("[rod] states a shape, and no flexural_rigidity (or youngs_modulus and diameter)")
         path = folder / said["shape"]
-        pieces = read_points(path).in_unit("m", str(path))
+        pieces = read_points(path, beside="diameter").in_unit("m", str(path))
         if len(pieces) > 1:
             raise ParameterError(f"{path} has {len(pieces)} curves: give the rod's shape as one")
-        x, y = pieces[0].T
+        x, y, *diameters = pieces[0].T
+        if diameters:
+            numbers["diameter"] = diameters[0]
         return Rod.from_shape(x, y, numbers.pop("flexural_rigidity"), **numbers)
     if ("length" in numbers) != ("flexural_rigidity" in numbers):
         raise ParameterError(

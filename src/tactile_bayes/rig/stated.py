@@ -56,11 +56,14 @@ class Stated(NamedTuple):
     own_gains: Sequence[Any]
     """Reading of each channel for a unit of its own load, without sign."""
     rest_curvature_deviation: Any = 0.0
+    taper_deviation: float = 0.0
 
     @classmethod
     def of(cls, rod: Rod, cell: LoadCell) -> Stated:
         """Return what a rod and a load cell state."""
-        return cls(rod, stated_values(rod, cell), cell.own_gains.tolist(), rod.rest_curvature_deviation)
+        return cls(
+            rod, stated_values(rod, cell), cell.own_gains.tolist(), rod.rest_curvature_deviation, rod.taper_deviation
+        )
 
     def default(self, name: str) -> Distribution:
         """Return the default distribution of a parameter, in the units of the rod."""
@@ -72,6 +75,8 @@ class Stated(NamedTuple):
                 scale = scale * self.own_gains[names.index(name)]
         if name == "rest_curvature":
             scale = np.where(self.rest_curvature_deviation, self.rest_curvature_deviation, scale)[()]
+        if name == "taper" and self.taper_deviation:
+            scale = self.taper_deviation
         centre = self.values.get(name, 0.0)
         if parameter.default == "log_normal":
             return stats.lognorm(s=parameter.width, scale=centre)

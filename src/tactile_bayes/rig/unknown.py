@@ -52,7 +52,7 @@ def of_pivots(said: Mapping[str, Unknown], pivots: int) -> dict[str, Unknown]:
 
 
 def of_modes(said: Mapping[str, Unknown], rod: Rod) -> dict[str, Unknown]:
-    """Return what is said of each parameter, without amplitudes of modes that a rod does not have."""
+    """Return what is said of each parameter, without amplitudes of what was not measured of a rod."""
     absent = GROUPS["rest_shape"][len(rod.rest_shape_modes) :]
     for name in absent:
         if said.get(name, DEFAULT) not in (DEFAULT, 0.0):
@@ -60,6 +60,13 @@ def of_modes(said: Mapping[str, Unknown], rod: Rod) -> dict[str, Unknown]:
                 f"{name} is said to be other than 0, and the rod has {len(rod.rest_shape_modes)} modes of its rest "
                 "curvature: only a rod that was traced has them (Rod.from_shape, or shape under [rod])"
             )
+    if "taper" in said or not rod.taper_deviation:
+        if said.get("taper_error", DEFAULT) not in (DEFAULT, 0.0):
+            raise ParameterError(
+                "taper_error is said to be other than 0, and the taper itself is said, or was not measured: give "
+                "diameters along the rod (Rod.from_shape, or a column of its shape), and say nothing of taper"
+            )
+        absent = (*absent, "taper_error")
     return {name: value for name, value in said.items() if name not in absent}
 
 

@@ -98,8 +98,9 @@ class Unknowns:
             longer = off.get("length", 1.0)  # the rod of another length has the stated turn from base to tip
             mean = self.rod.mean_rest_curvature + sum(modes[name].mean * values[name] for name in shaped)
             off["rest_curvature"] = (longer * values["rest_curvature"] - mean) / self.units["rest_curvature"]
-        if "taper" in values:
-            off["taper"] = values["taper"] - self.rod.taper
+        if "taper" in values or "taper_error" in values:
+            taper = values["taper"] if "taper" in values else self.rod.tapered_by(values["taper_error"])
+            off["taper"] = taper - self.rod.taper
         if "stem" in values:
             off["stem"] = (values["stem"] - self.rod.stem) / self.units["stem"]
         off |= {of_rig: values[name] / self.units[name] for name, of_rig in _RIG.items() if name in values}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_array, check_number, check_positive
+from tactile_bayes.checks import check_array, check_number, check_numbers, check_positive, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.rods.along import MISS, Along, along, modes_along
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, STEEPEST_TAPER, Profile, Rods, profile_of
@@ -75,6 +75,9 @@ class Rod:
         What is uncertain of the course of the rest curvature, if it was measured (`from_shape`): at most three
         independent deviations from it, each as large as its standard deviation [1/m]. Their amplitudes are the unknowns
         `rest_shape_1` to `rest_shape_3` of a rig.
+    taper_deviation : float
+        Standard deviation of the taper, if it was measured (`from_shape`): that of the unknown `taper` in its default
+        prior. In these deviations `taper_error` is unknown.
 
     Raises
     ------
@@ -105,6 +108,7 @@ class Rod:
     rest_curvature_deviation: float = 0.0
     stem: float = 0.0
     rest_shape_modes: Any = ()
+    taper_deviation: float = 0.0
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
@@ -119,6 +123,8 @@ class Rod:
             )
         correction = f"give a number from 0, for none, to {STEEPEST_TAPER}"
         check_number("the rod's taper", self.taper, correction, least=0.0, most=STEEPEST_TAPER)
+        correction = "give zero, for one that was not measured, or a positive number"
+        check_number("the rod's taper_deviation", self.taper_deviation, correction, least=0.0)
         if self.rigidity_profile is not None:
             of_rod = along("the rod's rigidity_profile", self.rigidity_profile, self.length, positive=True)
             uniform = isinstance(of_rod, float) and of_rod == 1.0
@@ -161,11 +167,8 @@ class Rod:
             )
 
     def __repr__(self) -> str:
-        optional = ("elastic_strain", None), ("rest_curvature", 0.0), ("taper", 0.0), ("rest_curvature_deviation", 0.0)
         shown = [(name, getattr(self, name)) for name in ("length", "flexural_rigidity", "diameter")]
-        for name, default in (*optional, ("rigidity_profile", None), ("stem", 0.0), ("rest_shape_modes", ())):
-            if getattr(self, name) != default:
-                shown.append((name, getattr(self, name)))
+        shown += [(f.name, of) for f in fields(self)[3:] if (of := getattr(self, f.name)) != f.default]
         return f"Rod({', '.join(f'{name}={value!r}' for name, value in shown)})"
 
     @classmethod
@@ -218,7 +221,7 @@ class Rod:
         *,
         scatter: float | None = None,
         length: float | None = None,
-        diameter: float = 0.0,
+        diameter: ArrayLike = 0.0,
         taper: float = 0.0,
         rigidity_profile: Any = None,
         stem: float = 0.0,
@@ -243,7 +246,10 @@ class Rod:
             Length of the rod from the first point on, in the unit of the points, if it continues beyond the last one,
             like a whisker whose tip must not be touched. The rest curvature there continues with its trend. By default
             the last point is the tip.
-        diameter, stem : float
+        diameter : float or array_like, shape (n,)
+            As in `Rod`, in the unit of the points, or measured at each of them: then diameter at the base and taper,
+            with its standard deviation, follow.
+        stem : float
             As in `Rod`, in the unit of the points.
         taper, rigidity_profile
             As in `Rod`.
@@ -251,13 +257,13 @@ class Rod:
         Returns
         -------
         Rod
-            With `rest_curvature_deviation` and `rest_shape_modes`.
+            With `rest_curvature_deviation`, `rest_shape_modes` and, from diameters at the points, `taper_deviation`.
 
         Raises
         ------
         ParameterError
             As in `Rod`, and if the points are not those of a rod: too few, not in order, turned back, or scattered by
-            more than a twentieth of the length.
+            more than a twentieth of the length; if diameters do not fall linearly, or a taper is given beside them.
 
         Examples
         --------
@@ -266,9 +272,14 @@ class Rod:
         >>> round(whisker.length, 6), round(whisker.mean_rest_curvature, 3)
         (0.03, 20.0)
         """
-        from tactile_bayes.mechanics.rods.traced import traced_rod
+        from tactile_bayes.mechanics.rods.traced import MeasuredCone, measured_cone, traced_rod
 
-        check_number("diameter", diameter, "give zero or a positive number, in the unit of the points", least=0.0)
+        correction = "give zero or positive numbers, one or one for each point, in the unit of the points"
+        diameters = check_numbers("diameter", diameter, correction, least=0.0)
+        if diameters.shape not in ((), np.shape(x)):
+            raise refused("diameter", diameter, correction)
+        if diameters.ndim and taper:
+            raise refused("taper", taper, "leave it out: it follows from the diameters at the points")
         check_number("stem", stem, "give a length from 0, for none, in the unit of the points", least=0.0)
         traced = traced_rod(x, y, scatter=scatter, length=length)
         whole, rigidity = (1.0, 1.0) if flexural_rigidity is None else (traced.length, flexural_rigidity)
@@ -279,16 +290,18 @@ class Rod:
             along("rest_curvature", lambda s, c=c: chebyshev.evaluate(c, s / whole) / whole, whole, miss=misses[k > 0])
             for k, c in enumerate(series)
         )
+        cone = measured_cone(traced.feet, diameters) if diameters.ndim else MeasuredCone(float(diameters), taper, 0.0)
         return cls(
             whole,
             rigidity,
-            diameter * whole / traced.length,
+            cone.diameter * whole / traced.length,
             rest_curvature=curvature,
-            taper=taper,
+            taper=cone.taper,
             rigidity_profile=rigidity_profile,
             rest_curvature_deviation=traced.deviation_of_mean / whole,
             stem=stem * whole / traced.length,
             rest_shape_modes=modes,
+            taper_deviation=cone.deviation,
         )
 
     def mirrored(self, side: ArrayLike) -> Rods:
@@ -312,6 +325,7 @@ class Rod:
             rest_curvature_deviation=self.rest_curvature_deviation / self.curvature_unit,
             stem=self.stem / self.length_unit,
             rest_shape_modes=[m.scaled(1.0 / self.length, 1.0 / self.curvature_unit) for m in self.rest_shape_modes],
+            taper_deviation=self.taper_deviation,
         )
 
     def shape_in_words(self, unit: str) -> list[str]:
@@ -352,6 +366,10 @@ class Rod:
             stem=self.stem if stem is None else stem,
             rest_shape_modes=[mode.scaled(longer, 1.0 / longer) for mode in self.rest_shape_modes],
         )
+
+    def tapered_by(self, error: Any) -> Any:
+        """Return the taper with an error in its standard deviations."""
+        return np.clip(self.taper + error * self.taper_deviation, 0.0, STEEPEST_TAPER)[()]
 
     def shaped(self, amplitudes: ArrayLike) -> Rod:
         """Return the rod of which the amplitudes of the modes of its rest curvature are known, shape (modes,)."""

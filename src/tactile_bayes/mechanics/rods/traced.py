@@ -28,7 +28,7 @@ from tactile_bayes.checks import check_numbers, check_positive
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["TracedRod", "traced_rod"]
+__all__ = ["MeasuredCone", "TracedRod", "measured_cone", "traced_rod"]
 
 _FEWEST = 8
 """Least number of points: four for a linear curvature, and four for their scatter."""
@@ -78,6 +78,9 @@ _FALSE_ALARM = 1e-6
 _ROUNDING = 1e-12
 """Scatter over the length that is rounding."""
 
+_BENT = 3
+"""Degree of the polynomial beside which diameters are checked to fall linearly."""
+
 _MOST_STEPS = 50
 
 _WILD = 1e3
@@ -99,6 +102,8 @@ class TracedRod:
     """Chebyshev coefficients of the rest curvature [1/L] on s from 0 to 1."""
     covariance: Floats
     """Their covariance."""
+    feet: Floats
+    """Arc lengths of the points from the first one, over the length."""
 
     def rest_curvature(self, s: ArrayLike) -> Floats:
         """Rest curvature [1/L] at arc lengths s from 0, the base, to 1, the tip."""
@@ -179,7 +184,38 @@ def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None, leng
     if length is not None:
         ends = ends[:, :1]
     covariance = fit.covariance + used**2 * (ends @ ends.T)
-    return TracedRod(fit.length, fit.length * used if scatter is None else scatter, fit.curvature, covariance)
+    return TracedRod(fit.length, fit.length * used if scatter is None else scatter, fit.curvature, covariance, fit.feet)
+
+
+class MeasuredCone(NamedTuple):
+    """Diameter at the base and taper of a rod, from diameters measured along it."""
+
+    diameter: float
+    taper: float
+    deviation: float
+    """Standard deviation of the taper."""
+
+
+def measured_cone(s: Floats, diameters: Floats) -> MeasuredCone:
+    """Return the cone that diameters at arc lengths s, over the length, determine, with white noise of unknown size."""
+    by = legvander(2.0 * s - 1.0, _BENT)
+    spread, bent = np.linalg.inv(by.T @ by), np.linalg.lstsq(by, diameters)[0]
+    freedom = s.size - by.shape[1]
+    # The posterior is a t distribution, of this standard deviation over its scale.
+    wider = math.sqrt(freedom / (freedom - 2.0))
+    scatter = wider * math.sqrt(float(np.sum((diameters - by @ bent) ** 2)) / freedom)
+    off = _BACKWARD * scatter * np.sqrt(np.diagonal(spread)[2:])
+    if (np.abs(bent[2:]) > off + _ROUNDING * bent[0]).any():
+        raise ParameterError(
+            "the diameters do not fall linearly: give the diameter at the base, and a rigidity_profile, the fourth "
+            "power of the diameter over that at the base"
+        )
+    middle, half = np.linalg.lstsq(by[:, :2], diameters)[0].tolist()
+    base, end = middle - half, middle + half
+    way = np.array([1.0 - end / base, 1.0 + end / base]) / base
+    deviation = scatter * math.sqrt(float(way @ np.linalg.inv(by[:, :2].T @ by[:, :2]) @ way))
+    taper = 1.0 - end / base
+    return MeasuredCone(base, max(taper, 0.0) if taper > -_BACKWARD * deviation else taper, deviation)
 
 
 def _refuse_length(length: float, fit: _Fit) -> None:
