@@ -22,7 +22,7 @@ from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 
 MODES = [lambda s: 3.0 - 30.0 * s, lambda s: 20.0 * s, lambda s: np.cos(60.0 * s)]
-ROD = Rod(0.1, 2e-4, rest_curvature=2.0, taper=0.2, stem=0.004, rest_shape_modes=MODES)
+ROD = Rod(0.1, 2e-4, rest_curvature=2.0, taper=0.2, stem=0.004, rest_shape_modes=MODES, taper_deviation=0.04)
 CELL = LoadCell(
     force_noise=0.05 * ROD.force_unit,
     moment_noise=0.02 * ROD.moment_unit,
@@ -58,6 +58,7 @@ KNOWN = {
     "rest_shape_2": -0.4,
     "rest_shape_3": 1.2,
     "taper": 0.25,
+    "taper_error": 0.9,
     "stem": 0.0055,
     "length": 0.102,
     "gauge_x": 0.0006,
@@ -113,7 +114,7 @@ def test_a_known_number_is_as_one_that_is_inferred_at_that_value(name):
 @pytest.mark.parametrize("seed", range(4))
 def test_some_known_and_others_inferred_are_as_all_inferred(seed):
     rng = np.random.default_rng(seed)
-    names = [name for name in KNOWN if name not in (*GROUPS["gauge"], "rigidity_scale")]
+    names = [name for name in KNOWN if name not in (*GROUPS["gauge"], "rigidity_scale", "taper_error")]
     chosen = rng.permutation(names)[: rng.integers(2, len(names))]
     known = {str(name): KNOWN[name] for name in chosen}
     one = model_of({**dict.fromkeys(names, "default"), **known})

@@ -207,7 +207,8 @@ def test_the_one_dimension_of_a_netcdf_file_may_have_any_name(tmp_path, name):
 
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_a_traced_rod_is_kept_with_its_modes(tmp_path, suffix):
-    rod = Rod(0.1, 1e-4, rest_curvature=2.0, rest_shape_modes=(lambda s: 3.0 - 30.0 * s, lambda s: np.cos(60.0 * s)))
+    modes = (lambda s: 3.0 - 30.0 * s, lambda s: np.cos(60.0 * s))
+    rod = Rod(0.1, 1e-4, rest_curvature=2.0, taper=0.3, rest_shape_modes=modes, taper_deviation=0.01)
     write_record(make_record(columns(), Rig(rod)), tmp_path / f"record{suffix}")
     assert rod_of(read_record(tmp_path / f"record{suffix}")) == rod
 

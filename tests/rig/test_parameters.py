@@ -13,7 +13,7 @@ from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, PARAMETERS, STANDARD, members, parameter_named
 
 MODES = (lambda s: 1.0 - 2.0 * s, lambda s: 0.5 + 5.0 * s**2, lambda s: np.cos(20.0 * s))
-ROD = Rod(0.2, 3e-4, rest_curvature=1.5, taper=0.3, stem=0.01, rest_shape_modes=MODES)
+ROD = Rod(0.2, 3e-4, rest_curvature=1.5, taper=0.3, stem=0.01, rest_shape_modes=MODES, taper_deviation=0.05)
 STATED = {"rest_curvature": 1.5, "taper": 0.3, "stem": 0.01, "length": 0.2}
 CELL = LoadCell(force_noise=0.05 * ROD.force_unit, moment_noise=0.02 * ROD.moment_unit, moment_curve=(2.0, 3.0))
 STATED |= {"moment_curve_quadratic": 2.0, "moment_curve_cubic": 3.0}

@@ -20,12 +20,13 @@ from tactile_bayes.rig.file_format import FileFormat
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS, STANDARD, members
 from tactile_bayes.rig.rig import rig_of
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.stated import Stated
 from tactile_bayes.rig.unknown import expanded
 from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 RECORD = scan(Parabola(0.5, q=0.5), drive_step=0.1).record
-ALL = tuple(name for group in STANDARD if group != "rest_shape" for name in members(group))
+ALL = tuple(name for group in STANDARD if group not in ("rest_shape", "taper_error") for name in members(group))
 TRACED = Rod(rest_shape_modes=(lambda s: 0.2 * (1.0 - s), lambda s: 0.1 * s))
 
 
@@ -51,6 +52,19 @@ def test_the_course_of_the_curvature_is_unknown_of_a_traced_rod():
     s = np.linspace(0.0, 1.0, 7)
     np.testing.assert_allclose(drawn.known_rod.rest_curvature(s), 0.2 * (1.0 - s) * z[0] + 0.1 * s * z[1], atol=1e-12)
     assert GROUPS["rest_shape"][0] not in Rig().draw(rng=1).known
+
+
+def test_the_error_of_a_measured_taper_is_unknown():
+    measured = Rod(taper=0.4, taper_deviation=0.02)
+    record = scan(Parabola(0.5, q=0.5), Rig(measured), drive_step=0.1).record
+    assert unknown_of({}, record) == (*ALL, "taper_error")
+    assert unknown_of({"taper_error": 0.0}, record) == ALL
+    assert unknown_of({"taper": "default"}, record) == (*ALL, "taper")
+    assert Stated.of(measured, CELL).default("taper").std() == pytest.approx(0.02, rel=1e-6)
+    drawn = Rig(measured).draw(rng=1)
+    assert drawn.known_rod.taper == pytest.approx(0.4 + 0.02 * drawn.known["taper_error"])
+    with refused(ParameterError, "taper_error", "not measured"):
+        unknown_of({"taper_error": 1.0})
 
 
 @pytest.mark.parametrize("value", [0.3, stats.norm(0.0, 1.0)])

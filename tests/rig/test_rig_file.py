@@ -23,6 +23,7 @@ RODS = {
     "SI, all": Rod(0.2, 3.1e-4, diameter=1e-3, elastic_strain=0.02, rest_curvature=1.2, taper=0.4, stem=0.003),
     "curved along": Rod(0.2, 3.1e-4, rest_curvature=lambda s: 3.0 * s - 0.1, rigidity_profile=lambda s: 1.0 - 0.3 * s),
     "traced": Rod.from_shape(0.1 * S, 0.02 * S**2, 1e-5),
+    "measured": Rod(0.2, 3.1e-4, diameter=1e-3, taper=0.4, taper_deviation=0.02),
 }
 CELLS = {
     "noise": LoadCell(force_noise=0.05, moment_noise=0.02),
@@ -195,6 +196,15 @@ def test_a_shape_is_found_beside_the_file(tmp_path, monkeypatch):
     assert found == RODS["traced"]
     with pytest.raises((ParameterError, FileNotFoundError), match=r"other\.csv"):
         read(folder / "rig.toml", '[rod]\nshape = "other.csv"\nflexural_rigidity = 1e-5\n')
+
+
+def test_a_shape_may_have_diameters(tmp_path):
+    lines = "".join(f"{x} 0.0 {2.0 - 0.01 * x}\n" for x in np.linspace(0.0, 100.0, 20))
+    (tmp_path / "shape.csv").write_text(f"x[mm] y[mm] diameter[mm]\n{lines}".replace(" ", ";"), encoding="utf-8")
+    by_modulus = read(tmp_path / "rig.toml", '[rod]\nshape = "shape.csv"\nyoungs_modulus = "200 GPa"\n').rod
+    assert by_modulus.diameter == pytest.approx(2e-3)
+    assert by_modulus.taper == pytest.approx(0.5)
+    assert by_modulus.flexural_rigidity == pytest.approx(2e11 * np.pi * 2e-3**4 / 64.0)
 
 
 @pytest.mark.parametrize("unit", ["mm", "cm"])

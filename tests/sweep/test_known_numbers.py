@@ -43,6 +43,7 @@ KNOWN = {
     "rest_shape_2": -0.4,
     "rest_shape_3": 1.2,
     "taper": 0.25,
+    "taper_error": 0.9,
     "stem": 0.055,
     "length": 1.02,
     "noise_scale": 1.7,
@@ -52,7 +53,7 @@ KNOWN = {
 """In units of the rod."""
 PIN = Circle(0.3, 0.5, 0.02)
 MODES = (lambda s: 0.3 * (1.0 - s) ** 2, lambda s: 0.2 * s, lambda s: 0.1 * np.cos(6.0 * s))
-ROD = Rod(rest_curvature=0.2, taper=0.2, stem=0.04, rest_shape_modes=MODES)
+ROD = Rod(rest_curvature=0.2, taper=0.2, stem=0.04, rest_shape_modes=MODES, taper_deviation=0.04)
 CELL = LoadCell(gain=((1.02, 0, 0.03), (0, 0.97, 0.01), (0, 0, 1)), lever=(0.01, 0.02), moment_curve=(0.02, 0.001))
 BASES = ((0.0, 0.0), (0.1, 0.03))
 
@@ -60,7 +61,8 @@ BASES = ((0.0, 0.0), (0.1, 0.03))
 def scaled(length: float, rigidity: float):
     """Rod, load cell, contour, pivots and known numbers in SI."""
     modes = [lambda s, of=of: of(s / length) / length for of in MODES]
-    whole = Rod(length, rigidity, rest_curvature=0.2 / length, taper=0.2, stem=0.04 * length, rest_shape_modes=modes)
+    options = {"stem": 0.04 * length, "rest_shape_modes": modes, "taper_deviation": 0.04}
+    whole = Rod(length, rigidity, rest_curvature=0.2 / length, taper=0.2, **options)
     moment, force = whole.moment_unit, whole.force_unit
     units = {
         name: (force if name.startswith("force") else moment) ** of.of_moment * length**of.of_length
@@ -100,7 +102,8 @@ def test_numbers_of_all_parameters_are_tried():
 @pytest.mark.parametrize("name", [*KNOWN, "all"])
 def test_a_scan_that_is_read_is_what_inference_expects(name, length):
     rod, cell, contour, bases, known = scaled(length or 1.0, 1.0 if length is None else 2e-4)
-    said = {**NOTHING, **(known if name == "all" else {name: known[name]})}
+    every = {other: value for other, value in known.items() if other != "taper_error"}  # which is in the taper
+    said = {**NOTHING, **(every if name == "all" else {name: known[name]})}
     rig = Rig(rod if length else replace(ROD), cell, said)
     swept = scan(contour, rig, drive=[Rotation(base, drive_step=0.1) for base in bases])
     record = rig.measure(swept.record, rng=1)
@@ -162,7 +165,7 @@ def test_a_drawn_rig_has_numbers_alone_and_is_drawn_from_the_distributions():
 def test_a_plan_has_known_numbers():
     rod, cell, contour, bases, known = scaled(0.1, 2e-4)
     noises = {"force_noise": 0.05 * rod.force_unit, "moment_noise": 0.02 * rod.moment_unit}
-    said = {**NOTHING, **{n: v for n, v in known.items() if n not in ("noise_scale",)}}
+    said = {**NOTHING, **{n: v for n, v in known.items() if n not in ("noise_scale", "taper_error")}}
     plan = Plan(
         contour, Rig(rod, replace(cell, **noises), said), drive=[Rotation(base, drive_step=0.1) for base in bases]
     )

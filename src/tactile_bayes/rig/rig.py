@@ -312,6 +312,5 @@ def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
     names = GROUPS["rest_shape"][: len(rod.rest_shape_modes)]
     rod, length = rod.shaped([rig.get(name, 0.0) for name in names]), rig.get("length", rod.length)
     curvature = rig.get("rest_curvature", rod.mean_rest_curvature * rod.length / length)
-    return rod.reshaped(
-        curvature, rig.get("taper", rod.tapered_by(rig.get("taper_error", 0.0))), rig.get("stem"), length
-    )
+    taper = rig.get("taper", float(rod.tapered_by(rig.get("taper_error", 0.0))))
+    return rod.reshaped(curvature, taper, rig.get("stem"), length)

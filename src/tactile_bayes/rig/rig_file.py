@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -65,6 +66,7 @@ TABLES = {
     "unknown": (*GROUPS, *PARAMETERS, "base", "base_x", "base_y"),
     "calibration": ("parameters", "correlation", "error", "source", "stated"),
 }
+_ONE_OF_BOTH = "[rod] states youngs_modulus: give the diameter beside it, and leave out flexural_rigidity"
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 _LARGEST = 1 << 20
@@ -185,31 +187,43 @@ def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
     numbers |= {
         name: said[name] for name in ("rigidity_profile", "rest_shape_modes", "taper_deviation") if name in said
     }
+    if "shape" in said:
+        return _traced(said, numbers, folder)
     modulus = numbers.pop("youngs_modulus", None)
     if modulus is not None:
         if "flexural_rigidity" in numbers or "diameter" not in numbers:
-            raise ParameterError(
-                "[rod] states youngs_modulus: give the diameter beside it, and leave out flexural_rigidity"
-            )
-        numbers["flexural_rigidity"] = modulus * math.pi * numbers["diameter"] ** 4 / 64.0
-    if "shape" in said:
-        check_kind("rod.shape", said["shape"], str, "give the path of a CSV file with columns x, y, diameter")
-        if "flexural_rigidity" not in numbers:
-            raise ParameterError("[rod] states a shape, and no flexural_rigidity (or youngs_modulus and diameter)")
-        path = folder / said["shape"]
-        pieces = read_points(path, beside="diameter").in_unit("m", str(path))
-        if len(pieces) > 1:
-            raise ParameterError(f"{path} has {len(pieces)} curves: give the rod's shape as one")
-        x, y, *diameters = pieces[0].T
-        if diameters:
-            numbers["diameter"] = diameters[0]
-        return Rod.from_shape(x, y, numbers.pop("flexural_rigidity"), **numbers)
+            raise ParameterError(_ONE_OF_BOTH)
+        numbers["flexural_rigidity"] = _rigidity(modulus, numbers["diameter"])
     if ("length" in numbers) != ("flexural_rigidity" in numbers):
         raise ParameterError(
             "[rod] needs length and flexural_rigidity (or youngs_modulus and diameter) together; without them the rig "
             "is dimensionless, in units of the rod"
         )
     return Rod(**numbers)
+
+
+def _traced(said: Mapping[str, Any], numbers: dict[str, Any], folder: Path) -> Rod:
+    """Return the rod of a shape, with its numbers beside."""
+    check_kind("rod.shape", said["shape"], str, "give the path of a CSV file with columns x, y, diameter")
+    modulus, rigidity = (numbers.pop(name, None) for name in ("youngs_modulus", "flexural_rigidity"))
+    if (modulus is None) == (rigidity is None):
+        both = "" if modulus is None else f"; {_ONE_OF_BOTH}"
+        raise ParameterError(f"[rod] states a shape: give flexural_rigidity, or youngs_modulus and diameter, too{both}")
+    path = folder / said["shape"]
+    pieces = read_points(path, beside="diameter").in_unit("m", str(path))
+    if len(pieces) > 1:
+        raise ParameterError(f"{path} has {len(pieces)} curves: give the rod's shape as one")
+    x, y, *diameters = pieces[0].T
+    if diameters:
+        numbers["diameter"] = diameters[0]
+    elif modulus is not None and "diameter" not in numbers:
+        raise ParameterError(_ONE_OF_BOTH)
+    rod = Rod.from_shape(x, y, 1.0 if rigidity is None else rigidity, **numbers)
+    return rod if modulus is None else replace(rod, flexural_rigidity=_rigidity(modulus, rod.diameter))
+
+
+def _rigidity(modulus: float, diameter: float) -> float:
+    return modulus * math.pi * diameter**4 / 64.0
 
 
 def keys_of(table: str, said: Iterable[str]) -> list[str]:

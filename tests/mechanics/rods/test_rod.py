@@ -9,6 +9,7 @@ from scipy.integrate import cumulative_simpson
 import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import ContourError, ParameterError
+from tactile_bayes.mechanics.rods.traced import measured_cone
 from tactile_bayes.record import record_hash, rod_of, to_dimensionless, to_si, write_record
 from tactile_bayes.record.attributes import same_rod
 from tactile_bayes.record.units import with_rod
@@ -156,6 +157,36 @@ def test_a_traced_rod_is_the_one_that_was_traced(turned):
     own = tb.Rod.from_shape(x, y)
     assert own.is_dimensionless
     assert own.mean_rest_curvature == pytest.approx(1.0, abs=1e-3)
+
+
+def test_tapers_measured_at_points_have_the_deviation_that_they_state():
+    """Of 300 cones the tapers are off by their standard deviations; a limit of 0.15 is exceeded once in 3e5 times."""
+    rng, s = np.random.default_rng(1), np.linspace(0.0, 1.0, 20)
+    off = []
+    for taper in rng.uniform(0.2, 0.9, 300):
+        diameters = 0.01 * (1.0 - taper * s) + rng.normal(0.0, 2e-4, s.size)
+        cone = measured_cone(s, diameters)
+        off.append((cone.taper - taper) / cone.deviation)
+        assert cone.diameter == pytest.approx(0.01, abs=1e-3)
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.2)
+    assert np.mean(np.abs(off) < 1.645) == pytest.approx(0.9, abs=0.08)
+
+
+def test_a_traced_rod_may_have_its_diameters_beside_its_points():
+    s = np.linspace(0.0, 0.05, 40)
+    rod = tb.Rod.from_shape(s, 0.0 * s, 1e-8, diameter=1e-3 * (1.0 - 8.0 * s))
+    assert (rod.diameter, rod.taper) == pytest.approx((1e-3, 0.4))
+    assert rod.taper_deviation < 1e-9
+    uniform = tb.Rod.from_shape(s, 0.0 * s, diameter=np.full(s.size, 1e-3) + 1e-5 * np.cos(99.0 * np.arange(s.size)))
+    assert 0.0 <= uniform.taper < 0.02
+    assert uniform.diameter == pytest.approx(0.02, rel=0.01)
+    with refused(ParameterError, "linearly", "rigidity_profile"):
+        tb.Rod.from_shape(s, 0.0 * s, diameter=1e-3 * (1.0 - 200.0 * s**2))
+    with refused(ParameterError, "taper", "leave it out"):
+        tb.Rod.from_shape(s, 0.0 * s, diameter=np.full(s.size, 1e-3), taper=0.1)
+    for wrong in (s[1:], -1e-3 * np.ones(s.size)):
+        with refused(ParameterError, "diameter", "each point"):
+            tb.Rod.from_shape(s, 0.0 * s, diameter=wrong)
 
 
 def test_a_tip_beyond_the_normal_slips_off_or_is_held():
