@@ -102,9 +102,10 @@ def table(noise: str, calibrations: dict[str, xr.Dataset]) -> str:
         return f"| {name} | {' | '.join(cells)} |"
 
     def held(name: str) -> str:
-        return row(CLAIMS[name], (_share(one.sel(claim=name)) for one in found))
+        return row(CLAIMS[name], (_share(one.sel(claim=name)) if name in one.claim else "–" for one in found))
 
-    smallest = [f"{float(np.nanmin(one.rank_p_value)):.2g} of {one.sizes['quantity']}" for one in found]
+    p_values = [one.rank_p_value.dropna("quantity") for one in found]
+    smallest = [f"{float(each.min()):.2g} of {each.size}" if each.size else "–" for each in p_values]
     return "\n".join(
         [
             row(

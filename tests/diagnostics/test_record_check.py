@@ -11,6 +11,7 @@ from tactile_bayes.contours import paper_profile
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import Rig
@@ -24,6 +25,9 @@ CELLS = {
     "unknown zero": LoadCell(force_noise=0.05, moment_noise=0.02, bias_uncertainty=(0.1, 0.1, 0.1)),
     "in steps": LoadCell(force_noise=0.05, moment_noise=0.02, force_resolution=0.1, moment_resolution=0.04),
 }
+
+
+CONVERGED = SamplerSettings(ensembles=2, walkers=24, max_steps=900, min_ess=200, max_r_hat=1.05)
 
 
 def readings(cell, seed):
@@ -139,7 +143,10 @@ def test_records_of_the_right_family_pass(name):
     p_values = []
     for seed in range(12):
         measured = CELLS[name].measure(scan(contour, drive_step=np.radians(2.0)).record, rng=seed)
-        result = infer_contour(measured, rig=Rig(load_cell=CELLS[name], unknown="nothing"), rng=seed, settings=SHORT)
+        result = infer_contour(
+            measured, rig=Rig(load_cell=CELLS[name], unknown="nothing"), rng=seed, settings=CONVERGED
+        )
+        assert result.attrs["converged"]
         p_values.append(float(check_record(result).overall_p_value))
     assert min(p_values) > 5e-3
 

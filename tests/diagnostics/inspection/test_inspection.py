@@ -182,7 +182,7 @@ def test_a_wrong_frame_an_exchange_and_a_sign_that_is_suspected_are_named(record
     as_fixed = tb.record.in_frame(record, "turning").assign_attrs(load_cell_frame="fixed")
     assert 'the load cell turned with the drive (frame = "turning" under [load_cell]' in correction(as_fixed)
     upside_down = changed(record, force_y=-record.force_y)
-    assert correction(upside_down) == "force_y had the other sign."
+    assert correction(upside_down).startswith("force_y had the other sign")
     assert words(upside_down)[0].startswith("force_y is negative in contact")
 
 

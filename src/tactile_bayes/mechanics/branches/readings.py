@@ -323,7 +323,7 @@ def _polished(part: Followed, wanted: float, way: float, start: Equilibrium) -> 
         way, last = new, abs(missing)
         state = settle_on(part.scene, part.leg, way, guess(part.work, way), SETTLED)
     at, travel, moment, force_x, force_y, tangent, rates = state
-    step = step if math.isfinite(step) else 0.0
+    step = min(step, room) if math.isfinite(step) else 0.0
     if course.steadiness == 0.0:  # at a fold the rate vanishes with the room
         step = min(max(step, -0.5 * room), 0.5 * room)
     at = Equilibrium(at.p + step * tangent.p, at.q + step * tangent.q, at.force + step * tangent.force)
