@@ -12,17 +12,18 @@ from tactile_bayes.sweep import Translation, scan
 _CARRIED = Translation(base=(0.9, 0.0), heading=np.pi, drive_angle=1.5, travel=1.8)
 _KINDS = (
     {"rig": Rig(rod=Rod(taper=0.5)), "direction": "forward"},
+    {"drive": [_CARRIED]},
     {"rig": Rig(rod=Rod(taper=0.5)), "drive": [_CARRIED]},
     {"direction": "forward"},
-    {"drive": [_CARRIED]},
 )
 
 
-def compile_share(number: int = 0, of: int = 1) -> None:
+def compile_share(number: int, of: int) -> None:
     """Compile one share of the forward models, which are cached on disk."""
     for arguments in _KINDS[number::of]:
         scan(Circle(0.1, 0.6, 0.1), **arguments)
 
 
-if __name__ == "__main__":
-    compile_share()
+if __name__ == "__main__":  # the first half: beside it a demonstration compiles the last one
+    compile_share(0, 4)
+    compile_share(1, 4)
