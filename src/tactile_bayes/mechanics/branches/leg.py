@@ -17,7 +17,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, Rates, settle, unloaded
 from tactile_bayes.mechanics.branches.outline import place
-from tactile_bayes.mechanics.branches.phase import slides
+from tactile_bayes.mechanics.branches.phase import slides, slips_clearly
 from tactile_bayes.mechanics.branches.scene import (
     Equilibrium,
     Scene,
@@ -58,6 +58,9 @@ NUDGE = 1e-9
 HARDLY = 1e-5
 """Force from which a contact that sticks is extrapolated to none, over that of a leg: rounding leaves 1e-11 rad of its
 direction."""
+
+_COARSE = 1e-5
+"""Last step to a node where noise hides what is finer, and the rod clearly slides."""
 
 REST, PLACE, ANGLE, RATE = 3, 4, 5, 6
 """Rows of series after the three loads: the coordinate q of the rod, the contour's parameter, the travel (in a rotation
@@ -257,7 +260,7 @@ def sample_leg(
     released there is no force.
     """
     at_nodes, half = work.at_nodes, work.nodes.size
-    settled = max(SETTLED, 0.1 * work.accuracy.last_step)
+    usual = max(SETTLED, 0.1 * work.accuracy.last_step)
     found = _by_way(leg, begin)
     old, older = found, found
     for k in range(half):
@@ -272,7 +275,8 @@ def sample_leg(
             if is_released and k == half - 1 and not slides(scene.phase):
                 found = _by_way(leg, unloaded(scene, start, HARDLY * leg.begin.force))
             else:
-                found = settle_on(scene, leg, work.nodes[k], start, settled)
+                is_clear = not work.accuracy.exact and slips_clearly(scene, found.at, found.tangent)
+                found = settle_on(scene, leg, work.nodes[k], start, _COARSE if is_clear else usual)
             if not math.isfinite(found.travel):
                 return False, begin, before
         at_nodes[0, k], at_nodes[0, half + k] = found.holding_moment, found.rates.moment

@@ -46,6 +46,7 @@ __all__ = [
     "slides",
     "sliding_on",
     "slip",
+    "slips_clearly",
     "stuck",
     "tip_touches",
     "touching",
@@ -60,6 +61,9 @@ _LONGEST = 1.5
 
 _LEAST_PSI1, _MOST_PSI1 = -0.5 * math.pi, 1.5 * math.pi
 """ψ1 between which a contact is sought: a quarter turn more than those of a rod on the outside of the contour."""
+
+_CLEARLY = 0.03
+"""Slip over the way on a leg, a hundred times the errors of coarse nodes."""
 
 _NODES, _WEIGHTS = (tuple(column.tolist()) for column in np.polynomial.legendre.leggauss(16))
 """Gauss–Legendre quadrature of the way that a rod rolls on a leg, to rounding."""
@@ -198,6 +202,12 @@ def slip(scene: Scene, at: Equilibrium, along: Equilibrium) -> float:
     tip = tip_touches(scene.phase)
     speed = beside(scene.outline, at.p, 1.0 if tip else at.q).speed
     return speed * along.p - (0.0 if tip else along.q)
+
+
+@compiled
+def slips_clearly(scene: Scene, at: Equilibrium, along: Equilibrium) -> bool:
+    """Return whether a rod slides, and hardly could stick nearby."""
+    return slides(scene.phase) and abs(slip(scene, at, along)) > _CLEARLY
 
 
 @compiled
