@@ -24,6 +24,6 @@ def compile_share(number: int, of: int) -> None:
         scan(Circle(0.1, 0.6, 0.1), **arguments)
 
 
-if __name__ == "__main__":  # the first half: beside it a demonstration compiles the last one
-    compile_share(0, 4)
-    compile_share(1, 4)
+if __name__ == "__main__":  # beside it a demonstration compiles the last one
+    for kind in range(len(_KINDS) - 1):
+        compile_share(kind, len(_KINDS))
