@@ -51,8 +51,8 @@ class Rig:
         record: a number is known; a frozen distribution of scipy.stats is unknown, and "default" stands for the default
         distribution. What is not named is unknown if it is unknown of a real rig: `rigidity_scale`,
         `drive_angle_offset`, `bias`, `lever`, `backlash`, `friction`, of a traced rod `rest_shape`, and of one whose
-        diameter was measured along it `taper_error`, each where the
-        record shows it; everything else is as stated. "nothing": all is as stated, without friction.
+        diameter was measured along it `taper_error`, each where the record shows it; everything else is as stated.
+        "nothing": all is as stated, without friction.
     calibration : RigPrior, optional
         Joint distribution of parameters that a known object has shown, from `calibrate_rig`.
     file : FileFormat or mapping
