@@ -220,7 +220,8 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
         return True, here
     if was_sliding:
         along = leg_from(scene, begin, onward, 1.0).along
-        if not changes and math.copysign(1.0, delta) * slip(scene, begin.at, along) <= NOT_SLIPPING:
+        ahead = _ahead(begin.at, along.p)  # at a knot, of the side that the contact goes to
+        if not changes and math.copysign(1.0, delta) * slip(scene, ahead, along) <= NOT_SLIPPING:
             return True, here
         scene, at = stuck(scene, begin.at)
     else:
@@ -306,5 +307,11 @@ def _length_on_line(line: Line | None, scene: Scene, begin: Balance, onward: Equ
 def _past(scene: Scene, at_knot: Balance, sense: float) -> Balance:
     """Equilibrium at a knot, with the tangent and the rates behind it."""
     at, travel, moment, force_x, force_y, _, _ = at_knot
-    behind = balance(scene, Equilibrium(at.p + math.copysign(NUDGE, sense), at.q, at.force))[0]
+    behind = balance(scene, _ahead(at, sense))[0]
     return Balance(at, travel, moment, force_x, force_y, behind.tangent, behind.rates)
+
+
+@inlined
+def _ahead(at: Equilibrium, sense: float) -> Equilibrium:
+    """The same, with the contact beside where it is, on the side that it goes to."""
+    return Equilibrium(at.p + math.copysign(NUDGE, sense), at.q, at.force)

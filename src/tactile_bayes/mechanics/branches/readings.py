@@ -63,9 +63,11 @@ _SETTLED, _ROUNDING, _NOISE = 1e-8, 1e-15, 1e-13
 rounding errors only: its square; the rounding of a travel; and that of one by Taylor series, below which a step that
 does not halve what is missing is noise (at 1e-8, 2 of 40 paths had a state just before a fold off by 5e-10 rad)."""
 
+_STEADY = 1e-6
+"""Steadiness of a leg below which it ends at a fold, up to rounding: also where this is at a knot."""
+
 _MOST_HALVINGS = 100
 """Largest number of steps to an exact state: more than halvings of a leg to rounding."""
-
 
 _PIECES = 16
 """Pieces of a leg between which curvatures are compared: the largest is found to some 1e-5 of itself."""
@@ -323,8 +325,8 @@ def _polished(part: Followed, wanted: float, way: float, start: Equilibrium) -> 
         way, last = new, abs(missing)
         state = settle_on(part.scene, part.leg, way, guess(part.work, way), SETTLED)
     at, travel, moment, force_x, force_y, tangent, rates = state
-    step = min(step, room) if math.isfinite(step) else 0.0
-    if course.steadiness == 0.0:  # at a fold the rate vanishes with the room
+    step = step if math.isfinite(step) else 0.0
+    if course.steadiness < _STEADY:  # at a fold the rate vanishes with the room
         step = min(max(step, -0.5 * room), 0.5 * room)
     at = Equilibrium(at.p + step * tangent.p, at.q + step * tangent.q, at.force + step * tangent.force)
     moment, force_x, force_y = moment + step * rates.moment, force_x + step * rates.x, force_y + step * rates.y
