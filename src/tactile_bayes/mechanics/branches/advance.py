@@ -57,7 +57,7 @@ _SCATTER = 1e-12
 _IN_A_DIP = 1e-5
 """Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
 
-_ROUNDING, _ROUNDING_STUCK = 1e-14, 1e-11
+_ROUNDING, _ROUNDING_STUCK = 1e-14, 3e-11
 """Tail of the series of a drive angle that its rounding leaves [rad], and where a contact sticks, which hardly
 yields."""
 
@@ -176,7 +176,7 @@ def _excess(in_dip: bool, is_sliding: bool, work: LegSeries) -> float:
     if in_dip:
         return angle / (_IN_A_DIP * DIP)
     rounding = _ROUNDING if is_sliding else _ROUNDING_STUCK
-    found = max(angle / max(accuracy.resolved * change, rounding), angle / accuracy.sharp)
+    found = max(max(angle - rounding, 0.0) / max(accuracy.resolved * change, rounding), angle / accuracy.sharp)
     for c in range(3):
         of_load = change_of(series[c])
         tolerated = max(accuracy.tolerance[c], _RESOLVED_LOADS * (abs(series[c, 0]) + of_load))

@@ -69,6 +69,10 @@ _MOST_TURN, _MOST_LOADING = 0.4, 1.0
 SETTLED = 1e-8
 """Step, over the largest, after which a first-order correction leaves rounding errors only: its square."""
 
+_ROUNDING, _UNRESOLVED = 2e-15, 1e-4
+"""Error of the equations that is rounding, and the largest step that it may cause, over the largest, where a contact
+sticks: the rod hardly yields to a turn of a small force."""
+
 _NONE = Pose(0.0, 0.0, 0.0)
 
 
@@ -295,7 +299,9 @@ def settle(
             break
         change, before = Equilibrium(dp, dq, df), found.at.force
         turn = -dot(equations.turn_by, change)
-        if largest <= settled and abs(dp) * (1.0 if scene.phase == STUCK else equations.turn_by.p) <= settled:
+        rests = largest <= settled and abs(dp) * (1.0 if scene.phase == STUCK else equations.turn_by.p) <= settled
+        hardly_yields = largest <= _UNRESOLVED and abs(one) + abs(two) <= _ROUNDING and not slides(scene.phase)
+        if rests or hardly_yields:
             travel = found.travel - dot(equations.travel_by, change)
             moment = found.holding_moment - dot(equations.moment_by, change)
             share = -df / before if before > 0.0 else 0.0

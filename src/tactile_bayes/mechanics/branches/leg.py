@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, Rates, settle, unloaded
+from tactile_bayes.mechanics.branches.equilibrium import SETTLED, Balance, Rates, balance, settle, unloaded
 from tactile_bayes.mechanics.branches.outline import place
 from tactile_bayes.mechanics.branches.phase import slides, slips_clearly
 from tactile_bayes.mechanics.branches.scene import (
@@ -51,6 +51,13 @@ __all__ = [
 _BY_ROD, _BY_FORCE, _BY_FORCE_ON_LINE = 0.2, 0.03, 0.3
 """Weights of q and f in the length of a leg, the last if the base is carried. Away from first contact all is smooth in
 p, where it is monotone: five times these weights, or a fifth, change the Newton steps of likelihoods by 12 %."""
+
+_BESIDE, _MOST_BESIDE, _LITTLE = 1e-3, 7, 0.1
+"""First distance at which a tangent is compared, in p, how often it is divided by ten, and turn of the force there
+that is small enough [rad]."""
+
+_HARDLY_TURNS = 0.05
+"""Change of p over that of f below which a contact that sticks is followed by f, which may pass a maximum."""
 
 NUDGE = 1e-9
 """Distance beyond a knot of the contour, in its parameter, at which it is smooth."""
@@ -159,7 +166,7 @@ def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -
     """Leg from an equilibrium in the sense of a direction.
 
     Its length is measured in the way and turn of the contact on the contour, in q, and in f over 1 + f; where the
-    contact sticks, in that which changes most.
+    contact sticks, in about the turn of the force.
     """
     tangent, loading = begin.tangent, 1.0 + begin.at.force
     if slides(scene.phase):
@@ -168,7 +175,7 @@ def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -
         by_force = _BY_FORCE if scene.line is None else _BY_FORCE_ON_LINE
         across = Equilibrium(by_p * tangent.p, _BY_ROD * tangent.q, by_force * tangent.force / (loading * loading))
     else:
-        across = _fastest(tangent, loading)
+        across = _fastest(scene, begin)
     size = length / math.sqrt(dot(across, tangent))
     if dot(across if slides(scene.phase) else tangent, onward) < 0.0:
         size = -size
@@ -178,15 +185,38 @@ def leg_from(scene: Scene, begin: Balance, onward: Equilibrium, length: float) -
 
 
 @compiled
-def _fastest(tangent: Equilibrium, loading: float) -> Equilibrium:
-    """Direction across which a contact that sticks is followed. A rod that hardly yields along itself turns the force
-    through the cone at once, and at the edge, where the slip has vanished, that begins with the square of p."""
-    force = tangent.force / loading
+def _fastest(scene: Scene, begin: Balance) -> Equilibrium:
+    """Direction across which a contact that sticks is followed: of that coordinate which changes most.
+
+    A rod that hardly yields along itself turns the force through the cone at once, and at the edge, where the slip has
+    vanished, that begins with the square of p.
+    """
+    tangent, force = begin.tangent, begin.tangent.force / (1.0 + begin.at.force)
     if abs(tangent.q) > max(abs(tangent.p), abs(force)):
         return Equilibrium(0.0, tangent.q, 0.0)
-    if abs(tangent.p) > abs(force):
-        return Equilibrium(tangent.p, 0.0, 0.0)
-    return Equilibrium(0.0, 0.0, force / loading)
+    by_p = abs(tangent.p) > _HARDLY_TURNS * abs(force)
+    change = tangent.p if by_p else force
+    weight = max(0.5 * _bend(scene, begin, change, by_p), 1.0)
+    if by_p:
+        return Equilibrium(weight * change, 0.0, 0.0)
+    return Equilibrium(0.0, 0.0, weight * change / (1.0 + begin.at.force))
+
+
+@compiled
+def _bend(scene: Scene, begin: Balance, change: float, by_p: bool) -> float:
+    """Second derivative of the force's direction by p, or by f over 1 + f, at the beginning of a leg, from the tangent
+    beside it."""
+    at, tangent, step, bend = begin.at, begin.tangent, _BESIDE, 0.0
+    for _ in range(_MOST_BESIDE):
+        share = step / change
+        there = Equilibrium(at.p + share * tangent.p, at.q + share * tangent.q, at.force + share * tangent.force)
+        beside = balance(scene, there)[0].tangent
+        slope = beside.q / (beside.p if by_p else beside.force / (1.0 + at.force))
+        bend = abs(slope - tangent.q / change) / step
+        if not bend * step * step > _LITTLE:
+            break
+        step *= 0.1
+    return bend
 
 
 @compiled

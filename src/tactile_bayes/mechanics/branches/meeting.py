@@ -83,8 +83,9 @@ _NEVER, _FOLD, _CORNER, _THRUST, _RELEASE, _JUMP = (int(kind) for kind in SnapOf
 _RUNS_OUT = int(Reachability.RUNS_OUT)
 
 
-_HIDDEN = 1e-5
-"""Slip per travel in the wrong sense of a contact that has stuck for less than that."""
+_HIDDEN, _UNCLEAR = 1e-4, 1e-6
+"""Slip per travel in the wrong sense of a contact that has stuck for less than that; and per length of a leg that
+begins where a contact has stuck for hardly more."""
 
 _ROOM_PAST_LINE = 1.1
 """Largest travel of a leg on a line of the drive, over the travel up to its end: a path of 40 lines takes half the
@@ -178,6 +179,9 @@ def go_on(here: Here, setting: Setting, step: Step, met: Meeting, event: Any, wo
     if event.snap_off > _NEVER:
         return there
     is_held, there = in_mode(there, met.kind == _MODE)
+    if not is_held and not slides(here.scene.phase):
+        there = slid_back(here)
+        is_held = math.isfinite(there.begin.at.p)
     if not is_held:
         event.snap_off = _JUMP
         return _stopped(here)
@@ -229,9 +233,11 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
     begin = balance(scene, at)[0]
     onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
     along, sense = leg_from(scene, begin, onward, 1.0).along, math.copysign(1.0, scene.rig.friction_angle)
-    off = along.q if was_sliding else slip(scene, begin.at, along)
+    there = Here(scene, line, begin, before, onward, longest)
+    if not was_sliding:
+        return sense * slip(scene, begin.at, along) <= _UNCLEAR, there
     # Where the slip has vanished, the force moves from the edge of the cone to second order.
-    return (changes and was_sliding) or sense * off <= NOT_SLIPPING, Here(scene, line, begin, before, onward, longest)
+    return changes or sense * along.q <= NOT_SLIPPING, there
 
 
 @compiled
