@@ -112,7 +112,7 @@ def drawn(rng) -> tuple[GivenRod, Contour, str, float, float]:
 
 
 def swept(seed: int) -> tuple[Shooting, SweepEvents]:
-    """A drawn sweep, the first with a single contact all along."""
+    """A drawn sweep, the first with a single contact all along, which slides in one sense."""
     rng = np.random.default_rng(seed)
     while True:
         rod, contour, direction, friction, diameter = drawn(rng)
@@ -125,6 +125,8 @@ def swept(seed: int) -> tuple[Shooting, SweepEvents]:
                     contour, direction=direction, rig=Rig(rod=thick, unknown={"friction": friction}), drive_step=0.1
                 ).events
         except (ContourError, ReachError):
+            continue
+        if {change.kind for change in events[direction].transitions} & {"stick", "slip"}:
             continue
         side = 1.0 if direction == "forward" else -1.0
         return Shooting(contour, rod.in_sweep(side), thick, side, friction), events[direction]

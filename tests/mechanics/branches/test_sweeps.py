@@ -27,6 +27,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import in_frame
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
+from tactile_bayes.sweep.drive import Translation
 
 SWEEPS = "tactile_bayes.mechanics.branches.sweeps"
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -91,6 +92,26 @@ def test_loads_and_usable_contours_are_the_exact_ones(name, rod, friction):
     # Except for a sample at an event that falls on its other side.
     assert np.quantile(np.sqrt(np.square(off).sum(axis=(1, 2))), 0.95) < 0.015
     assert np.mean(off > 0.01) < 2e-3
+
+
+@pytest.mark.parametrize(
+    "friction", [0.3, *(pytest.param(mu, marks=pytest.mark.slow) for mu in (0.0, 1e-7, 1e-3, 0.05, 0.6))]
+)
+def test_neighbours_of_an_upright_rod_on_a_stage_are_all_reached(friction):
+    """Its tip slides outward at first, and sticks at forces so small that the rod hardly yields along itself."""
+    rng, count = np.random.default_rng(1), 300
+    contours = Parabola(*(np.array([3.3, 0.41, 0.18])[:, None] + rng.normal(size=(3, count)) * [[0.05], [3e-3], [5e-3]]))
+    rig = RigValues(drive_angle_offset=0.01 * rng.normal(size=count), friction=friction)
+    drive = [Translation((x, 0.0), heading, 0.5 * np.pi, 1.5) for x, heading in ((0.75, np.pi), (-0.75, 0.0))]
+    record = scan(Parabola(3.3, 0.41, 0.18), rig=Rig(unknown={"friction": friction}), drive=drive).record
+    likelihood, exactly = RecordLikelihood(record, CELL), RecordLikelihood(record, CELL, exact=True)
+    loads, usable, events = likelihood.predict_with_events(contours, rig)
+    exact, reached, expected = exactly.predict_with_events(contours, rig)
+    assert usable.all()
+    assert reached.all()
+    assert np.quantile(np.abs(events - expected), 0.99) < 1e-5
+    off = np.sqrt(np.square((loads - exact) / likelihood.noise).sum(axis=(1, 2)))
+    assert np.quantile(off, 0.95) < 0.015
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.15])

@@ -24,7 +24,6 @@ from tactile_bayes.mechanics.branches.equilibrium import (
     balance,
     nowhere,
     settle,
-    settle_at,
     settle_at_limit,
 )
 from tactile_bayes.mechanics.branches.leg import (
@@ -50,6 +49,8 @@ from tactile_bayes.mechanics.branches.phase import (
     turned_over,
 )
 from tactile_bayes.mechanics.branches.scene import (
+    BY_FORCE,
+    NO_FORCE,
     Anchor,
     Equilibrium,
     Scene,
@@ -86,6 +87,9 @@ _RUNS_OUT = int(Reachability.RUNS_OUT)
 _HIDDEN, _UNCLEAR = 1e-4, 1e-6
 """Slip per travel in the wrong sense of a contact that has stuck for less than that; and per length of a leg that
 begins where a contact has stuck for hardly more."""
+
+_FAINT = 4e-3
+"""Force [EI/L²] that rounding turns by 3e-6 rad where a rod that is as good as straight sticks."""
 
 _ROOM_PAST_LINE = 1.1
 """Largest travel of a leg on a line of the drive, over the travel up to its end: a path of 40 lines takes half the
@@ -178,6 +182,10 @@ def go_on(here: Here, setting: Setting, step: Step, met: Meeting, event: Any, wo
     there = _behind(here, setting, step, met)
     if event.snap_off > _NEVER:
         return there
+    if met.kind == _MODE and slides(here.scene.phase) and there.begin.at.force < _FAINT:
+        back = slid_back(there)
+        if math.isfinite(back.begin.at.p):
+            return back
     is_held, there = in_mode(there, met.kind == _MODE)
     if not is_held and not slides(here.scene.phase):
         there = slid_back(here)
@@ -243,14 +251,18 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
 @compiled
 def slid_back(here: Here) -> Here:
     """Where a contact slides back that would stick for so little travel that rounding hides it, for a rod that is as
-    good as straight does not yield to a pull along it; NaN if it does not slide back."""
+    good as straight does not yield to a pull along it; NaN if it does not slide back.
+
+    The force across the rod stays, to first order.
+    """
     scene, line, begin, _, _, longest = here
     contact, delta = contact_at(scene, begin.at), scene.rig.friction_angle
     tip = tip_touches(scene.phase)
     scene = with_friction(in_phase(scene, touching(tip)), -delta)
     psi1 = contact.psi1 + contact.friction_angle + delta
-    at = Equilibrium(contact.p, psi1 if tip else contact.arclength, begin.at.force)
-    begin = settle_at(scene, contact.p, at)
+    force = begin.at.force * math.cos(contact.psi1) / math.cos(psi1)
+    at = Equilibrium(contact.p, psi1 if tip else contact.arclength, force)
+    begin = settle(scene, at, NO_FORCE, BY_FORCE, force, SETTLED) if force > 0.0 else nowhere()
     onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
     if math.copysign(1.0, delta) * slip(scene, begin.at, onward) < -_HIDDEN * abs(begin.rates.travel):
         begin = nowhere()
