@@ -100,7 +100,8 @@ def test_loads_and_usable_contours_are_the_exact_ones(name, rod, friction):
 def test_neighbours_of_an_upright_rod_on_a_stage_are_all_reached(friction):
     """Its tip slides outward at first, and sticks at forces so small that the rod hardly yields along itself."""
     rng, count = np.random.default_rng(1), 300
-    contours = Parabola(*(np.array([3.3, 0.41, 0.18])[:, None] + rng.normal(size=(3, count)) * [[0.05], [3e-3], [5e-3]]))
+    middle, spread = np.array([3.3, 0.41, 0.18]), np.array([0.05, 3e-3, 5e-3])
+    contours = Parabola(*(middle + spread * rng.normal(size=(count, 3))).T)
     rig = RigValues(drive_angle_offset=0.01 * rng.normal(size=count), friction=friction)
     drive = [Translation((x, 0.0), heading, 0.5 * np.pi, 1.5) for x, heading in ((0.75, np.pi), (-0.75, 0.0))]
     record = scan(Parabola(3.3, 0.41, 0.18), rig=Rig(unknown={"friction": friction}), drive=drive).record
