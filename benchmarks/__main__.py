@@ -42,12 +42,8 @@ from tactile_bayes.runs.demonstration import CONTOUR as DEMONSTRATED
 from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
 from tactile_bayes.tasks import one_thread
 
-CONTOUR = tb.contours.paper_profile("II", q=0.6)
-"""Its forward sweep is in tip, then tangential, then tip contact again."""
-
-SLOPES = 0.54, 0.12
-"""From soon after first contact to just before snap-off."""
-
+CONTOUR = tb.contours.paper_profile("II", q=0.6)  # its forward sweep is in tip, then tangential, then tip contact again
+SLOPES = 0.54, 0.12  # from soon after first contact to just before snap-off
 TAPERED = tb.Rod(taper=0.5)
 ANGLES = np.radians(np.arange(180.0))
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -66,10 +62,8 @@ SPECIFICATION: dict[str, Any] = {
     "load_cell": {"force_noise": 0.05, "moment_noise": 0.02},
 }
 MANY = 100_000
-STRETCHES = 1_000
-"""Steps of emcee's ensembles, by its own moves."""
-TIGHT = 1e-12
-"""Tolerance at which accuracy is judged; what is timed has 1e-9."""
+STRETCHES = 1_000  # steps of emcee's ensembles, by its own moves
+TIGHT = 1e-12  # tolerance at which accuracy is judged; what is timed has 1e-9
 
 
 def main() -> None:
@@ -242,9 +236,7 @@ def sweeps(by_hand: float) -> list[Row]:
     return [Row(f"{what}: solve_ivp and root / ours", n * by_hand, best_time(job) / of) for what, n, job, of in rows]
 
 
-_STEP_OF_TRAVEL = 0.015
-"""Step at which drives that carry the base have as many samples as rotations [L]."""
-
+_STEP_OF_TRAVEL = 0.015  # step at which drives that carry the base have as many samples as rotations [L]
 CARRIED = {
     "carried along a line": [
         tb.Translation((0.9, 0.0), np.pi, 1.0, 1.8),

@@ -32,19 +32,15 @@ SEED = 2026
 
 class Family(NamedTuple):
     title: str
-    replicates: int
-    """Number at the usual noise; half as many at others."""
+    replicates: int  # number at the usual noise; half as many at others
     drive: tuple[tb.Translation | tb.Motion, ...] | None = None
-    friction: float | None = None
-    """Coefficient of friction in truth, if it is not drawn."""
+    friction: float | None = None  # coefficient of friction in truth, if it is not drawn
 
 
 class Noise(NamedTuple):
     title: str
-    force: float
-    """Standard deviation [EI/L²]."""
-    moment: float
-    """Standard deviation [EI/L]."""
+    force: float  # standard deviation [EI/L²]
+    moment: float  # standard deviation [EI/L]
 
 
 FAMILIES = {
@@ -57,6 +53,7 @@ FAMILIES = {
 }
 FORTH = tb.Translation((0.75, 0.0), np.pi, 0.5 * np.pi, 1.5)
 BACK = tb.Translation((-0.75, 0.0), 0.0, 0.5 * np.pi, 1.5)
+# Parabolas, past which the drive goes in another way.
 STICKING = {
     "stage-0": Family("upright, one way, no friction", 200, (FORTH,), 0.0),
     "stage-0.3": Family("upright, one way, μ = 0.3", 200, (FORTH,), 0.3),
@@ -64,8 +61,6 @@ STICKING = {
     "stage-both-0.3": Family("upright, both ways, μ = 0.3", 200, (FORTH, BACK), 0.3),
     "turned": Family("rotations that turn back", 200, (tb.Motion(0.0, 0.0, np.radians([-30.0, 100.0, 60.0, 210.0])),)),
 }
-"""Parabolas, past which the drive goes in another way."""
-
 EVERY = {**FAMILIES, **STICKING}
 NOISES = {
     "usual": Noise("at the usual noise", 0.05, 0.02),

@@ -29,8 +29,7 @@ PLACES = {
     "in between": (0.05, 0.95),
     "last 5 % before snap-off": (0.95, 1.0),
 }
-SAMPLES = {"first 5 % of the sweep": 4, "in between": 12, "last 5 % before snap-off": 4}
-"""Contacts taken of each sweep."""
+SAMPLES = {"first 5 % of the sweep": 4, "in between": 12, "last 5 % before snap-off": 4}  # contacts taken of each sweep
 
 
 def main(sweeps: int = 1000) -> None:

@@ -34,12 +34,10 @@ class Outcome(NamedTuple):
     """Mean widths of bands over the span of the first base's sweeps, with the gap."""
 
     first: float
-    again: float
-    """From the same base once more."""
+    again: float  # from the same base once more
     naive: float
     chosen: float
-    foreseen: float
-    """Prediction by `design` for the chosen base."""
+    foreseen: float  # prediction by `design` for the chosen base
     base: tuple[float, float]
     naive_base: tuple[float, float]
     message: str

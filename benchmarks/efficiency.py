@@ -16,8 +16,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.planning.information import information
 from tactile_bayes.tasks import run_tasks
 
-FACTORS = (3.0, 1.0, 0.1, 0.01)
-"""Factors on a noise of 0.05 EI/L² and 0.02 EI/L."""
+FACTORS = (3.0, 1.0, 0.1, 0.01)  # factors on a noise of 0.05 EI/L² and 0.02 EI/L
 DRAWS = 2500.0
 SETTINGS = tb.SamplerSettings(ensembles=4, walkers=32, max_r_hat=1.01, min_ess=DRAWS, max_steps=4000)
 RIG = tb.Rig(load_cell=tb.LoadCell(force_noise=0.05, moment_noise=0.02))

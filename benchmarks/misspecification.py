@@ -30,13 +30,10 @@ from tactile_bayes.rig import NOTHING
 OUT = Path("results/misspecification")
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 TWO_BASES = [tb.Rotation((0.0, 0.0)), tb.Rotation((0.3, 0.0))]
+# Posteriors of a wrong model may have many modes; those that take longer are reported as unconverged.
 SETTINGS = tb.SamplerSettings(ensembles=2, walkers=34, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
-"""Posteriors of a wrong model may have many modes; those that take longer are reported as unconverged."""
-FEWER = 4
-"""Factor by which replicates of shape-free contours are fewer, as they cost more."""
-
-CHANCE, SCORE = 1e-3, 4.0
-"""Probability of the misfit, and size of the axial score, that raise an alarm."""
+FEWER = 4  # factor by which replicates of shape-free contours are fewer, as they cost more
+CHANCE, SCORE = 1e-3, 4.0  # probability of the misfit, and size of the axial score, that raise an alarm
 
 
 INFERRED = tb.Rig(load_cell=CELL)

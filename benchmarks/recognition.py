@@ -26,13 +26,9 @@ from tactile_bayes.rig import NOTHING
 from tactile_bayes.tasks import run_tasks
 
 FAMILIES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
-NONE = "edge"
-"""Two arcs that meet at an angle."""
-
+NONE = "edge"  # two arcs that meet at an angle
 KINDS = (*FAMILIES, NONE)
-NOISES = {"quiet": (0.02, 0.008), "strong": (0.15, 0.06)}
-"""Noise of forces [EI/L²] and of the moment [EI/L]."""
-
+NOISES = {"quiet": (0.02, 0.008), "strong": (0.15, 0.06)}  # noise of forces [EI/L²] and of the moment [EI/L]
 ANGLES = np.radians(np.arange(0.0, 200.0, 2.0))
 VERTEX = {"q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
 UNKNOWN = {**NOTHING, "bias": "default"}
@@ -43,8 +39,7 @@ BINS = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
 class Outcome(NamedTuple):
     """Outcome for one object."""
 
-    probability: Floats
-    """Probability by family; NaN if unknown."""
+    probability: Floats  # probability by family; NaN if unknown
     fits: Flags
     seconds: float
 

@@ -22,9 +22,8 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.sweep import Scan
 from tactile_bayes.tasks import run_tasks
 
+# Noise of forces [EI/L²] and of the moment [EI/L].
 NOISES = {"quiet": (0.02, 0.008), "middling": (0.05, 0.02), "strong": (0.15, 0.06)}
-"""Noise of forces [EI/L²] and of the moment [EI/L]."""
-
 ANGLES = np.radians(np.arange(0.0, 200.0, 1.0))
 PROBABILITY, PLACES = 0.9, 9
 SETTINGS = SamplerSettings(max_steps=700)
@@ -65,19 +64,14 @@ TRUTHS = {
 class Outcome(NamedTuple):
     """Outcome for one record."""
 
-    in_gap: float
-    """Share of the grid points in the gap at which the band holds the truth."""
+    in_gap: float  # share of the grid points in the gap at which the band holds the truth
     out_of_gap: float
-    width: float
-    """Mean width of the band in the gap."""
-    error: float
-    """Largest distance of the truth from the band's median there."""
-    known_width: float
-    """Mean width of the band of the contour's own family; NaN without one."""
+    width: float  # mean width of the band in the gap
+    error: float  # largest distance of the truth from the band's median there
+    known_width: float  # mean width of the band of the contour's own family; NaN without one
     seconds: float
     converged: bool
-    passed: bool
-    """True if the record passes its check."""
+    passed: bool  # true if the record passes its check
 
 
 def main(replicates: int = 4, workers: int = 2, *names: str) -> None:

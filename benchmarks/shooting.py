@@ -14,8 +14,7 @@ from scipy.optimize import least_squares, root
 
 __all__ = ["contact_by_integration", "misfit_by_least_squares", "sweep_by_collocation", "sweep_by_shooting"]
 
-State = tuple[float, float, float, float]
-"""Drive angle, holding moment, force, arc length of the contact."""
+State = tuple[float, float, float, float]  # drive angle, holding moment, force, arc length of the contact
 
 
 def _rod(s, state, force, beta):

@@ -37,14 +37,11 @@ OUT = Path("results/stream")
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 SEED, BLOCKS, PARTICLES, DRAWS = 2033, 12, 1000, 99
 QUARTERS = ("a quarter", "half", "three quarters", "all")
-AROUND = np.linspace(-0.1, 0.1, 9)
-"""Positions, relative to the vertex as the whole record shows it [L]."""
-TOLERANCES = (0.02, 0.01, 0.005)
-"""Largest widths of the band [L] at which a rule stops."""
-ALARMS = (0.2, 0.05, 0.01, 0.001)
-"""Rates of false alarms that an e-value may have at most."""
-
+AROUND = np.linspace(-0.1, 0.1, 9)  # positions, relative to the vertex as the whole record shows it [L]
+TOLERANCES = (0.02, 0.01, 0.005)  # largest widths of the band [L] at which a rule stops
+ALARMS = (0.2, 0.05, 0.01, 0.001)  # rates of false alarms that an e-value may have at most
 SMOOTH = tb.Rig(load_cell=CELL, unknown={"friction": 0.0, "backlash": 0.0})
+# What the model does not have: it takes all for parabolas without friction and backlash.
 WRONG: Mapping[str, dict[str, Any]] = {
     "none": {},
     "friction of 0.1, not inferred": {"truth": SMOOTH.with_unknown(friction=0.1)},
@@ -55,8 +52,6 @@ WRONG: Mapping[str, dict[str, Any]] = {
     "flat spot in the gap": {"truth": tb.calibration.Misspecification(flat_spot=(0.0, 2.0))},
     "outliers (t, 2.5)": {"truth": replace(SMOOTH, load_cell=replace(CELL, degrees_of_freedom=2.5))},
 }
-"""What the model does not have: it takes all for parabolas without friction and backlash."""
-
 Row = Mapping[str, Any]
 RECORDS = Kind("records", StudyError, dict, lambda row: {name: v for name, v in row.items() if name != "number"})
 

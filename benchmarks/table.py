@@ -13,8 +13,7 @@ class Row(NamedTuple):
     """Times of the same result by other code and by this package."""
 
     what: str
-    otherwise: float
-    """Time of a piece [s]."""
+    otherwise: float  # time of a piece [s]
     here: float
 
 

@@ -29,9 +29,8 @@ OUT = Path("results/trust")
 PROBABILITY = 0.95
 LOST = "lost"
 
+# Cases, with the ways to infer them that take parabolas.
 CHOSEN = [(name, other) for name, runs in CASES.items() for other, run in runs.items() if "family" not in run.options]
-"""Cases, with the ways to infer them that take parabolas."""
-
 Row = Mapping[str, Any]
 
 

@@ -42,36 +42,21 @@ from tactile_bayes.rig import NOTHING
 ROOT = Path(__file__).resolve().parents[1]
 MEASURED = Path(os.environ.get("TACTILE_BAYES_MEASURED", ROOT.parent / "shared" / "data")) / "whisker-sweeps"
 NAMES = ("index", "x", "y", "z", "sensor_x", "sensor_y", "sensor_z")
-ORIGIN = np.array([64.3045, 98.0687])
-"""Place of the sensor in the coordinates of the stage [mm]."""
-
+ORIGIN = np.array([64.3045, 98.0687])  # place of the sensor in the coordinates of the stage [mm]
+# Direction of the whisker at the clamp. The object rests and the sensor moves, in a frame that is turned by half.
 DRIVE_ANGLE = np.radians(180.0 - 115.3)
-"""Direction of the whisker at the clamp. The object rests and the sensor moves, in a frame that is turned by half."""
-
 HINGE, LENGTH, DIAMETER, RIGIDITY = 4.1, 51.0, 0.24e-3, 1e-5
-STEM = 4.1e-3, 2e-3
-"""Length of a rigid piece before the first traced point, and its standard deviation [m]."""
-
-FREE = 1.5e-3
-"""Standard deviation of the rod's length where it is inferred [m]."""
-
+STEM = 4.1e-3, 2e-3  # length of a rigid piece before the first traced point, and its standard deviation [m]
+FREE = 1.5e-3  # standard deviation of the rod's length where it is inferred [m]
+# Hysteresis over the peak: of a mean of readings there and back, which differ by 6 counts, and of a sweep.
 AT_POINTS, ON_SWEEPS = 0.0025, 0.01
-"""Hysteresis over the peak: of a mean of readings there and back, which differ by 6 counts, and of a sweep."""
-
-COUNTS = 5e6
-"""Roughly, counts to N m; the calibration finds them."""
-
+COUNTS = 5e6  # roughly, counts to N m; the calibration finds them
 SENSOR = tb.LoadCell(moment_noise=3.0, gain=((COUNTS, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
+# Distances of the probe from the clamp: closer points do not fit any rod, and the outermost is at the tip.
 RINGS = range(3, 9)
-"""Distances of the probe from the clamp: closer points do not fit any rod, and the outermost is at the tip."""
-
-UNTOUCHED = 15
-"""Number of readings before contact."""
-
-BEFORE = np.radians(-108.0)
-"""Bearing from which the probe arrives, on the other side of the whisker."""
-
+UNTOUCHED = 15  # number of readings before contact
+BEFORE = np.radians(-108.0)  # bearing from which the probe arrives, on the other side of the whisker
 SWEEPS = tuple(f"cylinder_may25/trial{k}" for k in range(5)) + tuple(f"cylinder_may03/trial{k}" for k in range(1, 5))
 LONG = tb.SamplerSettings(walkers=40, min_ess=400, max_r_hat=1.03, max_seconds=420)
 ENOUGH = tb.SamplerSettings(min_ess=400, max_r_hat=1.03, max_seconds=300)

@@ -35,15 +35,14 @@ def pytest_sessionstart(session):
         compile_share(int(worker["workerid"][2:]), worker["workercount"])
 
 
+# Calls that take a second or more.
 SAMPLING = re.compile(
     r"\b(infer_(contour|rig|point_load)|calibrat(e|ion_replicate)|compare_families|Stream(Comparison)?|design)\("
 )
-"""Calls that take a second or more."""
-
 OWN_EXAMPLES = "inference.contour.infer_contour"
 
+# Tests and cases that take a second or more, beside which others alike are quick.
 LONG = frozenset(Path(__file__).with_name("long_cases.txt").read_text(encoding="utf-8").splitlines()[1:])
-"""Tests and cases that take a second or more, beside which others alike are quick."""
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -44,9 +44,7 @@ def without_last(rows):
     return [cells[:-1] for cells in rows]
 
 
-FIRST_ROW = 9
-"""The line of the first sample: seven of header and the names come before it."""
-
+FIRST_ROW = 9  # the line of the first sample: seven of header and the names come before it
 MISTAKES = {
     "a missing column": (
         lambda rows: (NAMES[:-1], without_last(rows)),

@@ -104,6 +104,7 @@ def no_records():
 
 # --- What is wrong, for one argument or another ---------------------------------------------------------------------
 
+# What a refusal calls arguments that it does not call by their names.
 NAMED_BY = {
     **dict.fromkeys(("record", "measured"), "record|samples?|column|units|attribute"),
     **dict.fromkeys(("posterior", "without_events"), "posterior|draws|infer_contour"),
@@ -115,7 +116,6 @@ NAMED_BY = {
     "false_alarm": "false_alarm|record",
     "file": "file|columns|missing|split_sweeps",
 }
-"""What a refusal calls arguments that it does not call by their names."""
 UNKNOWN = [{"friction": None}, {"friction": "wide"}, {"left": 0.1}, {"friction": stats.norm}, {1: 0.1}, "everything"]
 
 

@@ -11,6 +11,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Gauge
 from tactile_bayes.rig import Rig
 
+# The posterior mean of `python -m benchmarks.whisker_sweeps`.
 RIG = {
     "moment_gain": 0.926,
     "moment_curve_quadratic": 598.5,
@@ -22,8 +23,7 @@ RIG = {
     "gauge_x": 0.2563e-3,
     "gauge_y": 3.2783e-3,
 }
-"""The posterior mean of `python -m benchmarks.whisker_sweeps`."""
-
+# The likeliest rig with a stem before the whisker, with the benchmark's priors and white noise of 7 counts.
 ON_STEM = {
     "moment_gain": 0.8914,
     "moment_curve_quadratic": 417.2,
@@ -36,7 +36,6 @@ ON_STEM = {
     "gauge_x": 0.2639e-3,
     "gauge_y": 2.915e-3,
 }
-"""The likeliest rig with a stem before the whisker, with the benchmark's priors and white noise of 7 counts."""
 
 
 def model_of(record, unknown, **contour):

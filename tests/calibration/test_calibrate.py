@@ -41,9 +41,8 @@ DRIVE = Rotation(drive_angles=ANGLES)
 FAMILY = Family("parabola", **PRIORS)
 AS_STATED = Rig(unknown="nothing")
 
+# Enough for numbers that are the same again, not for right ones.
 FEW_STEPS = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
-"""Enough for numbers that are the same again, not for right ones."""
-
 BY_DEFAULT = SamplerSettings(ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
 
 

@@ -12,8 +12,8 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 
+# A contour as a model draws it: y = 0.4 + 0.6 (x − 0.1)².
 DRAWN = family_named("parabola").build(np.array([0.6]), np.array([0.4]), np.array([0.1]))
-"""A contour as a model draws it: y = 0.4 + 0.6 (x − 0.1)²."""
 
 
 def radius(slope_angle):

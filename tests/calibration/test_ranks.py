@@ -18,8 +18,7 @@ from tactile_bayes.calibration.ranks import (
     uniformity_p_value,
 )
 
-LEAST = 1.0 / (_SIMULATIONS + 1)
-"""The smallest p-value there is."""
+LEAST = 1.0 / (_SIMULATIONS + 1)  # the smallest p-value there is
 
 
 def uniform(sets, count, top, seed):

@@ -17,8 +17,8 @@ EXPERIMENT = experiment_of(rig=Rig(unknown="nothing"), rng=1)
 
 NAMES = ("a", "q", "x_c", "rigidity_scale", "noise_scale", LOG_LIKELIHOOD, "snap_off_backward", "snap_off_forward")
 
+# How many are judged in a replicate; of the other claims one.
 PLACES = {"pointwise_in_gap": 9, "pointwise_beside": 18, "contact_region": 6, "snap_off": 2}
-"""How many are judged in a replicate; of the other claims one."""
 
 
 def posteriors(rng, count, shift=0.0, scale=1.0):

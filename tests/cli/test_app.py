@@ -27,9 +27,8 @@ from tactile_bayes.runs import contour as contour_run
 from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
 
 HEAVY = {"scipy", "xarray", "matplotlib", "emcee", "numpy", "arviz_stats"}
+# In the order in which a record goes through them.
 COMMANDS = ["scan", "measure", "rig", "inspect", "reconstruct", "infer", "compare", "calibrate", "sensitivity"]
-"""In the order in which a record goes through them."""
-
 ROD_OPTIONS = ["--length", str(ROD.length), "--flexural-rigidity", repr(ROD.flexural_rigidity)]
 CELL_OPTIONS = ["--force-noise", str(LOAD_CELL.force_noise), "--moment-noise", str(LOAD_CELL.moment_noise)]
 

@@ -13,8 +13,7 @@ from tactile_bayes.record import write_record
 
 PIN = ("--family", "circle", "--parameter", "r=0.2", "--parameter", "q=0.5")
 KNOWN = "".join(f"{name} = 0.0\n" for name in ("drive_angle_offset", "bias", "lever", "backlash", "friction"))
-ONE = f'[unknown]\nrigidity_scale = "default"\n{KNOWN}'
-"""A rig of which the stiffness alone is unknown."""
+ONE = f'[unknown]\nrigidity_scale = "default"\n{KNOWN}'  # a rig of which the stiffness alone is unknown
 
 
 @pytest.fixture(scope="module")

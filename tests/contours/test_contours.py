@@ -25,16 +25,13 @@ from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ContourError
 
 EPS = np.finfo(float).eps
-STEEPEST = 1.5
-"""Endless contours are tried up to here: there the tangent is 14, and heights have lost a digit."""
-
+STEEPEST = 1.5  # endless contours are tried up to here: there the tangent is 14, and heights have lost a digit
+# Of x, y and the slope angle.
 RATES = (
     lambda at: at.arclength_rate * np.cos(at.slope_angle),
     lambda at: at.arclength_rate * np.sin(at.slope_angle),
     lambda at: at.slope_rate,
 )
-"""Of x, y and the slope angle."""
-
 FEW = settings(
     max_examples=settings.default.max_examples // 3,
     deadline=None,

@@ -80,8 +80,7 @@ INDEXERS = {
     "array": np.array([23, 0, 11]),
     "mask": np.arange(24) % 5 == 0,
 }
-OF_A_KIND = ("int", "slice", "list", "empty slice", "array")
-"""Others stand for these."""
+OF_A_KIND = ("int", "slice", "list", "empty slice", "array")  # others stand for these
 
 
 @pytest.mark.parametrize(

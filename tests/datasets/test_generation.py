@@ -22,9 +22,7 @@ from tactile_bayes.record import CHANNELS, in_frame, rod_of
 from tactile_bayes.rig import NOTHING, Rig
 
 CONTACT = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
-FALSE_ALARM = 1e-4
-"""Of each statistical test here."""
-
+FALSE_ALARM = 1e-4  # of each statistical test here
 RANGES = {
     "a": {"uniform": [0.5, 2.0]},
     "b": {"uniform": [0.3, 0.8]},
@@ -204,6 +202,7 @@ CELLS = {
     "biased": {"bias_force_x": {"normal": [0.0, 0.1]}, "bias_uncertainty_force_x": {"uniform": [0.1, 0.2]}},
     "none": {},
 }
+# Told by the same load cell in the other frame.
 ELSEWHERE = {
     ("turning", "none"),
     ("turning", "outliers"),
@@ -211,7 +210,6 @@ ELSEWHERE = {
     ("fixed", "biased"),
     ("fixed", "white noise"),
 }
-"""Told by the same load cell in the other frame."""
 
 
 @pytest.mark.parametrize(

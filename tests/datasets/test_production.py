@@ -26,9 +26,7 @@ from tactile_bayes.tasks import Workers
 TESTS = Path(__file__).resolve().parents[1]
 on_linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
 
-MANY = changed(PLAIN, records=120, shard_records=4)
-"""Thirty shards, each of some ten milliseconds."""
-
+MANY = changed(PLAIN, records=120, shard_records=4)  # thirty shards, each of some ten milliseconds
 GENERATE = "import sys; from tactile_bayes.datasets import generate; generate(*sys.argv[1:3], workers=int(sys.argv[3]))"
 
 

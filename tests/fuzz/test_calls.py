@@ -20,22 +20,16 @@ from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayes
 from tactile_bayes.tasks import Workers
 
 ROOT = Path(__file__).parents[2]
+# Bases, results, and parts of the forward model that its own code alone calls.
 NOT_CALLED = {
     *(f"contours.{name}" for name in ("Contour", "Graph", "Single", "Locus")),
     *(f"datasets.{name}" for name in ("Specification", "Verification")),
     "TaskProgress",
     *(f"elastica.{name}" for name in ("Contact", "Wrench", "forward_contacts", "lever_of_stem")),
 }
-"""Bases, results, and parts of the forward model that its own code alone calls."""
-
-OF_ANY_NAME = ("Family", "Family.only", "Rig.with_unknown")
-"""What takes parameters of a contour or a rig by name."""
-
-MOST_OBSCURE = 0.02
-"""Largest share of wrong calls that end in an error of another library."""
-
-PARTS = 10
-"""Parts of all wrong calls, of which each seed of the day makes one."""
+OF_ANY_NAME = ("Family", "Family.only", "Rig.with_unknown")  # what takes parameters of a contour or a rig by name
+MOST_OBSCURE = 0.02  # largest share of wrong calls that end in an error of another library
+PARTS = 10  # parts of all wrong calls, of which each seed of the day makes one
 
 
 def a_number(low, high):
@@ -50,6 +44,7 @@ def callable_or_none(value):
     return value is None or callable(value)
 
 
+# What an accepted value of an argument can be: of one function, or wherever it is an argument.
 SENSIBLE = {
     "probability": lambda value: value is None or a_number(1e-323, 1.0 - 1e-16)(value),
     "false_alarm": a_number(1e-323, 1.0 - 1e-16),
@@ -74,7 +69,6 @@ SENSIBLE = {
     **dict.fromkeys(("progress", "keep", "stop"), callable_or_none),
     "plotting.pairs(truth)": lambda value: value is None or (isinstance(value, dict) and set(value) <= {"a", "q"}),
 }
-"""What an accepted value of an argument can be: of one function, or wherever it is an argument."""
 
 
 def sensible(name, argument):

@@ -247,9 +247,7 @@ class WrittenTable:
         return np.flatnonzero(~np.isclose([record[name] for name in NAMES_OF], right, rtol=1e-12, atol=0.0).all(axis=0))
 
 
-LIMIT = 2.0
-"""Longest processor time of a reading [s]."""
-
+LIMIT = 2.0  # longest processor time of a reading [s]
 MINUS = ("\N{MINUS SIGN}", "\N{EN DASH}", "\N{FULLWIDTH HYPHEN-MINUS}", "\N{NON-BREAKING HYPHEN}")
 BLANKS = (" ", "\N{NO-BREAK SPACE}", "\N{THIN SPACE}", "\N{NARROW NO-BREAK SPACE}", "\N{ZERO WIDTH SPACE}")
 

@@ -51,8 +51,7 @@ from tactile_bayes.tasks import Kind, is_temporary, open_results_store
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="calls are counted as Linux makes them")
 
-PARTS = 5
-"""Number of faults that each writer meets in a fast run; a slow one tries others."""
+PARTS = 5  # number of faults that each writer meets in a fast run; a slow one tries others
 
 
 def data(k):
@@ -82,8 +81,7 @@ def returned(make):
     return lambda *arguments, **options: make(GENERATION[0])
 
 
-GENERATION = [0]
-"""Generation that is written, for functions that stand for those of the library."""
+GENERATION = [0]  # generation that is written, for functions that stand for those of the library
 
 
 @pytest.fixture(autouse=True)
@@ -207,6 +205,7 @@ WRITERS = {
     "trust": write_trust,
 }
 
+# Writers of folders of files that belong together, with the file that shows that all of them are there.
 FIRST = {
     "infer": names.INFERENCE[0],
     "inspect": names.INSPECTION[0],
@@ -218,8 +217,6 @@ FIRST = {
     "sensitivity": names.SENSITIVITY[0],
     "trust": names.TRUST[0],
 }
-"""Writers of folders of files that belong together, with the file that shows that all of them are there."""
-
 INSPECTIONS = [inspect_record(record(k)) for k in (0, 1)]
 
 

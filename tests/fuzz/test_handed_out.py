@@ -13,11 +13,8 @@ from helpers.rest_lines import depth, rest_line
 from tactile_bayes.errors import ContourError, TactileBayesWarning
 from tactile_bayes.rig import Rig
 
-SCANS, POSES = 4, 60
-"""Number of scans that a seed checks, and of poses before contact in each."""
-
-DEEP = 1e-6
-"""Depth [L] from which on a rod lies in the object: the oracle finds less of states that are right."""
+SCANS, POSES = 4, 60  # number of scans that a seed checks, and of poses before contact in each
+DEEP = 1e-6  # depth [L] from which on a rod lies in the object: the oracle finds less of states that are right
 
 
 def depth_before(scan, rod, drive):

@@ -16,17 +16,13 @@ from tactile_bayes.inference.result import read_result, write_result
 from tactile_bayes.record import netcdf_content, write_record
 from tactile_bayes.rig import Rig, make_record, read_record
 
+# Number of files with a checksum, and of those without, whose reading takes half a second, each of two kinds.
 SEALED, FOREIGN = 100, 4
-"""Number of files with a checksum, and of those without, whose reading takes half a second, each of two kinds."""
-
-SEAL = b"\ntactile_bayes: SHA-256"
-"""Beginning of the last line of a file with a checksum."""
-
+SEAL = b"\ntactile_bayes: SHA-256"  # beginning of the last line of a file with a checksum
+# Longest time for a small file on a machine that does other work, and most memory of a process that reads it.
 SECONDS, BYTES = 200.0, 1e9
-"""Longest time for a small file on a machine that does other work, and most memory of a process that reads it."""
-
+# Memory of a large process [bytes]: more than a reader of a small file takes, and less than it may take.
 LARGE = 400_000_000
-"""Memory of a large process [bytes]: more than a reader of a small file takes, and less than it may take."""
 
 
 @pytest.fixture(scope="module")

@@ -13,12 +13,8 @@ import pytest
 
 import tactile_bayes
 
-LENGTHS = (22, 6_000)
-"""Repetitions of an attack: the first shows an exponential pattern, the second a quadratic one."""
-
-MOST = 0.03
-"""Processor time of a match [s], hundreds of times that of a linear pattern."""
-
+LENGTHS = (22, 6_000)  # repetitions of an attack: the first shows an exponential pattern, the second a quadratic one
+MOST = 0.03  # processor time of a match [s], hundreds of times that of a linear pattern
 METHODS = {"match", "fullmatch", "search", "sub", "subn", "split", "findall", "finditer"}
 CLASSES = {
     codes.CATEGORY_DIGIT: "1",

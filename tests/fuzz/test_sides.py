@@ -12,11 +12,8 @@ from helpers.rest_lines import depth, rest_line
 from tactile_bayes.errors import ClearanceWarning, TactileBayesError
 from tactile_bayes.rig import Rig
 
-SCANS, LOOKS, POSES = 8, 9, 24
-"""Number of drives that a seed checks, and of poses by which they are chosen and checked."""
-
-ROUNDING = 2e-3
-"""Depth [L] that the points of the check leave undecided at edges and along thick rods."""
+SCANS, LOOKS, POSES = 8, 9, 24  # number of drives that a seed checks, and of poses by which they are chosen and checked
+ROUNDING = 2e-3  # depth [L] that the points of the check leave undecided at edges and along thick rods
 
 
 def depths(contour, rod, drive, begin, end, count):

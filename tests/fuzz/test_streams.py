@@ -12,9 +12,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.record import write_record
 from tactile_bayes.rig import GrowingRecord, Rig, make_record
 
-CASES, STEPS = 6, 10
-"""Number of files that grow, and what happens to each."""
-
+CASES, STEPS = 6, 10  # number of files that grow, and what happens to each
 FAULTS = (b"\n", b"# note\n", b"7,sideways,1,2\n", b"0,forward,nan,,,,,\n", b'"\n', b"\0\0\0\n", b"0;1\n")
 
 

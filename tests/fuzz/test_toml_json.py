@@ -17,17 +17,15 @@ from tactile_bayes.inference.ensembles.checkpoint import open_checkpoint
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.tasks import Kind, open_results_store
 
-LIMIT = 1.0
-"""Longest processor time of a reading [s]."""
-
+LIMIT = 1.0  # longest processor time of a reading [s]
 SIGNS = "\"'[]{}=.,#\n\\-+0e\t\0\r_é\N{MINUS SIGN}\N{LEFT DOUBLE QUOTATION MARK}\N{ZERO WIDTH NO-BREAK SPACE}\ud800"
+# Values of TOML and JSON in any place; None stands for none.
 VALUES = [
     *(None, True, False, 0, -1, 1, 2**63, 10**400, 0.5, -0.0, float("nan"), float("inf"), 1e308, 5e-324),
     *("", "a", "parabola", "\0", "\ud800", "x" * 10_000, [], {}, [[]], [{}], [0.0, 0.0], [[0.0, 0.0]], ["forward"]),
     *({"uniform": [0.3, 0.8]}, {"uniform": [1]}, {"each": [1, 2]}, {"each": [1, 2], "axis": "a"}, {"choice": []}),
     *({"normal": [0, -1]}, {"log_normal": [1e308, 1e308]}, {"uniform": [-1e308, 1e308]}, {"x": {"y": {}}}),
 ]
-"""Values of TOML and JSON in any place; None stands for none."""
 
 
 def pick(rng, choices):

@@ -59,12 +59,10 @@ class Summary:
 
     mean: np.ndarray
     sd: np.ndarray
-    correlation: np.ndarray
-    """Of x and y, x and slope, y and slope."""
+    correlation: np.ndarray  # of x and y, x and slope, y and slope
     tangential: float
     spread: np.ndarray
-    error: np.ndarray
-    """Of the numbers themselves, from the scatter of independent sums."""
+    error: np.ndarray  # of the numbers themselves, from the scatter of independent sums
 
     @property
     def numbers(self) -> np.ndarray:

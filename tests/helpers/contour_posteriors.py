@@ -19,15 +19,12 @@ DEVIATIONS = np.array([0.02, 0.05, 0.05])
 STEP = float(np.radians(2.0))
 TRUTH = {"a": 0.5, "q": 0.5, "x_c": 0.0}
 
+# Enough for files and messages, not for numbers.
 QUICK = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=30)
-"""Enough for files and messages, not for numbers."""
-
+# Too short for anything but the layout of results.
 BRIEF = SamplerSettings(ensembles=2, walkers=16, block_steps=30, max_steps=30, min_ess=1e9)
-"""Too short for anything but the layout of results."""
-
+# Enough for means within a fraction of a standard deviation.
 MODEST = SamplerSettings(ensembles=2, walkers=16, min_ess=160, max_r_hat=1.06)
-"""Enough for means within a fraction of a standard deviation."""
-
 SOUND = SamplerSettings(ensembles=2, walkers=24, min_ess=400, max_r_hat=1.05)
 
 

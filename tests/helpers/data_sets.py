@@ -7,6 +7,7 @@ from tactile_bayes.rig import NOTHING
 
 __all__ = ["PLAIN", "RICH", "changed", "hashes"]
 
+# One family, dimensionless.
 PLAIN = {
     "name": "parabolas",
     "records": 24,
@@ -23,8 +24,7 @@ PLAIN = {
     "scan": {"samples": 24},
     "load_cell": {"moment_noise": {"log_normal": [0.02, 0.3]}, "force_noise": 0.05},
 }
-"""One family, dimensionless."""
-
+# Most of what a specification can say, in SI.
 RICH = {
     "name": "many things",
     "description": "Two families, steel wires, two bases.",
@@ -63,7 +63,6 @@ RICH = {
         "drive_angle_offset": {"uniform": [-0.01, 0.01]},
     },
 }
-"""Most of what a specification can say, in SI."""
 
 
 def changed(spec, **changes):

@@ -18,22 +18,19 @@ from tactile_bayes.mechanics.paths import States
 
 Number = Any
 DIGITS = 40
-STEP = mp.mpf(10) ** -22
-"""Of derivatives by differences: Newton's steps then gain 22 digits each."""
+STEP = mp.mpf(10) ** -22  # of derivatives by differences: Newton's steps then gain 22 digits each
 SETTLED = mp.mpf(10) ** -18
-NEAR = 1e-5
-"""Candidates for the snap-off are looked for this near, in a piece's parameter."""
+NEAR = 1e-5  # candidates for the snap-off are looked for this near, in a piece's parameter
 
 
 class Piece(NamedTuple):
     """A smooth piece of a contour."""
 
+    # From a parameter, which grows from left to right, to x, y and slope angle.
     locate: Callable[[Number], tuple[Number, Number, Number]]
-    """From a parameter, which grows from left to right, to x, y and slope angle."""
     low: Number
     high: Number
-    parameter: Callable[[Number, Number, Number], Number]
-    """From x, y and slope angle, roughly, to the parameter."""
+    parameter: Callable[[Number, Number, Number], Number]  # from x, y and slope angle, roughly, to the parameter
 
 
 def pieces(contour: Contour, low: Number = -mp.inf, high: Number = mp.inf) -> list[Piece]:
@@ -186,8 +183,7 @@ class ExactState(NamedTuple):
     tip: bool
     piece: int
     parameter: Number
-    rod: tuple[Number, ...]
-    """θ0 and, in tip contact, ψ1."""
+    rod: tuple[Number, ...]  # θ0 and, in tip contact, ψ1
 
     @property
     def possible(self) -> bool:

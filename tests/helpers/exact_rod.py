@@ -25,12 +25,9 @@ Outputs = dict[str, Number]
 class Shape(NamedTuple):
     """An equilibrium told by its elastica; `contact` and `wrench` round it to doubles."""
 
-    amplitude: float
-    """χ at the pivot: small near first contact, π where the line of force passes through the pivot."""
-    end_angle: float
-    """ψ1: from the force's normal to the rod at the contact; −friction in tangential contact."""
-    normal_angle: float
-    """β."""
+    amplitude: float  # χ at the pivot: small near first contact, π where the line of force passes through the pivot
+    end_angle: float  # ψ1: from the force's normal to the rod at the contact; −friction in tangential contact
+    normal_angle: float  # β
     arclength: float = 1.0
     friction: float = 0.0
 

@@ -12,9 +12,8 @@ from contextlib import contextmanager
 
 ERRORS = (errno.ENOSPC, errno.EIO, errno.EACCES)
 
+# Functions of `os` that are counted.
 _CALLS = ("open", "mkdir", "rmdir", "unlink", "rename", "replace", "fsync", "write", "truncate", "link")
-"""Functions of `os` that are counted."""
-
 KILL = "kill"
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from helpers.friction_contact import Flexible, Stepper
 from helpers.friction_stepper import Drive, contour_of
 
-_BASE = 0.15
-"""Least distance of the base from the object, over the object's size."""
+_BASE = 0.15  # least distance of the base from the object, over the object's size
 
 
 def drawn_case(rng: np.random.Generator, *, rod: str | None = None, drive: str | None = None) -> dict[str, Any]:

@@ -25,12 +25,10 @@ from scipy.optimize import brentq
 from scipy.special import ellipeinc
 
 NODES = 26
+# Last step of Newton's method, after which the error is of the size of its square.
 _CONVERGED, _MOST_ITERATIONS = 1e-7, 12
-"""Last step of Newton's method, after which the error is of the size of its square."""
-_SENSE = 1e-12
-"""Slip against the sense of a state that is rounding."""
-_JUMP = 0.5
-"""Largest change of the force in a step, over one more than the force."""
+_SENSE = 1e-12  # slip against the sense of a state that is rounding
+_JUMP = 0.5  # largest change of the force in a step, over one more than the force
 
 
 def _quadrature() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -44,8 +42,7 @@ def _quadrature() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 X, W, BEFORE = _quadrature()
-BEYOND = W - BEFORE
-"""Integrals from each node to 1."""
+BEYOND = W - BEFORE  # integrals from each node to 1
 BEFORE_AND_ALL = np.vstack([BEFORE, W])
 
 
@@ -155,15 +152,11 @@ class State(NamedTuple):
     s1: float
     offset: float
     slip: float
-    slipping: float
-    """Rate of the slip at the end of the step, times the step."""
-    end: float
-    """φ(s1)."""
-    moment: float
-    """M(0)."""
+    slipping: float  # rate of the slip at the end of the step, times the step
+    end: float  # φ(s1)
+    moment: float  # M(0)
     stored: float
-    sign: float
-    """Sign of the determinant of the equations; it changes at a fold."""
+    sign: float  # sign of the determinant of the equations; it changes at a fold
 
     @property
     def side(self) -> float:

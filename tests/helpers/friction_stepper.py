@@ -17,24 +17,18 @@ import numpy as np
 
 from helpers.friction_contact import Flexible, Oval, Parabola, State, Stepper
 
+# Largest change of slopes [rad] and of s1 in a step: absolute, and over the root of the step's share of the travel, as
+# before a fold.
 _NEAR, _STEEP = 0.2, 3.0
-"""Largest change of slopes [rad] and of s1 in a step: absolute, and over the root of the step's share of the travel, as
-before a fold."""
-_FINEST = 1e-8
-"""Smallest step, as a share of the travel."""
+_FINEST = 1e-8  # smallest step, as a share of the travel
+# Share of the travel in which several ways lead on, and how fast they go: other equilibria do not come nearer with the
+# step.
 _TINY, _STRAIGHT = 1e-7, 30.0
-"""Share of the travel in which several ways lead on, and how fast they go: other equilibria do not come nearer with the
-step."""
-_APART = 1e-10
-"""Least distance of two different states."""
-_FIRST = 30.0
-"""Size of the first step in contact over the resolution: slip grows with the square of the travel there."""
-_UNLOADED = 1e-3
-"""Force below which contact that is lost was released, without a jump."""
-_SHARE = 1e-9
-"""Share of the samples' spacing that is rounding."""
-_INSIDE = -1e-7
-"""Clearance below which a rod lies in the object."""
+_APART = 1e-10  # least distance of two different states
+_FIRST = 30.0  # size of the first step in contact over the resolution: slip grows with the square of the travel there
+_UNLOADED = 1e-3  # force below which contact that is lost was released, without a jump
+_SHARE = 1e-9  # share of the samples' spacing that is rounding
+_INSIDE = -1e-7  # clearance below which a rod lies in the object
 _MODES = {0: "stick", 1: "slip+", -1: "slip-"}
 _NOTHING = {"kind": "none", "mode": "none", "holding_moment": 0.0, "force": 0.0, "force_x": 0.0, "force_y": 0.0}
 _NOTHING |= dict.fromkeys(("slope_angle", "force_angle", "contact_x", "contact_y", "contact_arclength"), math.nan)

@@ -6,8 +6,7 @@ import tactile_bayes as tb
 from helpers.rest_lines import depth, rest_line
 from tactile_bayes.sweep.scanning import Scan
 
-_STEPS, _EVERY = 200, 4
-"""Steps of an integration, and the share of the samples whose rods are compared with the object."""
+_STEPS, _EVERY = 200, 4  # steps of an integration, and the share of the samples whose rods are compared with the object
 
 
 def _fields(rod: tb.Rod, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

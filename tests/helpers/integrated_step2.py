@@ -12,17 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
-STEPS = 120
-"""An arc of 4/√f then takes steps of h = 0.03/√f; derivatives then agree with closed forms to 1e-12."""
-
+STEPS = 120  # an arc of 4/√f then takes steps of h = 0.03/√f; derivatives then agree with closed forms to 1e-12
 TINY = 1e-30
-_LONGEST, _STRIDE = 12.0, 0.05
-"""How far, and in what steps, to look for the first zero of curvature, in 1/√f."""
-
+_LONGEST, _STRIDE = 12.0, 0.05  # how far, and in what steps, to look for the first zero of curvature, in 1/√f
 Complex = NDArray[np.complex128]
 Function = Callable[[Complex, NDArray[np.float64]], Complex]
+# Of the unloaded rod; the moment at the base is its difference from the curvature there.
 Curvature = NDArray[np.float64] | float
-"""Of the unloaded rod; the moment at the base is its difference from the curvature there."""
 
 
 def _along(state: Complex, fx: Complex, fy: Complex) -> Complex:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 
+# Command line that does not converge, and prints a line whenever a sampler reports.
 SAMPLING = """
 import functools
 from tactile_bayes.cli import main
@@ -22,7 +23,6 @@ contour.sample = sample
 ensembles.SamplerSettings = functools.partial(ensembles.SamplerSettings, block_steps=5, min_ess=1e9)
 main()
 """
-"""Command line that does not converge, and prints a line whenever a sampler reports."""
 
 
 def interrupted_at(call, function):

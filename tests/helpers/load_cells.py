@@ -19,6 +19,7 @@ def cell(**options) -> LoadCell:
     return LoadCell(**{"force_noise": 0.05, "moment_noise": 0.02, **options})
 
 
+# Every combination of which the likelihood is that of a normal distribution.
 NORMAL = {
     "white": CELL,
     "gain and bias": cell(gain=GAIN, bias=(0.1, -0.2, 0.3)),
@@ -41,7 +42,6 @@ NORMAL = {
     "drift, relative noise": cell(drift=WALK, bias_uncertainty=UNKNOWN, relative_noise=0.2),
     "drift that forgets, relative": cell(drift=WANDER, bias_uncertainty=UNKNOWN, relative_noise=0.2),
 }
-"""Every combination of which the likelihood is that of a normal distribution."""
 
 
 def moments(sheet: LoadCell, loads, noise_scale=(1.0, 1.0, 1.0)):

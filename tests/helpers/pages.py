@@ -26,10 +26,8 @@ class Block(NamedTuple):
 
     language: str
     code: str
-    line: int
-    """Of its first line of code, counted from 1."""
-    follows: bool
-    """Whether nothing stands between it and the block before."""
+    line: int  # of its first line of code, counted from 1
+    follows: bool  # whether nothing stands between it and the block before
 
 
 def blocks(text: str) -> list[Block]:

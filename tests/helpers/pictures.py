@@ -10,9 +10,8 @@ from matplotlib.testing.compare import compare_images
 
 BASELINE = Path(__file__).parents[1] / "baseline"
 
+# Root mean square difference of colours, of 255: edges are smoothed a little differently from version to version.
 TOLERANCE = 2.0
-"""Root mean square difference of colours, of 255: edges are smoothed a little differently from version to version."""
-
 DPI = 60
 
 

@@ -16,8 +16,8 @@ from tactile_bayes.sweep import Scan, scan
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 STEP = float(np.radians(3.0))
 
+# Enough for predictions of a record, and far from converged.
 SHORT = SamplerSettings(ensembles=4, walkers=12, max_steps=60, min_ess=1e9)
-"""Enough for predictions of a record, and far from converged."""
 
 
 @cache

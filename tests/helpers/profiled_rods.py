@@ -25,10 +25,8 @@ class RodAlong(NamedTuple):
     profile: Profile
     curvature: Function
     rigidity: Function
-    breaks: tuple[float, ...]
-    """Where these are not smooth: an integration stops there."""
-    softness: float
-    """Small deflection of the tip under a force across it, over that of a uniform rod."""
+    breaks: tuple[float, ...]  # where these are not smooth: an integration stops there
+    softness: float  # small deflection of the tip under a force across it, over that of a uniform rod
 
 
 def rod_along(curvature, rigidity, taper: float) -> RodAlong:

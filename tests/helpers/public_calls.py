@@ -33,6 +33,7 @@ SPECIFICATION = {
 }
 
 
+# Functions that begin what takes seconds, when all arguments have been checked, by their modules.
 _SLOW = (
     ("inference.contour", "sampled"),
     ("inference.point_load", "sample"),
@@ -43,7 +44,6 @@ _SLOW = (
     ("assessment.trust", "sampling_error"),
     ("report.writing", "page_of"),
 )
-"""Functions that begin what takes seconds, when all arguments have been checked, by their modules."""
 
 
 class AcceptedError(Exception):

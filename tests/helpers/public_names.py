@@ -7,14 +7,13 @@ import re
 import tactile_bayes as tb
 
 API = pathlib.Path(__file__).parents[2] / "docs" / "api"
+# Modules of many names, which are named by them in tables of calls.
 PREFIXES = {
     **{f"tactile_bayes.{name}": f"{name}." for name in ("contours", "datasets", "paper_figures", "plotting")},
     "tactile_bayes.mechanics.elastica": "elastica.",
 }
-"""Modules of many names, which are named by them in tables of calls."""
-
+# Modules of what functions return or raise.
 RESULTS = {f"tactile_bayes.{name}" for name in ("errors", "sweep", "diagnostics.inspection", "load_cell.discrepancy")}
-"""Modules of what functions return or raise."""
 
 
 def listed():

@@ -6,8 +6,7 @@ import pytest
 
 from tactile_bayes.checks import shown
 
-_NO_LETTER = r"(?!(?<=\w)\w)"
-"""A place that is not inside a word or a number."""
+_NO_LETTER = r"(?!(?<=\w)\w)"  # a place that is not inside a word or a number
 
 
 def refused(error, /, *named, **arguments):

@@ -18,9 +18,7 @@ from tactile_bayes.sweep import scan
 
 FEW = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
 
-COLUMN = "<|script><script>alert(1)<|script>"
-"""What reading makes of a column's name: a slash cannot be stored."""
-
+COLUMN = "<|script><script>alert(1)<|script>"  # what reading makes of a column's name: a slash cannot be stored
 LONG_NAME = "</script><script>alert(2)</script>"
 UNIT = "\"><svg onload='alert(3)'>"
 ENTRY = '"><img src=x onerror="alert(4)">'

@@ -6,8 +6,8 @@ import tactile_bayes as tb
 from tactile_bayes.contours import Contour
 
 _POINTS, _CELLS = 801, 1000
+# Upright distance from the object up to which the distance from it is computed, of every third point.
 _NEAR, _EVERY = 0.2, 3
-"""Upright distance from the object up to which the distance from it is computed, of every third point."""
 
 
 def rest_line(rod: tb.Rod, x: float, y: float, angle: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -53,17 +53,12 @@ class Held(NamedTuple):
     drive_angle: float
     holding_moment: float
     force: float
-    slope_angle: float
-    """α."""
-    radius: float
-    """ρ of the contour at the contact; zero in an edge."""
-    arclength: float
-    """s1."""
+    slope_angle: float  # α
+    radius: float  # ρ of the contour at the contact; zero in an edge
+    arclength: float  # s1
     tip: bool
-    curvature: Along = np.zeros_like
-    """κ0(s)."""
-    rigidity: Along = np.ones_like
-    """B(s)."""
+    curvature: Along = np.zeros_like  # κ0(s)
+    rigidity: Along = np.ones_like  # b(s)
 
 
 def held(

@@ -15,6 +15,7 @@ from helpers import public_calls
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 
+# Values that few arguments take.
 WRONG: list[Any] = [
     None,
     "",
@@ -66,8 +67,7 @@ WRONG: list[Any] = [
     stats.norm(0.0, 1.0),
     np.random.default_rng(1),
 ]
-"""Values that few arguments take."""
-
+# More of them, for tests that know of fewer arguments what is right.
 MORE: list[Any] = [
     95,
     [0.1, 0.2],
@@ -87,8 +87,7 @@ MORE: list[Any] = [
     iter([1.0, 2.0]),
     slice(0, 2),
 ]
-"""More of them, for tests that know of fewer arguments what is right."""
-
+# Makers of results, of which most arguments take one kind or none.
 RESULTS: list[Callable[[], Any]] = [
     public_calls.measured,
     public_calls.posterior,
@@ -106,4 +105,3 @@ RESULTS: list[Callable[[], Any]] = [
     public_calls.trusted,
     public_calls.inspected,
 ]
-"""Makers of results, of which most arguments take one kind or none."""

@@ -103,8 +103,8 @@ GROUPS = [[name] for name in FAULTS] + [
 ]
 
 
+# Faults that are another thing where the load cell turns with the drive.
 MATTERS = ("drive_angle_offset", "lever_x", "force_x_bias", "force_x_gain", "suspension_compliance")
-"""Faults that are another thing where the load cell turns with the drive."""
 
 
 def called(names):

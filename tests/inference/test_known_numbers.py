@@ -67,8 +67,8 @@ KNOWN = {
     "base_2_x": 0.0009,
     "base_2_y": -0.0004,
 }
+# Parameters of which numbers are refused, with what is to be said in their place.
 NEVER_KNOWN = {*GROUPS["discrepancy"], "moment_noise", "force_noise"}
-"""Parameters of which numbers are refused, with what is to be said in their place."""
 
 
 @cache

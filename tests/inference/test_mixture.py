@@ -7,8 +7,7 @@ from scipy import stats
 from tactile_bayes.inference.densities import ANYTHING, Ends, Mixture, Proposal
 
 MEAN = np.array([1.0, -2.0, 0.5])
-ROOT = np.array([[0.01, 0.0, 0.0], [3.0, 2.0, 0.0], [10.0, -20.0, 50.0]])
-"""Units that differ, and correlations."""
+ROOT = np.array([[0.01, 0.0, 0.0], [3.0, 2.0, 0.0], [10.0, -20.0, 50.0]])  # units that differ, and correlations
 
 
 def two_modes():
@@ -33,8 +32,7 @@ def test_draws_of_a_mixture_do_not_know_their_place():
     assert np.mean(first[:2000]) == pytest.approx(0.3, abs=0.051)
 
 
-UNITS = np.array([1.0, 1e-3, 50.0, 1.0])
-"""Units of the columns of `ridge`."""
+UNITS = np.array([1.0, 1e-3, 50.0, 1.0])  # units of the columns of `ridge`
 
 
 def ridge(rng, count):

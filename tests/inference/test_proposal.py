@@ -8,8 +8,7 @@ from tactile_bayes.inference.densities import Ends, Proposal
 from tactile_bayes.inference.importance import approximate
 
 MEAN = np.array([1.0, -2.0, 0.5])
-ROOT = np.array([[0.01, 0.0, 0.0], [3.0, 2.0, 0.0], [10.0, -20.0, 50.0]])
-"""Units that differ, and correlations."""
+ROOT = np.array([[0.01, 0.0, 0.0], [3.0, 2.0, 0.0], [10.0, -20.0, 50.0]])  # units that differ, and correlations
 
 
 def test_density_is_that_of_students_t():

@@ -16,8 +16,7 @@ from tactile_bayes.rig import make_record
 from tactile_bayes.sweep import scan
 
 RIG = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.1, -0.3, 0.7))
-SHARES = np.array([1.0, -0.6, 0.8])
-"""Loads on the channels, of the largest."""
+SHARES = np.array([1.0, -0.6, 0.8])  # loads on the channels, of the largest
 
 
 def ramp(before, loaded, after, slope, offset=0.5):

@@ -17,9 +17,8 @@ from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE, contact_from_wr
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 
 EPS = np.finfo(float).eps
+# Agreement of closed form and integration that is asked for; the integration itself is good to some 1e-13.
 CLOSE = 1e-10
-"""Agreement of closed form and integration that is asked for; the integration itself is good to some 1e-13."""
-
 FRICTION = (0.0, 0.3, 0.65)
 NORMALS = (-0.9, -0.1, 0.4)
 
@@ -77,8 +76,8 @@ def test_the_states_asked_for_are_in_the_phase_they_were_made_for():
 
 
 EVERY = slice(None)
+# Half of the states: there are nine of each amplitude, so that what one leaves out its neighbour has.
 ODD, EVEN = slice(1, None, 2), slice(0, None, 2)
-"""Half of the states: there are nine of each amplitude, so that what one leaves out its neighbour has."""
 
 
 @pytest.mark.parametrize(
@@ -257,9 +256,7 @@ def contact_ratios(wrench):
     return rounding_ratios(contact_from_wrench(*wrench), *exact_rod.judge_contact(wrench))
 
 
-MOST = 10.0
-"""Times what rounding of the inputs alone causes: the most that an output may be off."""
-
+MOST = 10.0  # times what rounding of the inputs alone causes: the most that an output may be off
 # θ0 → π/2 with the amplitude, → −π/2 where the line of force passes through the pivot.
 AMPLITUDE_ENDS = [
     Shape(chi, psi1, beta, 0.8 if psi1 == -delta else 1.0, delta)

@@ -13,15 +13,13 @@ from tactile_bayes.mechanics.elastica import tangential_arclength, wrench_from_c
 from tactile_bayes.mechanics.fitting import fit_contacts, fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
-NOISES = (0.005, 0.02, 0.06, 0.3)
-"""Standard deviations of the forces; of the moment 0.4 times as much."""
+NOISES = (0.005, 0.02, 0.06, 0.3)  # standard deviations of the forces; of the moment 0.4 times as much
 
 
 class Case(NamedTuple):
     reading: Reading
     delta: np.ndarray
-    true: np.ndarray
-    """Coordinates."""
+    true: np.ndarray  # coordinates
 
     def take(self, where):
         return Case(self.reading.take(where), self.delta[where], self.true[where])

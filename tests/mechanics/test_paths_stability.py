@@ -17,15 +17,15 @@ from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import equilibria, scan
 
 EIGENVALUE = 1e-7
+# The second eigenvalues of all cases lie above: a free rod's own are (π/2)² and (3π/2)² = 22 over squared lengths below
+# one, and the contact takes the first of them away.
 FAR = 20.0
-"""The second eigenvalues of all cases lie above: a free rod's own are (π/2)² and (3π/2)² = 22 over squared lengths
-below one, and the contact takes the first of them away."""
-
 FLAT_ROOF = Joined(Parabola(0.2, 0.3, 1.0), Parabola(0.2, 0.3, -1.0), x=0.0)
 HIGH_ROOF = Joined(Parabola(0.2, 0.5, 1.0), Parabola(0.2, 0.5, -1.0), x=0.0)
 SHARP_LEFT = Joined(Parabola(5.0, 0.3), Parabola(0.2, 0.3))
 EDGE_LEFT = Joined(Parabola(1.0, 0.3775, 0.15), Parabola(0.2, 0.3995, -0.05), x=0.0)
 
+# Rest curvature and taper.
 RODS = {
     "arc": (0.4, 0.0),
     "other arc": (-0.6, 0.0),
@@ -35,7 +35,6 @@ RODS = {
     "the other way": (lambda s: 0.3 * s, 0.6),
     "curved cone": (lambda s: 0.5 - 2.0 * s + 1.5 * s * s, 0.3),
 }
-"""Rest curvature and taper."""
 
 
 def snap_off(contour, base):

@@ -15,9 +15,8 @@ from tactile_bayes.rig import Rig
 
 PROFILE = paper_profile("II", q=0.5)
 
+# So little noise that every sample is loaded, and its phase certain.
 QUIET = tb.LoadCell(force_noise=5e-6, moment_noise=2e-6)
-"""So little noise that every sample is loaded, and its phase certain."""
-
 THICK = tb.Rod.circular(length=0.2, diameter=5e-3, youngs_modulus=1e9)
 
 TALKING = ((1.02, 0.01, -0.02), (0.03, 0.97, 0.01), (-0.01, 0.02, 1.01))
@@ -65,9 +64,9 @@ def in_the_middle(name):
 
 
 STEPS = {"raw": (1e-5, 2e-5), "constrained": (2e-4, 4e-4)}
+# Rounding of 1e-13 rod lengths over 1e-5, and some cubes; a fit is settled to 1e-12 of a sum of squares, which is 1e-6
+# of what it moved, and some times that across.
 TOLERANCES = {"raw": 2e-6, "constrained": 2e-5}
-"""Rounding of 1e-13 rod lengths over 1e-5, and some cubes; a fit is settled to 1e-12 of a sum of squares, which is 1e-6
-of what it moved, and some times that across."""
 
 
 def loaded(plan):

@@ -24,9 +24,8 @@ PROFILE = paper_profile("II", q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 DOUBLE = Plan(PROFILE, Rig(load_cell=CELL), drive=tb.Rotation(drive_step=np.radians(2.0)))
 
+# Drive angles clear of first contacts and snap-offs of both sweeps, the last one unloaded.
 BETWEEN = np.concatenate([np.linspace(0.9, 2.2, 14), np.linspace(2.5, 3.05, 5), [3.3]])
-"""Drive angles clear of first contacts and snap-offs of both sweeps, the last one unloaded."""
-
 CELLS = {
     "white": CELL,
     "correlated": replace(CELL, correlation=(0.3, -0.2, 0.6)),

@@ -30,8 +30,8 @@ CELLS = {
 }
 
 
+# Errors that samples share take seconds.
 SHARED = [pytest.param(name, "gap", marks=pytest.mark.slow) for name in ("encoder", "bias", "drift")]
-"""Errors that samples share take seconds."""
 
 
 @pytest.mark.parametrize(

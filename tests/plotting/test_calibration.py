@@ -14,12 +14,9 @@ from tactile_bayes.calibration.replicate import DRAWS
 from tactile_bayes.calibration.summary import CLAIMS
 from tactile_bayes.errors import ParameterError
 
-COUNT = 100
-"""Replicates in most tests: as many as there are ranks, and bands are made once."""
-
+COUNT = 100  # replicates in most tests: as many as there are ranks, and bands are made once
 UNIFORM = np.arange(COUNT)
-LOW = (DRAWS * np.linspace(0.0, 1.0, COUNT) ** 2).astype(int)
-"""Ranks of truths that lie low among draws."""
+LOW = (DRAWS * np.linspace(0.0, 1.0, COUNT) ** 2).astype(int)  # ranks of truths that lie low among draws
 
 
 LEVEL = 0.001

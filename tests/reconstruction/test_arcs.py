@@ -23,8 +23,7 @@ FRICTION = 0.2
 
 class Swept(NamedTuple):
     record: xr.Dataset
-    truth: np.ndarray
-    """Columns by `NAMES`."""
+    truth: np.ndarray  # columns by `NAMES`
     phase: np.ndarray
     rod: Rod
 

@@ -24,8 +24,7 @@ FAMILIAR = LoadCell(force_noise=0.05, moment_noise=0.02)
 WIRE = Rod(length=0.2, flexural_rigidity=2.4e-3, diameter=4e-3)
 
 COPIES = 4000
-SMALL = 1e-4
-"""Factor on forces and moments of ordinary noise, so that first order is all there is."""
+SMALL = 1e-4  # factor on forces and moments of ordinary noise, so that first order is all there is
 
 
 def cell(**options) -> LoadCell:
@@ -375,8 +374,8 @@ def test_outliers_without_variance_have_no_weights(swept, nu):
 # --- Units, mirrors, order ----------------------------------------------------------------------------------------
 
 
+# Relative agreement of the same sample told in other words: a search ends where its next gain is below 1e-12.
 SETTLED = {"raw": 1e-9, "constrained": 1e-6}
-"""Relative agreement of the same sample told in other words: a search ends where its next gain is below 1e-12."""
 
 
 def assert_same(one, other, tolerance=1e-9, scale=None, signs=None):

@@ -24,8 +24,7 @@ COLUMNS = {
     "force_y": "-/cell/wrench.wrench.force.y",
 }
 ROD = tb.Rod(length=0.2, flexural_rigidity=1e-3)
-TIMES = 0.01 * np.arange(40)
-"""Times of loads [s]; the drive is read every 0.025 s from 0.05 s on."""
+TIMES = 0.01 * np.arange(40)  # times of loads [s]; the drive is read every 0.025 s from 0.05 s on
 
 
 def header(time, frame="base"):
@@ -67,8 +66,7 @@ class Told(NamedTuple):
     frame: str = "base"
 
 
-ALL = np.arange(-5, 45) / 100
-"""Times of the drive, among which are those of all loads [s]."""
+ALL = np.arange(-5, 45) / 100  # times of the drive, among which are those of all loads [s]
 
 
 def drive(angle=angle, times=ALL):

@@ -16,11 +16,9 @@ from tactile_bayes.sweep import scan
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="there is no wait4")]
 
-SECONDS = 20
-"""Time that is given."""
-
+SECONDS = 20  # time that is given
+# Processor time beside it [s]: of compilers, if these have not run before, and of all that is not bounded.
 COMPILERS, ALLOWANCE = 45.0, 25.0
-"""Processor time beside it [s]: of compilers, if these have not run before, and of all that is not bounded."""
 
 
 def superellipse() -> Contour:

@@ -15,8 +15,7 @@ from tactile_bayes.rig import Rig
 
 PARABOLA = tb.contours.Parabola(0.6, 0.45, 0.1)
 
-_ROUNDING = 5e-4
-"""Depth [L] that the oracle's polygons leave undecided."""
+_ROUNDING = 5e-4  # depth [L] that the oracle's polygons leave undecided
 
 
 def inside(contour, rod, x, y, angle):

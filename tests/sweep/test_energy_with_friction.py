@@ -31,10 +31,10 @@ RODS = {
     "on a stem": tb.Rod(stem=0.1),
 }
 NODES, WEIGHTS = legendre.leggauss(40)
+# Derivatives at the nodes of what has values at the nodes, by the right.
 SLOPES = np.linalg.solve(
     legendre.legvander(NODES, NODES.size - 1).T, legendre.legval(NODES, legendre.legder(np.eye(NODES.size)))
 )
-"""Derivatives at the nodes of what has values at the nodes, by the right."""
 
 
 def at_nodes(drive, rig):

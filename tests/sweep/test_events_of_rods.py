@@ -22,8 +22,8 @@ from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 from tactile_bayes.sweep.events import SweepEvents
 
+# Slope angles around a fold [rad], and how many: the remainder of the polynomial is below rounding errors.
 NEAR, NODES = 5e-3, 9
-"""Slope angles around a fold [rad], and how many: the remainder of the polynomial is below rounding errors."""
 
 
 class Shooting:

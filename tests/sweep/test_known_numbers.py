@@ -19,6 +19,7 @@ from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 from tactile_bayes.sweep import Rotation, Translation, equilibria, scan, scan_many
 
 NOT_SWEPT = {*GROUPS["gauge"], *GROUPS["discrepancy"], "moment_noise", "force_noise"}
+# In units of the rod.
 KNOWN = {
     "rigidity_scale": 1.04,
     "drive_angle_offset": 0.015,
@@ -50,7 +51,6 @@ KNOWN = {
     "base_2_x": 0.009,
     "base_2_y": -0.004,
 }
-"""In units of the rod."""
 PIN = Circle(0.3, 0.5, 0.02)
 MODES = (lambda s: 0.3 * (1.0 - s) ** 2, lambda s: 0.2 * s, lambda s: 0.1 * np.cos(6.0 * s))
 ROD = Rod(rest_curvature=0.2, taper=0.2, stem=0.04, rest_shape_modes=MODES, taper_deviation=0.04)

@@ -30,9 +30,8 @@ from tactile_bayes.uncertainty.band import contour_band, length_unit
 
 __all__ = ["Alternative", "alternatives_of", "band_by_assumption"]
 
+# Unknowns of the rig, or groups of them, each of which is added or fixed.
 _UNKNOWNS = (*STANDARD, "base", "drift", "gain", "suspension_compliance", "rest_curvature", "taper", "stem", "length")
-"""Unknowns of the rig, or groups of them, each of which is added or fixed."""
-
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 
 _EDGES = ("lower", "median", "upper")
@@ -41,20 +40,16 @@ _EDGES = ("lower", "median", "upper")
 class Alternative(NamedTuple):
     """An experiment that differs from another in one assumption."""
 
-    name: str
-    """The assumption, such as "friction as stated"."""
-    kind: str
-    """"fixed", "added" or "family"."""
+    name: str  # the assumption, such as "friction as stated"
+    kind: str  # "fixed", "added" or "family"
     experiment: Experiment
 
 
 class _Outcome(NamedTuple):
     """Band of an alternative."""
 
-    band: tuple[tuple[float, ...], ...]
-    """Lower ends, medians and upper ends at the grid points; empty if there is none."""
-    fits: bool
-    """True if the record passes its check."""
+    band: tuple[tuple[float, ...], ...]  # lower ends, medians and upper ends at the grid points; empty if there is none
+    fits: bool  # true if the record passes its check
     converged: bool
     message: str
 

@@ -16,55 +16,37 @@ from tactile_bayes.planning.record_information import prior_precision, scaled_ce
 
 __all__ = ["Disagreement", "LinearFit", "Linearisation"]
 
+# Number of Gauss-Newton steps before the last; starts are draws of the posterior, or truths of predicted records.
 _STEPS = 1
-"""Number of Gauss-Newton steps before the last; starts are draws of the posterior, or truths of predicted records."""
-
-_DIFFERENCE = 0.1
-"""Step of differences, in posterior standard deviations."""
-
-_MOST_CORRELATED = 6000
-"""Largest number of readings whose covariance is factorised, in 0.3 GB."""
-
-_TURN = 1e-4
-"""Step of differences of the drive angle [rad]."""
-
+_DIFFERENCE = 0.1  # step of differences, in posterior standard deviations
+_MOST_CORRELATED = 6000  # largest number of readings whose covariance is factorised, in 0.3 GB
+_TURN = 1e-4  # step of differences of the drive angle [rad]
+# Second difference over a step, in standard deviations of the noise, above which a reading may jump at an event.
 _JUMP = 0.01
-"""Second difference over a step, in standard deviations of the noise, above which a reading may jump at an event."""
-
-_HALVINGS = 3
-"""Largest number of times that a step is halved."""
-
+_HALVINGS = 3  # largest number of times that a step is halved
+# Standard deviations at which residuals are clipped: a sample beside an event may be loaded on either side of it.
 _CLIPPED = 4.0
-"""Standard deviations at which residuals are clipped: a sample beside an event may be loaded on either side of it."""
-
-_SINGULAR = 1e-7
-"""Eigenvalue of a covariance of standardised sums of residuals below which a direction is not measured."""
+_SINGULAR = 1e-7  # eigenvalue of a covariance of standardised sums of residuals below which a direction is not measured
 
 
 class Disagreement(NamedTuple):
     """Disagreement of one part of a record with what the other part predicts."""
 
-    ratio: float
-    """Mean square of the prediction errors over that of all residuals: F-distributed if the model holds."""
+    ratio: float  # mean square of the prediction errors over that of all residuals: F-distributed if the model holds
+    # Number of directions of parameter space that the part measures, the first degrees of freedom of the ratio.
     measured: int
-    """Number of directions of parameter space that the part measures, the first degrees of freedom of the ratio."""
+    # Change of each parameter by the part, over its standard deviation as expected before; shape (parameters,).
     moves: Floats
-    """Change of each parameter by the part, over its standard deviation as expected before; shape (parameters,)."""
 
 
 class LinearFit(NamedTuple):
     """A record around its least-squares optimum, in scaled parameters with independent readings of unit variance."""
 
-    slopes: Floats
-    """Derivatives of the readings, shape (samples, channels, parameters)."""
-    residuals: Floats
-    """Residuals at the optimum, shape (samples, channels)."""
-    covariance: Floats
-    """Covariance of the parameters, shape (parameters, parameters)."""
-    prior: Floats
-    """Precision of the prior, shape (parameters, parameters)."""
-    zeros: Floats
-    """Derivatives of the readings by the zero of each channel, shape (samples, channels, channels)."""
+    slopes: Floats  # derivatives of the readings, shape (samples, channels, parameters)
+    residuals: Floats  # residuals at the optimum, shape (samples, channels)
+    covariance: Floats  # covariance of the parameters, shape (parameters, parameters)
+    prior: Floats  # precision of the prior, shape (parameters, parameters)
+    zeros: Floats  # derivatives of the readings by the zero of each channel, shape (samples, channels, channels)
 
     @property
     def freedom(self) -> float:
@@ -112,8 +94,7 @@ class _Around(NamedTuple):
     """A record around a point of its parameters."""
 
     fit: LinearFit
-    change: Floats
-    """Step to the optimum to first order, in scaled parameters."""
+    change: Floats  # step to the optimum to first order, in scaled parameters
 
 
 class Linearisation:

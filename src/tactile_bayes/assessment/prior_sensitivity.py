@@ -16,12 +16,9 @@ from tactile_bayes.uncertainty.band import contour_heights
 
 __all__ = ["prior_sensitivity"]
 
+# Components that are scaled: the prior of the contour, that of rig and noise, and the likelihood.
 _COMPONENTS = ("contour", "rig", "likelihood")
-"""Components that are scaled: the prior of the contour, that of rig and noise, and the likelihood."""
-
-_SENSITIVE = 0.05
-"""Sensitivity from which a component matters (Kallioinen et al. 2024)."""
-
+_SENSITIVE = 0.05  # Sensitivity from which a component matters (Kallioinen et al. 2024).
 _POWERS = (0.99, 1.01)
 
 

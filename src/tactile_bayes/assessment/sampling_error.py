@@ -16,8 +16,7 @@ from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["WANTED_SHARE", "sampling_error"]
 
-WANTED_SHARE = 0.1
-"""Monte-Carlo error of an end over the width of the band, above which more draws are advised."""
+WANTED_SHARE = 0.1  # Monte-Carlo error of an end over the width of the band, above which more draws are advised
 
 
 def sampling_error(posterior: xr.DataTree, x: ArrayLike, probability: float = 0.95) -> xr.Dataset:

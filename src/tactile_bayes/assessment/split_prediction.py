@@ -19,27 +19,18 @@ from tactile_bayes.record import CHANNELS
 
 __all__ = ["FALSE_ALARM", "parts_of", "split_prediction"]
 
-FALSE_ALARM = 0.01
-"""Probability of an alarm if the model holds."""
-
-_RECORDS = 199
-"""Number of predicted records with which the real one is compared."""
-
-_FEWEST_RECORDS = 99
-"""Least number of predicted records: with fewer an alarm would be impossible."""
-
+FALSE_ALARM = 0.01  # probability of an alarm if the model holds
+_RECORDS = 199  # number of predicted records with which the real one is compared
+_FEWEST_RECORDS = 99  # least number of predicted records: with fewer an alarm would be impossible
 _NOISE = "noise"
 
 
 class _Row(NamedTuple):
     """Disagreements of one record, by part."""
 
-    ratios: Floats
-    """Shape (parts,)."""
-    measured: Floats
-    """Degrees of freedom of the ratios, shape (parts,)."""
-    moves: Floats
-    """Shape (parts, parameters)."""
+    ratios: Floats  # shape (parts,)
+    measured: Floats  # degrees of freedom of the ratios, shape (parts,)
+    moves: Floats  # shape (parts, parameters)
     freedom: float
     scatter: float
 

@@ -36,15 +36,10 @@ from tactile_bayes.uncertainty.summary import gap_if_any, reach
 
 __all__ = ["draws_digest", "trust"]
 
-_USUAL = 0.95
-"""Probability of the band if a posterior does not state one."""
-
+_USUAL = 0.95  # probability of the band if a posterior does not state one
+# Number of grid points of each region, the gap and both sides of it, at which the effect of the prior is computed.
 _GRID_POINTS = 9
-"""Number of grid points of each region, the gap and both sides of it, at which the effect of the prior is computed."""
-
-_EVERY = 5
-"""Every so many grid points of the band, those of other assumptions are computed."""
-
+_EVERY = 5  # every so many grid points of the band, those of other assumptions are computed
 _ENDS = ("left", "right")
 
 _OF_CALIBRATION = ("rank_p_value", "coverage", "coverage_error", "coverage_replicates", "noticed_below")

@@ -19,9 +19,7 @@ UNCONVERGED = (
     "The posterior has not converged, so that replicates and other assumptions are left out: infer it again for longer."
 )
 
-_LARGEST = 2.0
-"""Change of a parameter, in standard deviations, from which it is named."""
-
+_LARGEST = 2.0  # change of a parameter, in standard deviations, from which it is named
 _SETS = {
     "record": "is set by the record",
     "both": "depends on the record, and on the prior as well",

@@ -33,15 +33,13 @@ from tactile_bayes.tasks import ResultsStore, Workers, keep_outcomes, open_resul
 
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
 
+# Default drive angles [degrees], from before first contact to after snap-off in either direction.
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
-"""Default drive angles [degrees], from before first contact to after snap-off in either direction."""
-
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
+# Least number of walkers of an ensemble, and their excess over twice the parameters; few suffice for 200 draws.
 _FEWEST_WALKERS, _MORE_WALKERS = 20, 2
-"""Least number of walkers of an ensemble, and their excess over twice the parameters; few suffice for 200 draws."""
-
+# Settings of a second run if the first has not converged; the walkers of `infer_contour` adapt to a bent posterior.
 _AGAIN = replace(_SETTINGS, max_steps=6000)
-"""Settings of a second run if the first has not converged; the walkers of `infer_contour` adapt to a bent posterior."""
 
 
 def calibrate(

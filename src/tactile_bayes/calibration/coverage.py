@@ -11,8 +11,7 @@ from tactile_bayes.arrays import Floats
 
 __all__ = ["coverage_p_value", "noticed_coverage"]
 
-_MARGIN = 0.01
-"""Error in probability that is allowed for quantiles of some hundred draws."""
+_MARGIN = 0.01  # error in probability that is allowed for quantiles of some hundred draws
 
 
 def coverage_p_value(share: ArrayLike, count: int, probability: float, *, is_whole: bool) -> Floats:

@@ -15,11 +15,9 @@ from tactile_bayes.rig.rig import Rig
 
 __all__ = ["Misspecification"]
 
-_SPOT = 0.1
-"""Standard deviation of a flat spot in slope angle [rad]."""
-
+_SPOT = 0.1  # standard deviation of a flat spot in slope angle [rad]
+# Largest slope angle [rad], and number of knots, of a contour with a flat spot, which is a spline.
 _ENDS, _KNOTS = 1.5, 121
-"""Largest slope angle [rad], and number of knots, of a contour with a flat spot, which is a spline."""
 
 
 @dataclass(frozen=True)

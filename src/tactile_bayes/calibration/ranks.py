@@ -15,28 +15,18 @@ from tactile_bayes.arrays import Floats, Index
 
 __all__ = ["NoticedRanks", "expected_shares", "noticed_ranks", "simultaneous_band", "uniformity_p_value"]
 
-_SIMULATIONS = 20_000
-"""Number of simulated sets of uniform ranks, the null distribution of the test."""
-
-_BLOCK_SIZE = 2000
-"""Number of sets that are simulated at a time."""
-
-_FARTHEST = 10.0
-"""Largest shift, and largest factor of the standard deviation, in the search for detected errors."""
-
-_TOLERANCE = 1e-4
-"""Tolerance of shifts, and of logarithms of factors."""
+_SIMULATIONS = 20_000  # number of simulated sets of uniform ranks, the null distribution of the test
+_BLOCK_SIZE = 2000  # number of sets that are simulated at a time
+_FARTHEST = 10.0  # largest shift, and largest factor of the standard deviation, in the search for detected errors
+_TOLERANCE = 1e-4  # tolerance of shifts, and of logarithms of factors
 
 
 class NoticedRanks(NamedTuple):
     """Smallest errors of a posterior that its ranks show with a given probability; NaN if none is detected."""
 
-    shift: float
-    """Shift of the posterior, to either side, in its standard deviations."""
-    narrow: float
-    """Factor > 1 by which its standard deviation is too small."""
-    wide: float
-    """Factor > 1 by which its standard deviation is too large."""
+    shift: float  # shift of the posterior, to either side, in its standard deviations
+    narrow: float  # factor > 1 by which its standard deviation is too small
+    wide: float  # factor > 1 by which its standard deviation is too large
 
 
 def uniformity_p_value(ranks: ArrayLike, top: int) -> float:

@@ -36,33 +36,22 @@ __all__ = [
     "replicate",
 ]
 
-DRAWS = 99
-"""Number of draws among which the truth has a rank, from 0 to this number."""
-
-LOG_LIKELIHOOD = "log_likelihood"
-"""Name of the log-likelihood among the ranked quantities."""
-
-_GRID_POINTS = 9
-"""Number of grid points of x at which a band is judged, in the gap and on each side of it."""
-
+DRAWS = 99  # number of draws among which the truth has a rank, from 0 to this number
+LOG_LIKELIHOOD = "log_likelihood"  # name of the log-likelihood among the ranked quantities
+_GRID_POINTS = 9  # number of grid points of x at which a band is judged, in the gap and on each side of it
+# Samples whose contact region is judged, as shares of the way from first contact to snap-off in a segment.
 _CONTACTS = (0.1, 0.5, 0.9)
-"""Samples whose contact region is judged, as shares of the way from first contact to snap-off in a segment."""
-
-_CONTACT_DRAWS = 200
-"""Number of draws from which a contact region is computed."""
+_CONTACT_DRAWS = 200  # number of draws from which a contact region is computed
 
 
 class Outcome(NamedTuple):
     """Outcome of one replicate; missing numbers are NaN, missing ranks are left out."""
 
+    # Ranks of the truth among the draws: of parameters, of the log-likelihood, and of drive angles of snap-off.
     ranks: Mapping[str, int]
-    """Ranks of the truth among the draws: of parameters, of the log-likelihood, and of drive angles of snap-off."""
-    numbers: Mapping[str, float]
-    """Shares, widths, scores and times by name."""
-    message: str
-    """Message of the sampler, or the error by which the replicate was lost."""
-    traceback: str = ""
-    """Traceback of that error; empty if there was none."""
+    numbers: Mapping[str, float]  # shares, widths, scores and times by name
+    message: str  # message of the sampler, or the error by which the replicate was lost
+    traceback: str = ""  # traceback of that error; empty if there was none
 
     @property
     def is_lost(self) -> bool:

@@ -31,13 +31,12 @@ _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee", "arviz-stats")
 class SimulatedExperiment:
     """Simulation of a record and inference from it; `calibrate` describes the entries."""
 
+    # Assumptions of inference, on a template whose drive angles are readings of an encoder without errors.
     assumed: Experiment
-    """Assumptions of inference, on a template whose drive angles are readings of an encoder without errors."""
-    drives: Sequence[Drive]
-    """Drives of the template."""
+    drives: Sequence[Drive]  # drives of the template
     settings: SamplerSettings
+    # Settings of a second run if the first has not converged; None for no second run.
     again: SamplerSettings | None = None
-    """Settings of a second run if the first has not converged; None for no second run."""
     probability: float = 0.9
     seed: Seed = 0
     truth: Misspecification = field(default_factory=Misspecification)

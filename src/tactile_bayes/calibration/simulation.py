@@ -20,23 +20,19 @@ from tactile_bayes.record import CHANNELS
 
 __all__ = ["Simulation", "simulate"]
 
-_TRIALS = 200
-"""Largest number of truths that are drawn until the simulated rig reaches one."""
+_TRIALS = 200  # largest number of truths that are drawn until the simulated rig reaches one
 
 
 class Simulation(NamedTuple):
     """A simulated record and its truth."""
 
-    measured: xr.Dataset
-    """The record."""
+    measured: xr.Dataset  # the record
+    # Parameters by name, in the record's units, relative to the rod and load cell that inference assumes.
     truth: Mapping[str, float]
-    """Parameters by name, in the record's units, relative to the rod and load cell that inference assumes."""
-    contour: Contour
-    """Contour of the object, shape (1,)."""
-    rig: RigValues
-    """The rig that was simulated, relative to its own rod and load cell."""
+    contour: Contour  # contour of the object, shape (1,)
+    rig: RigValues  # the rig that was simulated, relative to its own rod and load cell
+    # Drive angles and contact points of first contact and snap-off, each of shape (segments,).
     events: Mapping[str, Floats]
-    """Drive angles and contact points of first contact and snap-off, each of shape (segments,)."""
 
 
 def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simulation:

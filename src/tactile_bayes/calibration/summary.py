@@ -16,9 +16,8 @@ from tactile_bayes.calibration.verdict import FEWEST, POWER, Tally, conclusion, 
 
 __all__ = ["CLAIMS", "FALSE_ALARM", "summary"]
 
-FALSE_ALARM = 0.01
-"""Largest probability that the verdict finds a fault in right posteriors."""
-
+FALSE_ALARM = 0.01  # largest probability that the verdict finds a fault in right posteriors
+# Statements that must hold with the stated probability: names and descriptions.
 CLAIMS = {
     "pointwise_in_gap": "band, in the gap",
     "pointwise_beside": "band, beside it",
@@ -27,7 +26,6 @@ CLAIMS = {
     "contact_region": "contact regions",
     "snap_off": "angle of snap-off",
 }
-"""Statements that must hold with the stated probability: names and descriptions."""
 
 
 class Described(Protocol):

@@ -14,20 +14,12 @@ __all__ = ["FEWEST", "POWER", "Conclusion", "Tally", "conclusion", "lost_message
 
 Conclusion = Literal["calibrated", "not calibrated", "undecided", "too few"]
 
-FEWEST = 20
-"""Least number of replicates for which uniformity and coverage are tested."""
-
-POWER = 0.9
-"""Probability with which the faults that a verdict names would have been detected."""
-
-_MOST_LOST = 0.01
-"""Largest share of lost replicates of a calibrated posterior; coverage may be wrong by as much."""
-
+FEWEST = 20  # least number of replicates for which uniformity and coverage are tested
+POWER = 0.9  # probability with which the faults that a verdict names would have been detected
+_MOST_LOST = 0.01  # largest share of lost replicates of a calibrated posterior; coverage may be wrong by as much
+# Largest share of unconverged runs; beyond it, the limit of steps is tested instead of the posteriors.
 _MOST_UNCONVERGED = 0.05
-"""Largest share of unconverged runs; beyond it, the limit of steps is tested instead of the posteriors."""
-
-_NAMED = 5
-"""Largest number of lost replicates whose numbers are stated."""
+_NAMED = 5  # largest number of lost replicates whose numbers are stated
 
 
 @dataclass(frozen=True)

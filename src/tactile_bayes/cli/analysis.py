@@ -41,9 +41,8 @@ Records = Annotated[
     list[Path], typer.Argument(help="Record, .csv or .nc, or a bag of ROS; or several, or a folder of them.")
 ]
 
+# Quantities in the table of several records; the file has all.
 _SHOWN = ("a", "b", "r", "n", "w", "q", "x_c", "gap width")
-"""Quantities in the table of several records; the file has all."""
-
 _STOPPING = "stopping; the draws made so far are checked, plotted and written now (Ctrl-C again discards them)"
 
 

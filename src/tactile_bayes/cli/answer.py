@@ -35,8 +35,7 @@ class Answer:
     parts: Iterable[str | Table | Mapping[str, Path]]
     numbers: Callable[[], Mapping[str, Any]]
     interrupted: str = ""
-    in_a_line: bool = False
-    """True if the object for programs is one line."""
+    in_a_line: bool = False  # true if the object for programs is one line
 
 
 def print_answer(answer: Answer, as_json: bool) -> None:

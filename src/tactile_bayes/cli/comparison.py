@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["compare"]
 
-_POOR_K = 0.7
-"""Pareto k̂ above which a leave-one-out density cannot be trusted."""
+_POOR_K = 0.7  # Pareto k̂ above which a leave-one-out density cannot be trusted
 
 
 def compare(

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CarryOptions", "DriveOptions", "Pivots", "pivots_in"]
 
-_STEPS = (0.001, 28.0)
-"""Smallest and largest step of rotations [degrees]."""
-
+_STEPS = (0.001, 28.0)  # smallest and largest step of rotations [degrees]
 Directions = Literal["both", "forward", "backward"]
 
 Pivots = Annotated[

@@ -15,11 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["remaining_seconds", "sampling_bar"]
 
-_GOAL = 1000.0
-"""Effective sample size at which sampling stops, as in `SamplerSettings`."""
-
-_MAX_R_HAT = 1.01
-"""R̂ below which sampling stops, as in `SamplerSettings`."""
+_GOAL = 1000.0  # effective sample size at which sampling stops, as in `SamplerSettings`
+_MAX_R_HAT = 1.01  # R̂ below which sampling stops, as in `SamplerSettings`
 
 
 class Show(Protocol):

@@ -11,9 +11,8 @@ __all__ = ["accept_every_text"]
 
 _HANDLER = "tactile_bayes.stand_in"
 
+# Name of ASCII for streams, under which Typer does not take it for a mistake and write UTF-8.
 _ASCII = "tactile_bayes_ascii"
-"""Name of ASCII for streams, under which Typer does not take it for a mistake and write UTF-8."""
-
 _STAND_INS = {
     "\N{COMBINING CIRCUMFLEX ACCENT}": "^",
     "\N{MINUS SIGN}": "-",

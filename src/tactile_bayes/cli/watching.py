@@ -30,14 +30,11 @@ _STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl
 
 _PAGE = "watch.html"
 
+# E-value above which the model is wrong: a right one reaches it in one record of a thousand at most.
 _SURPRISING = 1000.0
-"""E-value above which the model is wrong: a right one reaches it in one record of a thousand at most."""
-
-_RARE = 0.001
-"""Smallest probability of a shape that is written out."""
-
+_RARE = 0.001  # smallest probability of a shape that is written out
+# Number of particles for each parameter below which quantiles can be off by several standard deviations.
 _PER_PARAMETER = 30
-"""Number of particles for each parameter below which quantiles can be off by several standard deviations."""
 
 
 def watch(

@@ -39,11 +39,10 @@ class Locus(NamedTuple):
     x: Floats
     y: Floats
     slope_angle: Floats
+    # dσ/dp ≥ 0 with the arc length σ; zero only where the radius of curvature is: in an edge, where the contour turns
+    # on the spot, and at a vertex as sharp as that of |x|ⁿ with n < 2.
     arclength_rate: Floats
-    """dσ/dp ≥ 0 with the arc length σ; zero only where the radius of curvature is: in an edge, where the contour turns
-    on the spot, and at a vertex as sharp as that of |x|ⁿ with n < 2."""
-    slope_rate: Floats
-    """dα/dp ≥ 0; zero only where the radius of curvature is infinite."""
+    slope_rate: Floats  # dα/dp ≥ 0; zero only where the radius of curvature is infinite
 
 
 class Contour(ABC):
@@ -262,8 +261,7 @@ class Contour(ABC):
 class Vertexed(Contour):
     """Contours with positive sizes and a vertex at height q above x_c."""
 
-    sizes: ClassVar[Mapping[str, str]]
-    """Messages by name of a size, for a size that is not positive and finite."""
+    sizes: ClassVar[Mapping[str, str]]  # messages by name of a size, for a size that is not positive and finite
 
     q: Parameter
     x_c: Parameter

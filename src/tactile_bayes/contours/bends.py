@@ -16,14 +16,10 @@ __all__ = ["FALSE_ALARM", "STRAIGHT", "Bends", "refuse_two_bands", "refuse_unles
 
 STRAIGHT = "; a contour must be curved: measure a longer stretch or more points, of the lower boundary only"
 
-FALSE_ALARM = 1e-3
-"""Probability that the points of a convex contour are refused."""
-
-_LEAST_BEND = 3.0
-"""Least upward bend of all points together, in standard errors."""
-
+FALSE_ALARM = 1e-3  # probability that the points of a convex contour are refused
+_LEAST_BEND = 3.0  # least upward bend of all points together, in standard errors
+# Number of neighbouring points that are tested for two bands, and the least number of all points.
 _NEIGHBOURS, _FEWEST_BANDED = 8, 20
-"""Number of neighbouring points that are tested for two bands, and the least number of all points."""
 
 
 class Bends(NamedTuple):
@@ -36,10 +32,8 @@ class Bends(NamedTuple):
 
     first: Floats
     last: Floats
-    size: Floats
-    """Coefficients of the squares."""
-    errors: Floats
-    """Coefficients in standard errors."""
+    size: Floats  # coefficients of the squares
+    errors: Floats  # coefficients in standard errors
 
     @property
     def mean_curvature(self) -> float:

@@ -13,18 +13,12 @@ __all__ = ["in_cells"]
 
 _ORDER = 16
 
-_MISS = 4e-15
-"""Largest size of the last coefficients of a series, as a share of the size of a coordinate, or in rad."""
-
-_ROUNDED = 1e-15
-"""Rounding error of a parameter, as a share of it."""
-
-_HALVINGS = 40
-"""Largest number of halvings of a cell: its size is then below rounding."""
-
+_MISS = 4e-15  # largest size of the last coefficients of a series, as a share of the size of a coordinate, or in rad
+_ROUNDED = 1e-15  # rounding error of a parameter, as a share of it
+_HALVINGS = 40  # largest number of halvings of a cell: its size is then below rounding
+# Number of further cells of a contour beyond which none is halved: a contour that is rough everywhere is not smooth in
+# smaller cells either.
 _MOST = 256
-"""Number of further cells of a contour beyond which none is halved: a contour that is rough everywhere is not smooth in
-smaller cells either."""
 
 
 def in_cells(contour: Contour, low: Floats, high: Floats) -> Halves:

@@ -18,20 +18,13 @@ __all__ = ["check"]
 
 BatchIndex = tuple[int, ...]
 
+# Number of points at which rates are checked, and the stride of the points at which searches are checked.
 _PROBES, _FEW = 400, 10
-"""Number of points at which rates are checked, and the stride of the points at which searches are checked."""
-
-_STEEPEST = 1.5
-"""Largest slope angle at which a contour is checked [rad]."""
-
+_STEEPEST = 1.5  # largest slope angle at which a contour is checked [rad]
+# Endless parameters are first sampled at the former times the hyperbolic sine of up to the latter, up to 4e17.
 _NEAREST, _ENDLESS = 1e-9, 62.0
-"""Endless parameters are first sampled at the former times the hyperbolic sine of up to the latter, up to 4e17."""
-
-_STRAIGHT = 5
-"""Number of neighbouring points without curvature that make a contour straight; rounding may cause fewer."""
-
-_SAME = 1e-9
-"""Rounding error, as a share of a contour's size, or as an angle [rad]."""
+_STRAIGHT = 5  # number of neighbouring points without curvature that make a contour straight; rounding may cause fewer
+_SAME = 1e-9  # rounding error, as a share of a contour's size, or as an angle [rad]
 
 
 def check(contour: Contour) -> None:

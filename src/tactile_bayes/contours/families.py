@@ -29,9 +29,7 @@ from tactile_bayes.errors import ParameterError
 
 __all__ = ["FAMILIES", "FLANKS", "Flank", "FlankFamily", "family_named", "sides_of"]
 
-_FAR = 1e3
-"""Widths from the vertex beyond which the height of a power law is constant, to avoid overflow."""
-
+_FAR = 1e3  # widths from the vertex beyond which the height of a power law is constant, to avoid overflow
 Values = Mapping[str, Any]
 
 
@@ -140,6 +138,7 @@ def _size(meaning: str, scale: float, length_power: int = 1) -> FamilyParameter:
 
 _A = "coefficient a, or horizontal half-axis of an ellipse"
 
+# Flanks by name; any two make a joined family.
 FLANKS: dict[str, Flank] = {
     # Radius of curvature at the vertex, 1/(2a), like the circle's: half a rod length within a factor of e.
     "parabola": Flank(
@@ -176,7 +175,6 @@ FLANKS: dict[str, Flank] = {
         build=PowerLaw.of_width,
     ),
 }
-"""Flanks by name; any two make a joined family."""
 
 
 def sides_of(family: str) -> dict[str, str]:
@@ -189,12 +187,12 @@ def _of_flanks(name: str) -> FlankFamily:
     return FlankFamily(name, {side: FLANKS[flank] for side, flank in sides_of(name).items()})
 
 
+# Families by name; "parabola/circle" is a parabola on the left of the vertex and a circle on the right.
 FAMILIES: dict[str, ContourFamily] = {
     **{name: _of_flanks(name) for name in FLANKS},
     SHAPE_FREE.name: SHAPE_FREE,
     **{f"{left}/{right}": _of_flanks(f"{left}/{right}") for left in FLANKS for right in FLANKS},
 }
-"""Families by name; "parabola/circle" is a parabola on the left of the vertex and a circle on the right."""
 
 
 def family_named(name: str) -> ContourFamily:

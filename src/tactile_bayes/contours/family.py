@@ -17,17 +17,15 @@ __all__ = ["ContourFamily", "DefaultPrior", "FamilyParameter", "log_normal", "pa
 
 _MOST_STEPS = 100
 
+# Change of parameters, in rod lengths and relative to their size, at which least squares have converged.
 _SETTLED = 1e-5
-"""Change of parameters, in rod lengths and relative to their size, at which least squares have converged."""
 
 
 class DefaultPrior(NamedTuple):
     """Default prior of a parameter, for a rod of length one."""
 
-    distribution: str
-    """Name of the distribution in scipy.stats."""
-    numbers: Mapping[str, float]
-    """Arguments of the distribution; `scale` has the parameter's unit."""
+    distribution: str  # name of the distribution in scipy.stats
+    numbers: Mapping[str, float]  # arguments of the distribution; `scale` has the parameter's unit
 
 
 def log_normal(s: float, scale: float, **more: float) -> DefaultPrior:
@@ -39,27 +37,21 @@ class FamilyParameter(NamedTuple):
     """Parameter of a family."""
 
     meaning: str
-    length_power: int
-    """Power of length in its unit."""
-    prior: DefaultPrior | None = None
-    """None for the vertex, which lies anywhere within a rod length of the pivot."""
-    bounds: tuple[float, float] = (-np.inf, np.inf)
-    """Least and greatest value of a valid contour."""
-    unit: str = "1"
-    """Unit of a parameter without length."""
+    length_power: int  # power of length in its unit
+    prior: DefaultPrior | None = None  # none for the vertex, which lies anywhere within a rod length of the pivot
+    bounds: tuple[float, float] = (-np.inf, np.inf)  # least and greatest value of a valid contour
+    unit: str = "1"  # unit of a parameter without length
 
 
+# The last two parameters of every family.
 VERTEX = {"q": FamilyParameter("height of the vertex", 1), "x_c": FamilyParameter("position of the vertex", 1)}
-"""The last two parameters of every family."""
 
 
 class ContourFamily(ABC):
     """Contours that a vector of parameters describes; the last two are those of the vertex, q and x_c."""
 
-    name: str
-    """Name that users give."""
-    table: Mapping[str, FamilyParameter]
-    """Parameters by name, in order."""
+    name: str  # name that users give
+    table: Mapping[str, FamilyParameter]  # parameters by name, in order
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:

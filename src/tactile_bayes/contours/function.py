@@ -22,20 +22,13 @@ __all__ = ["FunctionContour", "from_function"]
 Function = Callable[[Floats], ArrayLike]
 
 _MAX_DEGREE = 1024
+# Largest size of the last coefficients of a resolved function, over the largest one and the root of the degree.
 _RESOLVED = 1e-14
-"""Largest size of the last coefficients of a resolved function, over the largest one and the root of the degree."""
-
-_REFOUND = 64.0
-"""Largest error of an interpolant between its nodes, as a multiple of that size."""
-
+_REFOUND = 64.0  # largest error of an interpolant between its nodes, as a multiple of that size
+# Numbers of points, besides the ends, at which the derivatives and the interpolant of a function are checked.
 _PROBES, _MANY_PROBES = 400, 1000
-"""Numbers of points, besides the ends, at which the derivatives and the interpolant of a function are checked."""
-
-_PATCH = 32
-"""Degree of the interpolants that locate a point where a function is not smooth."""
-
-_CONVEX = 1e-9
-"""Negative second derivatives up to this share of the largest are rounding."""
+_PATCH = 32  # degree of the interpolants that locate a point where a function is not smooth
+_CONVEX = 1e-9  # negative second derivatives up to this share of the largest are rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,7 @@ from tactile_bayes.errors import ContourError
 
 __all__ = ["SAME_SLOPE", "Joined"]
 
-SAME_SLOPE = 1e-9
-"""Difference below which slope angles are equal [rad]."""
+SAME_SLOPE = 1e-9  # difference below which slope angles are equal [rad]
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,14 +21,10 @@ from tactile_bayes.errors import ContourError
 
 __all__ = ["MeasuredContour", "from_points"]
 
-_FEWEST = 6
-"""Least number of different x: four for a cubic, and two for the scatter."""
-
+_FEWEST = 6  # least number of different x: four for a cubic, and two for the scatter
 _MOST_PIECES = 100
 
-_FLOOR = 1e-3
-"""Least curvature of a fit, as a share of the points' mean curvature."""
-
+_FLOOR = 1e-3  # least curvature of a fit, as a share of the points' mean curvature
 _TINY = np.finfo(float).tiny
 
 
@@ -172,12 +168,9 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
 
 
 class _Weighing(NamedTuple):
-    weight: float
-    """Weight of the roughness."""
-    noise: float
-    """Factor on the noise."""
-    freedom: float
-    """Degrees of freedom of the estimate of this factor."""
+    weight: float  # weight of the roughness
+    noise: float  # factor on the noise
+    freedom: float  # degrees of freedom of the estimate of this factor
 
 
 class _Smoothing(NamedTuple):
@@ -186,11 +179,9 @@ class _Smoothing(NamedTuple):
     knots: Floats
     design: Floats
     target: Floats
-    rest: float
-    """Residual sum of squares of the unpenalised fit."""
+    rest: float  # residual sum of squares of the unpenalised fit
     points: int
-    roughness: Floats
-    """Matrix R with |R c|² = ∫ g⁗² du for coefficients c."""
+    roughness: Floats  # Matrix R with |R c|² = ∫ g⁗² du for coefficients c
 
     @classmethod
     def of(cls, u: Floats, heights: Floats, noise: Floats) -> _Smoothing:

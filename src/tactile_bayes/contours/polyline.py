@@ -15,11 +15,8 @@ from tactile_bayes.errors import ContourError
 
 __all__ = ["Polyline"]
 
-_JOINED = 1e-6
-"""Distance below which two ends are one point, as a share of the extent."""
-
-_BEYOND = 1e-9
-"""Share of a segment by which a foot beyond it may be rounding."""
+_JOINED = 1e-6  # distance below which two ends are one point, as a share of the extent
+_BEYOND = 1e-9  # share of a segment by which a foot beyond it may be rounding
 
 
 @dataclass(frozen=True, eq=False, repr=False)

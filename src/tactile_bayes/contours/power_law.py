@@ -16,8 +16,7 @@ __all__ = ["PowerLaw"]
 
 _LEAST_EXPONENT, _GREATEST_EXPONENT = 1.1, 50.0
 
-_STEEPEST = 1e300
-"""Greatest factor a that follows from a width, to avoid overflow."""
+_STEEPEST = 1e300  # greatest factor a that follows from a width, to avoid overflow
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,24 +14,18 @@ from tactile_bayes.contours.smooth import Smooth
 
 __all__ = ["Directions", "RandomRadius"]
 
-_PLACES = 200
-"""Number of slope angles at which the expansion is computed."""
-
-_LARGEST = 25.0
-"""Bound on the logarithm of radii, far beyond any prior."""
-
-_LENGTHS = 64
-"""Number of length scales at which the expansion is computed; it is interpolated between them."""
+_PLACES = 200  # number of slope angles at which the expansion is computed
+_LARGEST = 25.0  # bound on the logarithm of radii, far beyond any prior
+_LENGTHS = 64  # number of length scales at which the expansion is computed; it is interpolated between them
 
 
 class Directions(NamedTuple):
     """Terms of the expansion as functions of the slope angle, in the order of decreasing variance."""
 
-    log_lengths: Floats
-    """Logarithms of the length scales, shape (lengths,)."""
+    log_lengths: Floats  # logarithms of the length scales, shape (lengths,)
+    # Values at the nodes of `Smooth`, shape (lengths, nodes, directions). With standard normal weights their sum has
+    # unit variance on average over slope angles.
     values: Floats
-    """Values at the nodes of `Smooth`, shape (lengths, nodes, directions). With standard normal weights their sum has
-    unit variance on average over slope angles."""
 
 
 @dataclass(frozen=True)

@@ -14,21 +14,15 @@ __all__ = ["Mismatch", "Rate", "mismatch", "probes"]
 
 Rate = Callable[[Floats], Floats]
 
-_MISS = 1e-6
-"""Tolerated error of an integral, as a share of the largest change between neighbouring stops."""
-
+_MISS = 1e-6  # tolerated error of an integral, as a share of the largest change between neighbouring stops
 _ROUNDING = 16.0 * np.finfo(float).eps
 
-_SUSPECTS = 16
-"""Number of the worst stretches that are examined."""
-
+_SUSPECTS = 16  # number of the worst stretches that are examined
 _HALVINGS = 8
+# If the derivative is right, the misses of a stretch shrink at least by this factor after so many halvings: only those
+# about a jump or a kink remain. The misses of a wrong derivative keep their sum.
 _SHRINKS = 0.25
-"""If the derivative is right, the misses of a stretch shrink at least by this factor after so many halvings: only those
-about a jump or a kink remain. The misses of a wrong derivative keep their sum."""
-
-_JUMP = 1e-6
-"""Tolerated change of a rate over a distance of rounding, as a share of the largest rate."""
+_JUMP = 1e-6  # tolerated change of a rate over a distance of rounding, as a share of the largest rate
 
 
 class Mismatch(NamedTuple):
@@ -36,10 +30,8 @@ class Mismatch(NamedTuple):
 
     left: float
     right: float
-    miss: float
-    """Difference over the stretch; NaN if the derivative only jumps, at `right`."""
-    contour: tuple[int, ...]
-    """Index of the function among many."""
+    miss: float  # difference over the stretch; NaN if the derivative only jumps, at `right`
+    contour: tuple[int, ...]  # index of the function among many
 
 
 def probes(count: int) -> Floats:

@@ -17,11 +17,8 @@ from tactile_bayes.numerics import chebyshev
 
 __all__ = ["ShapeFree"]
 
-_LARGEST = 100.0
-"""Bound on the logarithm of a radius, beyond which a spline has overshot."""
-
-_ORDER = 32
-"""Chebyshev nodes between two knots; the error is rounding even if radii change twentyfold there."""
+_LARGEST = 100.0  # bound on the logarithm of a radius, beyond which a spline has overshot
+_ORDER = 32  # Chebyshev nodes between two knots; the error is rounding even if radii change twentyfold there
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,16 +28,13 @@ from tactile_bayes.numerics.selection import evenly_spread
 
 __all__ = ["SHAPE_FREE", "ShapeFreeFamily"]
 
+# Priors of the standard deviation of log ρ, and of the length over which it changes [rad].
 _AMPLITUDE, _LENGTH = log_normal(0.6, 0.7), log_normal(0.4, 0.7)
-"""Priors of the standard deviation of log ρ, and of the length over which it changes [rad]."""
-
+# First guess of the scatter of points to be fitted [L], and the threshold of the soft-L1 loss in units of it.
 _SCATTER, _HUBER = 0.01, 2.0
-"""First guess of the scatter of points to be fitted [L], and the threshold of the soft-L1 loss in units of it."""
-
 _STEP = 1e-5
 
-_POINTS = 500
-"""Largest number of points of a fit, which is a first guess for a search."""
+_POINTS = 500  # largest number of points of a fit, which is a first guess for a search
 
 
 @dataclass(frozen=True)

@@ -21,14 +21,10 @@ from tactile_bayes.numerics.roots import falling_root
 __all__ = ["Smooth"]
 
 _UPRIGHT = 0.5 * np.pi
-_LARGEST = 100.0
-"""Bound on the logarithm of a radius."""
-
-_MOST_NODES = 10_000
-"""Largest number of nodes that is given."""
-
+_LARGEST = 100.0  # bound on the logarithm of a radius
+_MOST_NODES = 10_000  # largest number of nodes that is given
+# Cells of a contour, on each of which it is a polynomial of fifth degree; even, so that the vertex ends a cell.
 _CELLS = 128
-"""Cells of a contour, on each of which it is a polynomial of fifth degree; even, so that the vertex ends a cell."""
 
 
 @dataclass(frozen=True, eq=False)

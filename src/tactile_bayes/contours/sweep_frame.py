@@ -11,8 +11,7 @@ from tactile_bayes.contours.base import Contour, Locus, Parameter
 
 __all__ = ["SweepFrame"]
 
-_FAR = 1e3
-"""Rod lengths beyond which an end of a contour does not matter."""
+_FAR = 1e3  # rod lengths beyond which an end of a contour does not matter
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ __all__ = ["Tabled"]
 class Tabled(Contour):
     """Contours with tables of a row for each; `_row` is its index, so that `take` need not copy the tables."""
 
+    # Names of the arrays with an entry for each contour, `log_radius` first and `_row` last.
     _by_contour: ClassVar[tuple[str, ...]]
-    """Names of the arrays with an entry for each contour, `log_radius` first and `_row` last."""
 
     log_radius: Floats
 

@@ -36,13 +36,13 @@ __all__ = [
 
 _DISCRETE = ("constant", "choice", "each")
 
+# Parameters that add to entries of the load cell's data sheet.
 _OF_CELL = {
     **dict(zip(GROUPS["bias"], (f"bias_{channel}" for channel in CHANNELS), strict=True)),
     **{name: name for name in GROUPS["lever"]},
     "drive_angle_offset": "drive_angle_offset",
     "backlash": "drive_angle_backlash",
 }
-"""Parameters that add to entries of the load cell's data sheet."""
 
 
 def deviations_of_table(

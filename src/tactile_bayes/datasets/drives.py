@@ -20,16 +20,13 @@ class Drives(NamedTuple):
     """Drives of n sweeps, those of a record side by side."""
 
     base_x: Floats
-    base_y: Floats
-    """Pivots, or where the base begins, shape (n,)."""
+    base_y: Floats  # pivots, or where the base begins, shape (n,)
     backward: Flags
+    # Drive angles in the sweep frame, shape (n, k), or shares of the drive angle from first contact to snap-off, shape
+    # (k,); travels of a base that is carried, in rod lengths, shape (n, k).
     way: Floats
-    """Drive angles in the sweep frame, shape (n, k), or shares of the drive angle from first contact to snap-off, shape
-    (k,); travels of a base that is carried, in rod lengths, shape (n, k)."""
-    ends: Floats | None = None
-    """Poses between which the base is carried, shape (n, 2, 3)."""
-    lines: Floats | None = None
-    """Its lines, as `trace` takes them, along which it turns too."""
+    ends: Floats | None = None  # poses between which the base is carried, shape (n, 2, 3)
+    lines: Floats | None = None  # its lines, as `trace` takes them, along which it turns too
 
     @property
     def travel_share(self) -> Floats:

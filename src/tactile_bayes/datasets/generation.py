@@ -32,16 +32,12 @@ from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases
 
 __all__ = ["Records", "directions_of", "generate_records"]
 
-_MOST_DRAWS = 1000
-"""Largest number of draws of one record."""
-
+_MOST_DRAWS = 1000  # largest number of draws of one record
+# Number of draws that are tested together for the last records: superfluous draws cost less than another call.
 _AT_ONCE = 500
-"""Number of draws that are tested together for the last records: superfluous draws cost less than another call."""
-
+# Distance in the random stream between two draws of a record: far more than the number of distributions, so that a
+# contour does not depend on what is drawn after it.
 _APART = 2**20
-"""Distance in the random stream between two draws of a record: far more than the number of distributions, so that a
-contour does not depend on what is drawn after it."""
-
 _GOOD = Reachability.TOUCHES.message
 
 
@@ -50,18 +46,16 @@ class Records:
     """Records of a data set as arrays; lengths, forces and moments are in the units of the data set."""
 
     index: Index
-    family: Index
-    """Index of the group of the specification of each contour, shape (n,)."""
+    family: Index  # index of the group of the specification of each contour, shape (n,)
+    # Drawn numbers by the keys of the distributions, shape (n,); NaN for parameters of other families.
     drawn: dict[str, Floats]
-    """Drawn numbers by the keys of the distributions, shape (n,); NaN for parameters of other families."""
+    # Columns of sweeps, shape (n, sweeps): base_x and base_y of pivots, or directions of sweeps that carry the base (0
+    # forward, 1 backward), phases, events, and the largest strain of a thick rod.
     sweep: dict[str, NDArray[Any]]
-    """Columns of sweeps, shape (n, sweeps): base_x and base_y of pivots, or directions of sweeps that carry the base (0
-    forward, 1 backward), phases, events, and the largest strain of a thick rod."""
+    # Columns of samples, shape (n, sweeps, samples): readings, base_x and base_y of a base that is carried, and
+    # "truth_" columns.
     sample: dict[str, NDArray[Any]]
-    """Columns of samples, shape (n, sweeps, samples): readings, base_x and base_y of a base that is carried, and
-    "truth_" columns."""
-    redrawn: Counter[str]
-    """Numbers of rejected draws by reason."""
+    redrawn: Counter[str]  # numbers of rejected draws by reason
 
     @property
     def strained(self) -> int:
@@ -160,12 +154,9 @@ def directions_of(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> NDA
 class _Candidates(NamedTuple):
     """Next draws of some records."""
 
-    row: Index
-    """Row of the record of each draw."""
-    group: Index
-    """Index of the group of the specification of its contour."""
-    values: dict[str, Floats]
-    """Numbers by the keys of all distributions."""
+    row: Index  # row of the record of each draw
+    group: Index  # index of the group of the specification of its contour
+    values: dict[str, Floats]  # numbers by the keys of all distributions
 
 
 def _drawn(
@@ -241,8 +232,7 @@ def _turns(spec: Specification, index: Index) -> dict[str, Index]:
 class _Tried(NamedTuple):
     """Sweeps along the valid contours of one group, with the sweeps of a candidate side by side."""
 
-    candidate: Index
-    """Indices of the candidates."""
+    candidate: Index  # indices of the candidates
     paths: Paths
     drives: Drives
     units: ManyUnits

@@ -24,8 +24,7 @@ __all__ = ["MANIFEST", "Manifest", "read_manifest", "versions_here", "write_mani
 
 MANIFEST = "manifest.json"
 
-_FORMAT = 2
-"""Version of the format; version 1 had other random numbers for the same seed."""
+_FORMAT = 2  # version of the format; version 1 had other random numbers for the same seed
 _CORRECTION = (
     "put a copy of it back, or run dataset generate with the same specification into another folder, which makes the "
     "same files again"

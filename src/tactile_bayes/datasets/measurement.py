@@ -20,6 +20,7 @@ from tactile_bayes.record import CHANNELS, turned
 
 __all__ = ["measure"]
 
+# Entries of a data sheet whose validity does not depend on the others: field, and position in it.
 _HARMLESS: dict[str, tuple[str, int | None]] = {
     **{
         name: (name, None)
@@ -36,7 +37,6 @@ _HARMLESS: dict[str, tuple[str, int | None]] = {
     "lever_y": ("lever", 1),
     **{f"{stem}_{name}": (stem, k) for stem in ("bias", "bias_uncertainty") for k, name in enumerate(CHANNELS)},
 }
-"""Entries of a data sheet whose validity does not depend on the others: field, and position in it."""
 
 
 def measure(

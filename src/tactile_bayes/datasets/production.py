@@ -32,15 +32,12 @@ from tactile_bayes.tasks import (
 
 __all__ = ["generate"]
 
+# Share of the time that is spent on the manifest: shards that it does not list when the run is killed are repeated.
 _WRITING_SHARE = 0.05
-"""Share of the time that is spent on the manifest: shards that it does not list when the run is killed are repeated."""
 
 
-_MOST_NAMED = 3
-"""Largest number of differences between two specifications that a message names."""
-
-_LONGEST_VALUE = 60
-"""Largest number of characters of a value in the message."""
+_MOST_NAMED = 3  # largest number of differences between two specifications that a message names
+_LONGEST_VALUE = 60  # largest number of characters of a value in the message
 
 
 def generate(

@@ -30,9 +30,7 @@ from tactile_bayes.tasks import write_atomically
 
 __all__ = ["Written", "file_in", "records_as_dataset", "shard_file", "write_shard"]
 
-_LONGEST = 9
-"""Largest number of phases in a sweep."""
-
+_LONGEST = 9  # largest number of phases in a sweep
 PHASE_SEQUENCES = tuple(
     "-".join("AB"[(start + k) % 2] for k in range(length)) for length in range(1, _LONGEST + 1) for start in (0, 1)
 )
@@ -47,10 +45,8 @@ class Written(NamedTuple):
     bytes: int
     sha256: str
     redrawn: dict[str, int]
-    strained: int
-    """Number of records with a sweep in which the strain of the rod exceeds the model."""
-    untouched: int
-    """Number of sweeps without a sample in contact."""
+    strained: int  # number of records with a sweep in which the strain of the rod exceeds the model
+    untouched: int  # number of sweeps without a sample in contact
 
 
 def shard_file(shard: int) -> str:

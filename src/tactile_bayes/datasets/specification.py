@@ -20,8 +20,7 @@ from tactile_bayes.rig.rig_prior import RigPrior
 
 __all__ = ["Drive", "Group", "Specification"]
 
-_AT_HAND = 2**14
-"""Number of samples in a block: a column of them takes 128 kB."""
+_AT_HAND = 2**14  # number of samples in a block: a column of them takes 128 kB
 
 
 @dataclass(frozen=True)

@@ -44,24 +44,21 @@ __all__ = ["read_specification", "read_text", "rule_of"]
 _MOST_SHARDS = 1_000_000
 _LARGEST_SEED = 2**63 - 1
 
+# Keys of each table; those of a rig are as in rig.toml.
 _TABLES: Mapping[str, Iterable[str]] = {
     "": ("name", "description", "records", "seed", "shard_records", "precision", "each_contour", "contours", "rig"),
     "scan": ("bases", "directions", "translations", "samples", "from_degrees", "to_degrees", "margin"),
     **{name: OF_RIG[name] for name in ("rod", "load_cell", "unknown", "calibration")},
 }
-"""Keys of each table; those of a rig are as in rig.toml."""
-
-_TRACED = ("shape", "rigidity_profile")
-"""What rig.toml states along a rod, and no data set draws."""
-
+_TRACED = ("shape", "rigidity_profile")  # what rig.toml states along a rod, and no data set draws
 _OF_ROTATIONS = ("bases", "directions", "from_degrees", "to_degrees", "margin")
 _OF_TRANSLATIONS = ("base", "heading", "drive_angle", "turn", "travel", "step")
 
+# Parameters of earlier versions by family: the old one, the new one, and its meaning.
 _REPLACED = {
     "power-law": ("a", "w", "the width at which it is as high as wide, a^(1/(1 − n))"),
     "shape-free": ("radius", "r", "its mean (geometric) over slope angles"),
 }
-"""Parameters of earlier versions by family: the old one, the new one, and its meaning."""
 
 
 def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Specification:

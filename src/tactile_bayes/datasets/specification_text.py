@@ -16,6 +16,7 @@ __all__ = ["DEFAULTS", "SCAN", "UNNAMED", "differences", "left_out", "meaning", 
 UNNAMED = "unnamed"
 
 SCAN = {"bases": [[0.0, 0.0]], "directions": ["forward", "backward"], "samples": 180, "margin": 0.1}
+# Default values of keys; a specification with an explicit default is the same.
 DEFAULTS = {
     "name": UNNAMED,
     "description": "",
@@ -27,7 +28,6 @@ DEFAULTS = {
     "rod": {"diameter": 0.0},
     "unknown": "nothing",
 }
-"""Default values of keys; a specification with an explicit default is the same."""
 
 
 def meaning(text: str) -> dict[str, Any]:

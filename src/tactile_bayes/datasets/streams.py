@@ -15,12 +15,8 @@ __all__ = ["CONTOUR", "NOISE", "Together", "streams"]
 
 Words = NDArray[np.uint32]
 
-CONTOUR, NOISE = 0, 1
-"""Purposes of streams: the distributions of a specification, and the load cell."""
-
-_POOL = 4
-"""Number of words in the entropy pool of a `SeedSequence`."""
-
+CONTOUR, NOISE = 0, 1  # purposes of streams: the distributions of a specification, and the load cell
+_POOL = 4  # number of words in the entropy pool of a `SeedSequence`
 _GATHER, _GIVE = (0x43B0D7E5, 0x931E8875), (0x8B51F9DD, 0x58F38DED)
 _LEFT, _RIGHT = np.uint32(0xCA01F9DD), np.uint32(0x4973F715)
 _HALF = np.uint32(16)

@@ -38,10 +38,8 @@ class Variation:
 
     kind: str
     numbers: tuple[float, ...] = ()
-    axis: str | None = None
-    """Axis of a list."""
-    of: Any = None
-    """Frozen distribution of the kind "scipy"."""
+    axis: str | None = None  # axis of a list
+    of: Any = None  # frozen distribution of the kind "scipy"
 
     @property
     def is_drawn(self) -> bool:

@@ -27,8 +27,7 @@ __all__ = ["Verification", "verify"]
 class Verification(NamedTuple):
     """Progress of a verification."""
 
-    files: int
-    """Number of files that are verified, unchanged or identical when regenerated."""
+    files: int  # number of files that are verified, unchanged or identical when regenerated
     wanted: int
 
 

@@ -13,15 +13,11 @@ from tactile_bayes.numerics.selection import evenly_spread
 
 __all__ = ["cut_off_parameters"]
 
-_FEW, _DRAWS = 40, 200
-"""Number of draws that are displaced, and if one of them is then out of reach."""
-
-_STEP = 0.5
-"""Displacement, in standard deviations of the parameter."""
-
+_FEW, _DRAWS = 40, 200  # number of draws that are displaced, and if one of them is then out of reach
+_STEP = 0.5  # displacement, in standard deviations of the parameter
+# Share of draws of which the displaced one is out of reach, from which a parameter counts as cut off: a normal density
+# that ends one standard deviation from its mode has a tenth of its draws within half of one.
 _MOST = 0.1
-"""Share of draws of which the displaced one is out of reach, from which a parameter counts as cut off: a normal density
-that ends one standard deviation from its mode has a tenth of its draws within half of one."""
 
 
 def cut_off_parameters(posterior: xr.DataTree) -> dict[str, str]:

@@ -21,38 +21,25 @@ from tactile_bayes.rig.parameters import GROUPS
 
 __all__ = ["DISCREPANCIES", "LOST_BELOW", "Residuals", "check_record", "residuals_of"]
 
+# Ways in which a record can differ from those that the posterior predicts.
 DISCREPANCIES = ("runs", "neighbours", "largest", "loaded", "zero")
-"""Ways in which a record can differ from those that the posterior predicts."""
-
-_FEWEST_SAMPLES = 5
-"""Number of loaded, or of unloaded, samples in a channel below which they are not judged."""
-
+_FEWEST_SAMPLES = 5  # number of loaded, or of unloaded, samples in a channel below which they are not judged
+# Standard deviations at which residuals are clipped for all discrepancies except `largest`: one outlier is no run.
 _OUTLYING = 4.0
-"""Standard deviations at which residuals are clipped for all discrepancies except `largest`: one outlier is no run."""
-
+# Running-mean widths in the loaded part of a sweep: misfit of one shape by another changes sign 3 to 5 times.
 _WINDOWS = 8
-"""Running-mean widths in the loaded part of a sweep: misfit of one shape by another changes sign 3 to 5 times."""
-
-_EXCESS = 1.2
-"""Root mean square of loaded residuals over the noise between neighbours from which they count as larger."""
-
-LOST_BELOW = 20.0
-"""Log-probability below the median beyond which a draw belongs to a lost walker and is left out."""
-
+_EXCESS = 1.2  # root mean square of loaded residuals over the noise between neighbours from which they count as larger
+LOST_BELOW = 20.0  # log-probability below the median beyond which a draw belongs to a lost walker and is left out
 _TINY = 1e-300
 
 
 class Residuals(NamedTuple):
     """Standardised residuals of one channel: readings less the predictive median, over the predictive spread."""
 
-    values: Floats
-    """Shape (1 + predictions, samples); row 0 is the record itself."""
-    scale: Floats
-    """Predictive spread in the record's units, shape (samples,)."""
-    loaded: Flags
-    """True for samples that the posterior expects to carry a load, shape (samples,)."""
-    sweeps: tuple[Index, ...]
-    """Rows of each sweep, in the order of measurement."""
+    values: Floats  # shape (1 + predictions, samples); row 0 is the record itself
+    scale: Floats  # predictive spread in the record's units, shape (samples,)
+    loaded: Flags  # true for samples that the posterior expects to carry a load, shape (samples,)
+    sweeps: tuple[Index, ...]  # rows of each sweep, in the order of measurement
 
 
 def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dataset:

@@ -13,17 +13,12 @@ from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, t
 
 __all__ = ["CHECK_UNITS", "check_units_and_signs"]
 
+# Force in EI/L² above which units are doubted: a tangential contact with more is within 0.37 L of the pivot.
 _STRONGEST = 100.0
-"""Force in EI/L² above which units are doubted: a tangential contact with more is within 0.37 L of the pivot."""
-
-_WEAKEST = 0.02
-"""Largest force in EI/L² below which units are doubted: a rod that lets go has been bent by more."""
-
-_LONGEST_LEVER = 2.0
-"""Moment over force, in L, above which units are doubted: no contact is further away than L."""
-
+_WEAKEST = 0.02  # largest force in EI/L² below which units are doubted: a rod that lets go has been bent by more
+_LONGEST_LEVER = 2.0  # moment over force, in L, above which units are doubted: no contact is further away than L
+# Ending of the messages on loads that are too large or too small for the rod.
 CHECK_UNITS = "check the units of the loads, and the rod's length and flexural rigidity."
-"""Ending of the messages on loads that are too large or too small for the rod."""
 
 
 def check_units_and_signs(measured: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[str, ...]:

@@ -29,38 +29,27 @@ from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["CONTRADICTION", "NOISE_FACTOR", "OFF_ZERO", "doubtful_sides", "verdicts"]
 
-_HOLDS, _NOT = "holds", "do not rely on it"
-"""Conclusions of `trust`; another one is a reservation."""
-
+_HOLDS, _NOT = "holds", "do not rely on it"  # conclusions of `trust`; another one is a reservation
 _NOISES = ("noise_scale", "moment_noise", "force_noise", *GROUPS["discrepancy"])
 
-NOISE_FACTOR = 2.0
-"""Ratio of found to stated noise beyond which it is reported: data sheets are no more accurate."""
-
-OFF_ZERO = 5.0
-"""Standard errors by which a zero must differ from the stated one to be reported."""
-
-CONTRADICTION = 1e-4
-"""Probability of the misfit of single samples below which it is reported."""
-
+NOISE_FACTOR = 2.0  # ratio of found to stated noise beyond which it is reported: data sheets are no more accurate
+OFF_ZERO = 5.0  # standard errors by which a zero must differ from the stated one to be reported
+CONTRADICTION = 1e-4  # probability of the misfit of single samples below which it is reported
 _FEWEST_PRIOR_DRAWS = 500
 
+# Distance of the posterior median beyond the prior's last draw from which it is reported, over the distance from the 5
+# % quantile of the prior's draws to the last: some four standard deviations of a normal prior; a prior that is largest
+# at its end has nothing beyond it.
 _BEYOND = 0.5
-"""Distance of the posterior median beyond the prior's last draw from which it is reported, over the distance from the
-5 % quantile of the prior's draws to the last: some four standard deviations of a normal prior; a prior that is largest
-at its end has nothing beyond it."""
-
+# Width of the posterior over that of the prior above which the record is reported as uninformative.
 _PRIOR_DOMINATED = 0.7
-"""Width of the posterior over that of the prior above which the record is reported as uninformative."""
-
+# Columns whose zero a parameter is.
 _COLUMN_OF_ZERO = {
     "moment_bias": "holding_moment",
     "force_x_bias": "force_x",
     "force_y_bias": "force_y",
     "drive_angle_offset": "drive_angle",
 }
-"""Columns whose zero a parameter is."""
-
 _CAUSES = {
     "runs": "whose residuals do not scatter about zero but stay on one side",
     "neighbours": "whose residuals do not scatter about zero but stay on one side",

@@ -23,9 +23,7 @@ __all__ = [
     "elapsed_in",
 ]
 
-BEFORE_ONSET, IN_CONTACT, AFTER_CONTACT = 1, 2, 3
-"""Parts of a sweep, as far as they are certain; 0 is none of them."""
-
+BEFORE_ONSET, IN_CONTACT, AFTER_CONTACT = 1, 2, 3  # parts of a sweep, as far as they are certain; 0 is none of them
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
@@ -38,12 +36,11 @@ class Blocks(NamedTuple):
     scatter about the line, for any loads that are straight in the block, and nearly so for curved ones.
     """
 
+    # Number of readings of which it is the mean, or half of those of whose line it is one of two points.
     readings: Floats
-    """Number of readings of which it is the mean, or half of those of whose line it is one of two points."""
-    freedom: Floats
-    """Degrees of freedom of `scatter`."""
+    freedom: Floats  # degrees of freedom of `scatter`
+    # Sum of the squares of the readings about their straight line over the drive angle, shape (samples, 3).
     scatter: Floats
-    """Sum of the squares of the readings about their straight line over the drive angle, shape (samples, 3)."""
 
     @classmethod
     def of(cls, record: xr.Dataset, rod: Rod) -> Blocks | None:

@@ -13,13 +13,10 @@ from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
 __all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
 
-FEWEST = 3
-"""Least number of samples for an estimate of bias and noise."""
-
+FEWEST = 3  # least number of samples for an estimate of bias and noise
+# Range of a smooth course of the readings, in standard deviations of the noise between neighbours, from which it is a
+# load whatever the zero: less may be a drift.
 _FIRM = 20.0
-"""Range of a smooth course of the readings, in standard deviations of the noise between neighbours, from which it is
-a load whatever the zero: less may be a drift."""
-
 _CLIP = 3.0
 _DOUBT = 0.05
 _FEWEST_OF_COURSE = 6

@@ -12,8 +12,7 @@ from tactile_bayes.load_cell.data_sheet import DataSheet
 
 __all__ = ["covariance", "squared_mahalanobis_distance", "wandering_deviation"]
 
-_BEYOND_ALL = 1e100
-"""Bound on deviations in standard deviations, whose products do not overflow."""
+_BEYOND_ALL = 1e100  # bound on deviations in standard deviations, whose products do not overflow
 
 
 def covariance(sheet: DataSheet, loads: Floats) -> Floats:

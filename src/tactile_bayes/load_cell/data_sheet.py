@@ -33,9 +33,8 @@ __all__ = ["CERTAIN", "SEVERAL", "DataSheet"]
 
 Triple = tuple[float, float, float]
 
+# Deterministic entries: known errors, for which a record can be corrected.
 CERTAIN = ("bias", "gain", "lever", "moment_curve", "drive_angle_offset", "drive_angle_backlash")
-"""Deterministic entries: known errors, for which a record can be corrected."""
-
 _LOADS = f"give an array of shape (..., 3), with the channels {', '.join(CHANNELS)}"
 
 _IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -55,6 +54,7 @@ _SCALARS = (
 )
 _DRIFTS: dict[type[Drift], str] = {RandomWalk: "random_walk", OrnsteinUhlenbeck: "ornstein_uhlenbeck"}
 _PAIRS = tuple(combinations(CHANNELS, 2))
+# Names of the numbers of each entry with several numbers.
 SEVERAL: dict[str, tuple[str, ...]] = {
     "bias": tuple(f"bias_{name}" for name in CHANNELS),
     "bias_uncertainty": tuple(f"bias_uncertainty_{name}" for name in CHANNELS),
@@ -63,8 +63,6 @@ SEVERAL: dict[str, tuple[str, ...]] = {
     "moment_curve": ("moment_curve_quadratic", "moment_curve_cubic"),
     "correlation": tuple(f"correlation_{one}_{other}" for one, other in _PAIRS),
 }
-"""Names of the numbers of each entry with several numbers."""
-
 _OF_CHANNELS = f"give three finite numbers ({', '.join(CHANNELS)})"
 _CORRECTIONS = {
     "bias": _OF_CHANNELS,

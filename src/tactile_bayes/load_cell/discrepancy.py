@@ -18,10 +18,8 @@ __all__ = ["Course", "Discrepancy", "joined"]
 class Course(NamedTuple):
     """Order in which a discrepancy passes through the samples of a record."""
 
-    order: Index
-    """Samples, those of each sweep together and by its coordinate, shape (samples,)."""
-    step: Floats
-    """Distance from the sample before in that order; infinite where a sweep begins, shape (samples,)."""
+    order: Index  # samples, those of each sweep together and by its coordinate, shape (samples,)
+    step: Floats  # distance from the sample before in that order; infinite where a sweep begins, shape (samples,)
 
     @classmethod
     def along(cls, coordinate: Floats, sweeps: Sequence[Index]) -> Course:

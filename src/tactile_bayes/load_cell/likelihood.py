@@ -30,14 +30,9 @@ __all__ = [
 
 _LOG_2PI = math.log(2.0 * math.pi)
 
-_NARROW = 1e-5
-"""Width of a step of the reading, in scales of the noise, below which the density is constant on it."""
-
-_FAR = -600.0
-"""Logarithm of a probability below which it may underflow."""
-
-_AT_LIMIT = 1e-9
-"""Share of the range by which a reading at its end may differ from it."""
+_NARROW = 1e-5  # width of a step of the reading, in scales of the noise, below which the density is constant on it
+_FAR = -600.0  # logarithm of a probability below which it may underflow
+_AT_LIMIT = 1e-9  # share of the range by which a reading at its end may differ from it
 
 
 def log_likelihood(

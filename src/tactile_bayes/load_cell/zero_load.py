@@ -31,12 +31,10 @@ from tactile_bayes.record import (
 
 __all__ = ["found_cell", "zero_load"]
 
+# Least number of samples of a sweep that counts as unloaded because no contact was found in it: in a shorter sweep a
+# strong contact may be missed.
 _MIN_SAMPLES = 12
-"""Least number of samples of a sweep that counts as unloaded because no contact was found in it: in a shorter sweep a
-strong contact may be missed."""
-
-_STEPS = 1e-2
-"""Tolerated distance of a reading, in steps, from a whole number."""
+_STEPS = 1e-2  # tolerated distance of a reading, in steps, from a whole number
 
 
 def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
@@ -262,12 +260,9 @@ class _Stretch(NamedTuple):
     """Readings of an unloaded stretch in which the zero is constant."""
 
     readings: float
-    freedom: float
-    """Degrees of freedom of `squares`."""
-    mean: Floats
-    """Shape (channels,)."""
-    squares: Floats
-    """Sum of squares about the mean, shape (channels,)."""
+    freedom: float  # degrees of freedom of `squares`
+    mean: Floats  # shape (channels,)
+    squares: Floats  # sum of squares about the mean, shape (channels,)
 
     @classmethod
     def of_readings(cls, values: Floats) -> _Stretch:

@@ -32,13 +32,10 @@ from tactile_bayes.mechanics.elastica import wrench_from_contact
 
 __all__ = ["base_curvature"]
 
-_MAX_TURN = 1.5
-"""Largest angle δ between chord and base [rad] that is modelled."""
-
+_MAX_TURN = 1.5  # largest angle δ between chord and base [rad] that is modelled
 _MAX_STEPS = 30
 
-_SETTLED = 1e-8
-"""Newton step after which the remaining error, about its square, is lost in rounding."""
+_SETTLED = 1e-8  # Newton step after which the remaining error, about its square, is lost in rounding
 
 
 @cache

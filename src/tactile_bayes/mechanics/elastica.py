@@ -32,59 +32,47 @@ __all__ = [
     "wrench_from_contact",
 ]
 
+# Largest friction angle δ [rad]: the map of Phase B folds unless 2 E(m) > K(m) for m = (1 + sin δ)/2.
 MAX_FRICTION_ANGLE = 0.7
-"""Largest friction angle δ [rad]: the map of Phase B folds unless 2 E(m) > K(m) for m = (1 + sin δ)/2."""
 
 
 _STEM = "give a length in rod lengths, from 0 for none"
 _PROFILE = "give the profile of a rod, Rod(...).profile"
 
-_FARTHEST = 3.0
-"""Angle [rad] by which a rod on a stem may be turned from the bearing of its contact."""
-
+_FARTHEST = 3.0  # angle [rad] by which a rod on a stem may be turned from the bearing of its contact
+# Largest number of steps to that angle, the error that is rounding, and the least that is none [rad].
 _MOST_HALVINGS, _SETTLED, _MISSED = 100, 1e-15, 1e-9
-"""Largest number of steps to that angle, the error that is rounding, and the least that is none [rad]."""
 
 
 class Wrench(NamedTuple):
     """Base wrench of a contact and its derivatives; NaN where the rod cannot make it (`phase` is then `NONE`)."""
 
-    drive_angle: Floats
-    """Slope φ0 of the rod at the pivot [rad]."""
-    holding_moment: Floats
-    """Moment m0 that the drive holds [EI/L]."""
+    drive_angle: Floats  # slope φ0 of the rod at the pivot [rad]
+    holding_moment: Floats  # moment m0 that the drive holds [EI/L]
     force_x: Floats
-    force_y: Floats
-    """Support reaction (−f sin β, f cos β) [EI/L²]."""
-    contact_arclength: Floats
-    """Arc length s1 from the pivot to the contact [L]."""
-    tip_angle: Floats
-    """Slope φ(s1) of the rod at the contact [rad]."""
-    phase: NDArray[np.int8]
-    """`NONE`, `TIP` or `TANGENTIAL`."""
+    force_y: Floats  # support reaction (−f sin β, f cos β) [EI/L²]
+    contact_arclength: Floats  # arc length s1 from the pivot to the contact [L]
+    tip_angle: Floats  # slope φ(s1) of the rod at the contact [rad]
+    phase: NDArray[np.int8]  # `NONE`, `TIP` or `TANGENTIAL`
+    # ∂φ0/∂α at a fixed contact point; by rotation of the whole, ∂φ0/∂(polar angle of the point) = 1 − by_slope.
     by_slope: Floats
-    """∂φ0/∂α at a fixed contact point; by rotation of the whole, ∂φ0/∂(polar angle of the point) = 1 − by_slope."""
+    # ∂φ0/∂(r²) at a fixed direction of the contact and α, r its distance from the pivot; 0 in tangential contact of a
+    # straight rod.
     by_distance: Floats
-    """∂φ0/∂(r²) at a fixed direction of the contact and α, r its distance from the pivot; 0 in tangential contact of a
-    straight rod."""
+    # Arc length that tangential contact at this point would take [L]; above 1 the rod is too short for it.
     tangential_arclength: Floats
-    """Arc length that tangential contact at this point would take [L]; above 1 the rod is too short for it."""
 
 
 class Contact(NamedTuple):
     """Contact that follows from a base wrench; NaN where there is none."""
 
     contact_x: Floats
-    contact_y: Floats
-    """Contact point relative to the pivot [L]."""
-    slope_angle: Floats
-    """Slope angle α of the contour [rad]."""
-    contact_arclength: Floats
-    """Arc length s1 from the pivot to the contact [L]; above 1 it lies beyond the tip."""
-    tip_angle: Floats
-    """Slope φ(s1) of the rod at the contact [rad]."""
+    contact_y: Floats  # contact point relative to the pivot [L]
+    slope_angle: Floats  # slope angle α of the contour [rad]
+    contact_arclength: Floats  # arc length s1 from the pivot to the contact [L]; above 1 it lies beyond the tip
+    tip_angle: Floats  # slope φ(s1) of the rod at the contact [rad]
+    # Parameter m of the elliptic integrals; the curvature of the whole elastica has a zero if and only if m < 1.
     modulus: Floats
-    """Parameter m of the elliptic integrals; the curvature of the whole elastica has a zero if and only if m < 1."""
 
 
 def _refuse_friction(friction_angle: Floats, least: float = 0.0) -> None:

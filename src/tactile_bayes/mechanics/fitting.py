@@ -19,29 +19,21 @@ from tactile_bayes.mechanics.rods.profile import Rods, rods_of
 
 __all__ = ["fit_contacts", "fit_sheet", "plain", "raw_contacts"]
 
+# Free coordinates on a sheet; None stands for the edge.
 _FREE = {TIP: (FORCE, PSI1), TANGENTIAL: (FORCE, ARCLENGTH), None: (FORCE,)}
-"""Free coordinates on a sheet; None stands for the edge."""
-
 _BLOCK = 4096
 
 _COARSE, _COARSE_STEPS = 1e-3, 10
+# Gain in the sum of squares that the next step promises, relative to one plus the sum, at which a descent ends.
 _SETTLED, _MOST_STEPS = 1e-12, 100
-"""Gain in the sum of squares that the next step promises, relative to one plus the sum, at which a descent ends."""
-
+# Factor on the other sheet's sum of squares, and addend, beyond which a coarsely fitted sheet is given up.
 _OUTDONE = 2.0, 10.0
-"""Factor on the other sheet's sum of squares, and addend, beyond which a coarsely fitted sheet is given up."""
-
+# Arc lengths to start from in tangential contact, and shares of the range of ψ1 in tip contact.
 _STARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Arc lengths to start from in tangential contact, and shares of the range of ψ1 in tip contact."""
-
+# Correlation that counts as zero, and the value that replaces a covariance that is not finite.
 _ROUNDING, _BEYOND_ALL = 1e-15, 1e300
-"""Correlation that counts as zero, and the value that replaces a covariance that is not finite."""
-
-_LEAST_MOMENT = 0.1
-"""Least moment of a start, in its standard deviations."""
-
-_SAME = 1e-4
-"""Difference of coordinates of one and the same optimum."""
+_LEAST_MOMENT = 0.1  # least moment of a start, in its standard deviations
+_SAME = 1e-4  # difference of coordinates of one and the same optimum
 
 
 def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike, has_noise: bool) -> RawFit:

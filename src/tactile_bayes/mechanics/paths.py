@@ -29,11 +29,9 @@ __all__ = ["Mode", "Paths", "States", "trace"]
 class States(NamedTuple):
     """States on paths."""
 
-    parameter: Floats
-    """Parameter of the contour in the sweep frame."""
+    parameter: Floats  # parameter of the contour in the sweep frame
     x: Floats
-    y: Floats
-    """Contact point on the object."""
+    y: Floats  # contact point on the object
     slope_angle: Floats
     wrench: Wrench
 
@@ -46,11 +44,10 @@ class States(NamedTuple):
 class Mode(NamedTuple):
     """How rod and object touch along a part of a path."""
 
-    tip: bool
-    """True if the tip touches, else the rod."""
+    tip: bool  # true if the tip touches, else the rod
     sticks: bool
+    # True if it slips along the contour to the right; of one that sticks it is not defined, nor without friction.
     to_right: bool
-    """True if it slips along the contour to the right; of one that sticks it is not defined, nor without friction."""
 
 
 @dataclass(frozen=True)
@@ -64,34 +61,28 @@ class Paths:
     sweep_frame: SweepFrame
     friction_angle: Floats
     reach: NDArray[np.int8]
-    distance: Floats
-    """Least distance of the contour from the pivot [L]."""
-    first_angle: Floats
-    """Drive angle of first contact [rad]."""
+    distance: Floats  # least distance of the contour from the pivot [L]
+    first_angle: Floats  # drive angle of first contact [rad]
     first_parameter: Floats
-    snap_angle: Floats
-    """Drive angle of snap-off [rad]."""
+    snap_angle: Floats  # drive angle of snap-off [rad]
     snap_parameter: Floats
     snap_off: NDArray[np.int8]
+    # States where phases begin, and at the end of the last, with the columns of `STATE`, shape (n, phases + 1,
+    # columns); zero beyond.
     events: Floats
-    """States where phases begin, and at the end of the last, with the columns of `STATE`, shape (n, phases + 1,
-    columns); zero beyond."""
-    phases: Index
-    """Number of phases."""
-    largest_curvature: Floats
-    """Largest curvature of the rod up to snap-off [1/L], with a relative error of 1e-4."""
+    phases: Index  # number of phases
+    largest_curvature: Floats  # largest curvature of the rod up to snap-off [1/L], with a relative error of 1e-4
+    # Drive angle beyond which the unloaded rod has passed the contour, as far as that is known [rad]. If the base is
+    # carried, the travel from snap-off on at which the unloaded rod lies in the object [L]; −∞ if it does so nowhere.
     clear_angle: Floats
-    """Drive angle beyond which the unloaded rod has passed the contour, as far as that is known [rad]. If the base is
-    carried, the travel from snap-off on at which the unloaded rod lies in the object [L]; −∞ if it does so nowhere."""
     tolerance: Floats | None
     shapes: Shapes
     sweeps: Sweeps
     profile: Profile | None
+    # Lines of drives that carry the base, as in `Segments`, shape (1 or n, lines, columns). All drive angles here are
+    # then travels, in rod lengths.
     lines: Floats | None
-    """Lines of drives that carry the base, as in `Segments`, shape (1 or n, lines, columns). All drive angles here are
-    then travels, in rod lengths."""
-    sampled: Floats
-    """States at the drive angles given to `trace`, shape (n, k, columns)."""
+    sampled: Floats  # states at the drive angles given to `trace`, shape (n, k, columns)
 
     def is_clear(self) -> Flags:
         """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,).

@@ -2,8 +2,6 @@
 
 __all__ = ["NONE", "PHASE_NAMES", "TANGENTIAL", "TIP"]
 
+# Codes of the contact phase: no contact, Phase A (the tip touches), Phase B (the rod touches tangentially).
 NONE, TIP, TANGENTIAL = 0, 1, 2
-"""Codes of the contact phase: no contact, Phase A (the tip touches), Phase B (the rod touches tangentially)."""
-
-PHASE_NAMES = ("none", "tip", "tangential")
-"""Names of the contact phases, by code."""
+PHASE_NAMES = ("none", "tip", "tangential")  # names of the contact phases, by code

@@ -6,37 +6,29 @@ from enum import IntEnum
 
 __all__ = ["CLEARANCE", "Reachability", "SnapOff"]
 
+# Least distance of pivot and contour at which a path is followed [L]. Nearer, almost the whole path lies within a
+# degree of snap-off, and the nodes would miss it.
 CLEARANCE = 0.02
-"""Least distance of pivot and contour at which a path is followed [L]. Nearer, almost the whole path lies within a
-degree of snap-off, and the nodes would miss it."""
 
 
 class Reachability(IntEnum):
     """Reachability of a contour by a rod in a sweep."""
 
     TOUCHES = 0
-    TOO_FAR = 1
-    """No point is within the rod's length."""
-    CUTS_PIVOT = 2
-    """The pivot is not below the contour."""
-    ENDS = 3
-    """The rod would touch beyond the end of the contour from which it comes."""
-    TOO_CLOSE = 4
-    """The pivot is nearer to the contour than `CLEARANCE`."""
-    RUNS_OUT = 5
-    """The rod would still touch at the other end of the contour."""
-    GRAZES = 6
-    """Contact is so weak that rounding hides how it ends."""
-    TOUCHES_TWICE = 7
-    """A rod that is curved toward the object would touch it at two points."""
+    TOO_FAR = 1  # no point is within the rod's length
+    CUTS_PIVOT = 2  # the pivot is not below the contour
+    ENDS = 3  # the rod would touch beyond the end of the contour from which it comes
+    TOO_CLOSE = 4  # the pivot is nearer to the contour than `CLEARANCE`
+    RUNS_OUT = 5  # the rod would still touch at the other end of the contour
+    GRAZES = 6  # contact is so weak that rounding hides how it ends
+    TOUCHES_TWICE = 7  # a rod that is curved toward the object would touch it at two points
+    # At first contact the tip is turned beyond the normal of the contour, so that any force pushes it off.
     SLIPS_OFF = 8
-    """At first contact the tip is turned beyond the normal of the contour, so that any force pushes it off."""
+    # A rod that is carried is in the object at the beginning of its drive, or comes into it without a contact.
     BEGINS_INSIDE = 9
-    """A rod that is carried is in the object at the beginning of its drive, or comes into it without a contact."""
+    # Friction lets the contact neither slide nor stick at first, or both: a straight rod is pushed along itself.
     HEAD_ON = 10
-    """Friction lets the contact neither slide nor stick at first, or both: a straight rod is pushed along itself."""
-    FOLDS_OVER = 11
-    """The tip would turn over until the other side of the rod lies along the contour."""
+    FOLDS_OVER = 11  # the tip would turn over until the other side of the rod lies along the contour
 
     @property
     def message(self) -> str:
@@ -64,13 +56,8 @@ class SnapOff(IntEnum):
     """Kind of the end of a path."""
 
     NEVER = 0
-    FOLD = 1
-    """A smooth maximum of the drive angle."""
-    CORNER = 2
-    """A maximum where the phase changes or the contour's curvature jumps."""
-    THRUST = 3
-    """The line of force passes through the pivot, so that the holding moment vanishes."""
-    RELEASE = 4
-    """The force vanishes: a rod that is curved or carried leaves the contour without a jump."""
-    JUMP = 5
-    """Friction lets the contact neither slide nor stick: it jumps."""
+    FOLD = 1  # a smooth maximum of the drive angle
+    CORNER = 2  # a maximum where the phase changes or the contour's curvature jumps
+    THRUST = 3  # the line of force passes through the pivot, so that the holding moment vanishes
+    RELEASE = 4  # the force vanishes: a rod that is curved or carried leaves the contour without a jump
+    JUMP = 5  # friction lets the contact neither slide nor stick: it jumps

@@ -8,8 +8,7 @@ from tactile_bayes.arrays import Index
 
 __all__ = ["blocks"]
 
-_MOST = 2_000_000
-"""Largest number of entries in one array of a block: 16 MB, of which a few exist at a time."""
+_MOST = 2_000_000  # largest number of entries in one array of a block: 16 MB, of which a few exist at a time
 
 
 def blocks(points: int, numbers: int, largest: int | None = None) -> list[Index]:

@@ -10,8 +10,7 @@ from tactile_bayes.arrays import Floats
 
 __all__ = ["central_slopes"]
 
-_JUMP = 0.01
-"""Second difference of a value over a step, in its unit, above which it may be a jump."""
+_JUMP = 0.01  # second difference of a value over a step, in its unit, above which it may be a jump
 
 
 def central_slopes(values: Callable[[Floats], Floats], point: Floats, steps: Floats | float) -> Floats:

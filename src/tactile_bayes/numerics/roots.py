@@ -10,14 +10,10 @@ from tactile_bayes.arrays import Floats, Index
 
 __all__ = ["bound_ends", "falling_root"]
 
-_ROUNDING = 1e-14
-"""Step, as a share of the bracket, at the level of rounding, at which the iteration ends."""
-
-_FARTHEST = 2.0**60
-"""Distance beyond which no root is sought."""
-
+_ROUNDING = 1e-14  # step, as a share of the bracket, at the level of rounding, at which the iteration ends
+_FARTHEST = 2.0**60  # distance beyond which no root is sought
+# Maps indices of functions and arguments to values and derivatives, each of shape (k,).
 Function = Callable[[Index, Floats], tuple[Floats, Floats]]
-"""Maps indices of functions and arguments to values and derivatives, each of shape (k,)."""
 
 
 def bound_ends(function: Function, lo: Floats, hi: Floats, near: Floats) -> None:

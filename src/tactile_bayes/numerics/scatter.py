@@ -10,8 +10,7 @@ from tactile_bayes.arrays import Floats
 
 __all__ = ["DEVIATION_OVER_MEDIAN", "robust_deviation", "rough_noise"]
 
-DEVIATION_OVER_MEDIAN = 1.4826
-"""Standard deviation of a normal distribution about zero, over the median of the size."""
+DEVIATION_OVER_MEDIAN = 1.4826  # standard deviation of a normal distribution about zero, over the median of the size
 
 
 def robust_deviation(values: Floats) -> float:

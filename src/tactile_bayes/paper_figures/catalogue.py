@@ -35,12 +35,9 @@ _EXPLAINED = (0.5,)
 
 class _Entry(NamedTuple):
     draw: Callable[[Choice], Figure]
-    words: str
-    """A caption, without the drive and distances, "{along}" for what changes along the drive."""
-    direction: Direction
-    """Direction of rotations."""
-    distances: tuple[float, ...]
-    """Default distances q [L]."""
+    words: str  # a caption, without the drive and distances, "{along}" for what changes along the drive
+    direction: Direction  # direction of rotations
+    distances: tuple[float, ...]  # default distances q [L]
 
 
 def _observables(profile: Profile) -> _Entry:
@@ -67,8 +64,7 @@ _ENTRIES: Mapping[int, _Entry] = {
     ),
 }
 
-NUMBERS = tuple(_ENTRIES)
-"""Numbers of the figures, in order."""
+NUMBERS = tuple(_ENTRIES)  # numbers of the figures, in order
 
 
 def figure(

@@ -22,21 +22,12 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_contact_kinds"]
 
-_WAY = {"tip": 0.6, "tangential": 0.45}
-"""Position of the state shown between the first and the last of a phase."""
-
-_LIMITS: Limits = (-0.36, 1.02), (-0.24, 0.98)
-"""Limits of both panels in x and y for rotations [L]."""
-
+_WAY = {"tip": 0.6, "tangential": 0.45}  # position of the state shown between the first and the last of a phase
+_LIMITS: Limits = (-0.36, 1.02), (-0.24, 0.98)  # limits of both panels in x and y for rotations [L]
+# Limits from the base where it is carried, in x those of a forward contact [L].
 _CARRIED_LIMITS: Limits = (-0.36, 1.1), (-0.24, 1.16)
-"""Limits from the base where it is carried, in x those of a forward contact [L]."""
-
-_BESIDE = {"tip": 0.2, "tangential": 0.36}
-"""Radius at which the slope angle is drawn: beyond the rod's end [L]."""
-
-_ARROW = 0.2
-"""Length of the contact force; components of the reaction are in proportion to it [L]."""
-
+_BESIDE = {"tip": 0.2, "tangential": 0.36}  # radius at which the slope angle is drawn: beyond the rod's end [L]
+_ARROW = 0.2  # length of the contact force; components of the reaction are in proportion to it [L]
 _CLEAR: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 _THIN: dict[str, Any] = {"color": "0.35", "linewidth": 0.7}
 

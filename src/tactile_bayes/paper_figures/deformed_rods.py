@@ -26,8 +26,7 @@ _LEGEND = (
     ["first contact", "phase change", "snap-off", *ENDINGS.values()],
 )
 
-_ROOM = 0.05
-"""Margin around the rods [L]."""
+_ROOM = 0.05  # margin around the rods [L]
 
 
 def draw_deformed_rods(profile: Profile, direction: Direction, choice: Choice) -> Figure:

@@ -27,14 +27,9 @@ __all__ = ["draw_observable_curves"]
 
 _LINES = {"forward": "-", "backward": (0, (3.0, 1.2))}
 _WIDTHS = {"tip": 0.8, "tangential": 1.7}
-_BETWEEN = 48
-"""Number of points of a line between two events, beside those of the drive's steps."""
-
-_SAME = 1e-12
-"""Change of a pose up to which it is left out beside the one before [L and rad]."""
-
-_SHRUNK = 0.75
-"""Size of the many event markers, over their usual size."""
+_BETWEEN = 48  # number of points of a line between two events, beside those of the drive's steps
+_SAME = 1e-12  # change of a pose up to which it is left out beside the one before [L and rad]
+_SHRUNK = 0.75  # size of the many event markers, over their usual size
 
 
 def draw_observable_curves(profile: Profile, direction: Direction, choice: Choice) -> Figure:

@@ -25,14 +25,9 @@ __all__ = ["draw_reconstructed_points"]
 
 _COLOURS = {"forward": BASES[3], "backward": BASES[2]}
 _X = (-0.92, 0.92)
-_Y = (-0.06, 1.0)
-"""Limits of every panel of rotations [L]: no rod reaches farther."""
-
-_ROOM = 0.06
-"""Margin around contacts and bases of a drive that carries the base [L]."""
-
-_BESIDE = 0.2
-"""Room on either side of the vertex, below which distances are written [L]."""
+_Y = (-0.06, 1.0)  # limits of every panel of rotations [L]: no rod reaches farther
+_ROOM = 0.06  # margin around contacts and bases of a drive that carries the base [L]
+_BESIDE = 0.2  # room on either side of the vertex, below which distances are written [L]
 
 
 def draw_reconstructed_points(profiles: Sequence[Profile], choice: Choice) -> Figure:

@@ -34,38 +34,27 @@ SOURCES = (*CHANNELS, "drive_angle")
 _COLUMNS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 _TRUTHS = ("contact_x", "contact_y", "slope_angle", "contact_phase")
 
+# Default distances of samples from first contact and from snap-off, over the sweep's length.
 _NEAR = np.geomspace(1e-5, 0.5, 41)
-"""Default distances of samples from first contact and from snap-off, over the sweep's length."""
-
-_EVENLY = (np.arange(60) + 0.5) / 60
-"""Default positions of further samples, over the sweep's length."""
-
+_EVENLY = (np.arange(60) + 0.5) / 60  # default positions of further samples, over the sweep's length
+# Distances from an event between which errors follow a power of the distance, over the sweep's length.
 _POWER_LAW = (1e-5, 1e-3)
-"""Distances from an event between which errors follow a power of the distance, over the sweep's length."""
-
+# Free contact coordinates, in tip contact (True) and in tangential contact (False).
 _FREE = {True: (FORCE, PSI1), False: (FORCE, ARCLENGTH)}
-"""Free contact coordinates, in tip contact (True) and in tangential contact (False)."""
 
 
 class _Forward(NamedTuple):
     """Contacts of a sweep in the sweep frame, dimensionless."""
 
-    side: Floats
-    """1 for forward and −1 for backward samples, shape (n,)."""
-    coordinates: Floats
-    """Force, ψ1, arc length and drive angle, shape (n, 4)."""
-    tip: Flags
-    """True in tip contact, shape (n,)."""
-    slope_angle: Floats
-    """Slope angle of the contour at the contact [rad], shape (n,)."""
-    from_readings: Floats
-    """Derivatives of the loads by the three readings, shape (n, 3, 3)."""
+    side: Floats  # 1 for forward and −1 for backward samples, shape (n,)
+    coordinates: Floats  # force, ψ1, arc length and drive angle, shape (n, 4)
+    tip: Flags  # true in tip contact, shape (n,)
+    slope_angle: Floats  # slope angle of the contour at the contact [rad], shape (n,)
+    from_readings: Floats  # derivatives of the loads by the three readings, shape (n, 3, 3)
+    # Derivatives of the loads by the drive angle, for a load cell that turns with the drive, shape (n, 3).
     leaning: Floats
-    """Derivatives of the loads by the drive angle, for a load cell that turns with the drive, shape (n, 3)."""
-    covariance: Floats
-    """Covariance of the readings, shape (n, 3, 3)."""
-    rods: Rods
-    """Their rods in the sweep frame."""
+    covariance: Floats  # covariance of the readings, shape (n, 3, 3)
+    rods: Rods  # their rods in the sweep frame
 
     def take(self, where: Index) -> _Forward:
         """Return some of the contacts."""

@@ -27,9 +27,9 @@ from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
 
+# Degrees of freedom of the t distribution from which nested draws come, and its scale over that of Laplace's
+# approximation.
 _FREEDOM, _WIDENING = 8.0, 1.2
-"""Degrees of freedom of the t distribution from which nested draws come, and its scale over that of Laplace's
-approximation."""
 
 
 @dataclass(frozen=True)
@@ -83,32 +83,22 @@ class Question:
 
     known: Knowledge
     candidates: tuple[Candidate, ...]
-    x: Floats
-    """Grid points at which the band matters [length]."""
-    probability: float
-    """Probability of the pointwise band, in (0, 1)."""
-    nested: int
-    """Number of draws of each nested posterior; 0 for Laplace's approximation alone."""
+    x: Floats  # grid points at which the band matters [length]
+    probability: float  # probability of the pointwise band, in (0, 1)
+    nested: int  # number of draws of each nested posterior; 0 for Laplace's approximation alone
     seed: Seed
 
 
 class Expected(NamedTuple):
     """Expected results of a candidate: means over draws of the truth, each with its standard error."""
 
-    width: tuple[float, float]
-    """Mean width of the band [length]."""
-    gap: tuple[float, float]
-    """Width of the arcs that no sweep touches [length]."""
-    information: tuple[float, float]
-    """Gain in information [nats]."""
-    reached: float
-    """Share of the draws that the rod reaches."""
-    nested_width: tuple[float, float]
-    """Mean width of the band by nested Monte Carlo [length]."""
-    nested_information: tuple[float, float]
-    """Gain in information by nested Monte Carlo [nats]."""
-    nested_draws: float
-    """Median of the effective draws of the nested posteriors."""
+    width: tuple[float, float]  # mean width of the band [length]
+    gap: tuple[float, float]  # width of the arcs that no sweep touches [length]
+    information: tuple[float, float]  # gain in information [nats]
+    reached: float  # share of the draws that the rod reaches
+    nested_width: tuple[float, float]  # mean width of the band by nested Monte Carlo [length]
+    nested_information: tuple[float, float]  # gain in information by nested Monte Carlo [nats]
+    nested_draws: float  # median of the effective draws of the nested posteriors
 
 
 def expected_of(task: tuple[Question, int]) -> Expected:

@@ -38,14 +38,10 @@ __all__ = ["design", "usual_drives"]
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy")
 
-_GRID_POINTS = 25
-"""Number of grid points of x over the span."""
-
+_GRID_POINTS = 25  # number of grid points of x over the span
+# Default positions of pivots, over the rod's length.
 _ACROSS, _ABOVE = np.linspace(-0.5, 0.5, 11), np.array([-0.1, 0.0, 0.1])
-"""Default positions of pivots, over the rod's length."""
-
-_NESTED = 400
-"""Number of draws of each nested posterior."""
+_NESTED = 400  # number of draws of each nested posterior
 
 
 def design(

@@ -27,9 +27,8 @@ from tactile_bayes.uncertainty.band import contour_band
 
 __all__ = ["CellOutcome", "MapCell", "MapTask", "error_cell"]
 
+# Settings of posteriors, which only need to yield a band.
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=1000)
-"""Settings of posteriors, which only need to yield a band."""
-
 _FEWEST_WALKERS = 24
 
 
@@ -37,12 +36,9 @@ _FEWEST_WALKERS = 24
 class MapCell:
     """Coordinates of a cell in the map."""
 
-    contour: str
-    """Name of the contour."""
-    distance: float
-    """Height of the contour's lowest point above the pivot [length]."""
-    noise_factor: float
-    """Factor on the noise of the load cell."""
+    contour: str  # name of the contour
+    distance: float  # height of the contour's lowest point above the pivot [length]
+    noise_factor: float  # factor on the noise of the load cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +47,10 @@ class MapTask:
 
     contours: Mapping[str, Contour]
     cells: tuple[MapCell, ...]
-    plan: Plan
-    """Plan of the sweeps, for any of the contours."""
-    drive: Rotation
-    """Its drive, with a pivot at the height 0."""
+    plan: Plan  # plan of the sweeps, for any of the contours
+    drive: Rotation  # its drive, with a pivot at the height 0
     replicates: int
-    posteriors: Mapping[int, int]
-    """Number of replicates for which posteriors are inferred, by index of the cell."""
+    posteriors: Mapping[int, int]  # number of replicates for which posteriors are inferred, by index of the cell
     probability: float
     seed: Seed
 
@@ -65,10 +58,8 @@ class MapTask:
 class CellOutcome(NamedTuple):
     """Outcome of a cell."""
 
-    numbers: Mapping[str, float]
-    """Results by name."""
-    message: str
-    """"ok", or the error by which the cell is empty."""
+    numbers: Mapping[str, float]  # results by name
+    message: str  # "ok", or the error by which the cell is empty
 
 
 def error_cell(task: tuple[MapTask, int]) -> CellOutcome:

@@ -18,12 +18,11 @@ __all__ = ["Whitening", "whitening"]
 class Whitening(NamedTuple):
     """Linear map of readings to independent ones of unit variance."""
 
-    present: Flags
-    """True for channels that were measured, shape (3,)."""
+    present: Flags  # true for channels that were measured, shape (3,)
+    # Inverse Cholesky factor of each sample, shape (samples, channels, channels); None if samples share errors.
     alone: Floats | None
-    """Inverse Cholesky factor of each sample, shape (samples, channels, channels); None if samples share errors."""
+    # Cholesky factor of the covariance of all readings, shape (samples · channels, samples · channels), or None.
     together: Floats | None
-    """Cholesky factor of the covariance of all readings, shape (samples · channels, samples · channels), or None."""
 
     def __call__(self, readings: Floats) -> Floats:
         """Whiten errors or derivatives of readings, shape (samples, 3, k), to (samples, channels, k)."""

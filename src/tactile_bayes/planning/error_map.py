@@ -51,9 +51,8 @@ _LENGTHS = (
     "posterior_gap_width",
 )
 _DRIVE, _BANDS = Rotation(drive_step=float(np.radians(2.0))), Bands()
+# Axes of the map beside the contours, with their usual values.
 _AXES = {"distance": (0.5,), "noise_factor": (0.1, 0.3, 1.0, 3.0)}
-"""Axes of the map beside the contours, with their usual values."""
-
 _SHARES = ("posterior_touched_coverage", "posterior_gap_coverage", "posterior_failed")
 
 

@@ -16,21 +16,16 @@ from tactile_bayes.sweep import Scan
 
 __all__ = ["Stretch", "band_factor", "deviation_of_heights", "height_slopes", "stretches"]
 
-_GRID_POINTS = 25
-"""Number of grid points in every stretch."""
+_GRID_POINTS = 25  # number of grid points in every stretch
 
 
 class Stretch(NamedTuple):
     """An interval of x that is touched or a gap, with its grid points."""
 
-    name: str
-    """"touched", or "gap"."""
-    begin: float
-    """Left end [length]."""
-    end: float
-    """Right end [length]."""
-    x: Floats
-    """Grid points, evenly between the ends, in a gap without them [length]."""
+    name: str  # "touched", or "gap"
+    begin: float  # left end [length]
+    end: float  # right end [length]
+    x: Floats  # grid points, evenly between the ends, in a gap without them [length]
 
 
 def stretches(scan: Scan) -> list[Stretch]:

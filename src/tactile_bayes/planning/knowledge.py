@@ -29,11 +29,8 @@ __all__ = ["COARSE", "STEP", "Base", "Knowledge", "known_from_posterior", "known
 
 Base = tuple[float, float]
 
-STEP = float(np.radians(2.0))
-"""Step of the drive if a rotation has no grid of its own [rad]."""
-
-COARSE = float(np.radians(5.0))
-"""Step of the drive for records of which only the events are used [rad]."""
+STEP = float(np.radians(2.0))  # step of the drive if a rotation has no grid of its own [rad]
+COARSE = float(np.radians(5.0))  # step of the drive for records of which only the events are used [rad]
 
 
 @dataclass(frozen=True, eq=False)

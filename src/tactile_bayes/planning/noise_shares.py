@@ -21,9 +21,7 @@ from tactile_bayes.record import carried_sweeps, travels_of
 
 __all__ = ["noise_shares"]
 
-_STATES = 15
-"""Default number of states in each sweep."""
-
+_STATES = 15  # default number of states in each sweep
 _ERRORS = ("along", "across")
 
 

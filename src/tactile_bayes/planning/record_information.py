@@ -27,28 +27,26 @@ __all__ = [
     "scaled_cell",
 ]
 
+# Steps of finite differences, over the scale of each parameter: of exact loads, and of interpolated ones.
 STEP, COARSE_STEP = 1e-5, 1e-3
-"""Steps of finite differences, over the scale of each parameter: of exact loads, and of interpolated ones."""
 
 
 class ReadingSlopes(NamedTuple):
     """Loads of a record without noise, and their derivatives, dimensionless."""
 
-    loads: Floats
-    """Loads, shape (samples, 3)."""
+    loads: Floats  # loads, shape (samples, 3)
+    # Derivatives of the readings by the parameters of contour and rig, shape (samples, 3, parameters).
     by_parameters: Floats
-    """Derivatives of the readings by the parameters of contour and rig, shape (samples, 3, parameters)."""
+    # Derivatives of the readings by the drive angle, shape (samples, 3); zero if the encoder makes no errors.
     by_angle: Floats
-    """Derivatives of the readings by the drive angle, shape (samples, 3); zero if the encoder makes no errors."""
 
 
 class RecordInformation(NamedTuple):
     """Expected information of a record, to first order."""
 
+    # Derivatives of independent readings of unit variance by the parameters, shape (samples, channels, d).
     slopes: Floats
-    """Derivatives of independent readings of unit variance by the parameters, shape (samples, channels, d)."""
-    of_noise: Floats
-    """Information about the parameters of the noise, shape (d,); zero for the others."""
+    of_noise: Floats  # information about the parameters of the noise, shape (d,); zero for the others
 
     @property
     def matrix(self) -> Floats:

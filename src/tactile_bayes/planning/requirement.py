@@ -34,11 +34,8 @@ __all__ = ["Where", "required_noise", "required_rod"]
 
 Where = Literal["gap", "touched", "everywhere"]
 
-_LEAST_TOUCHED = 0.5
-"""Least share of the grid points of the plan's own rod that another rod must touch."""
-
-_LEAST, _MOST = 1e-6, 1e4
-"""Range of factors on the noise in which the required one is sought."""
+_LEAST_TOUCHED = 0.5  # least share of the grid points of the plan's own rod that another rod must touch
+_LEAST, _MOST = 1e-6, 1e4  # range of factors on the noise in which the required one is sought
 
 
 class _Band:

@@ -30,8 +30,7 @@ __all__ = ["PARTS", "sensitivity"]
 
 PARTS = ("amplification", "information", "noise_shares", "required_noise")
 
-_WIDTHS = (0.0005, 0.001, 0.0025, 0.005, 0.01)
-"""Default widths of bands [rod lengths]."""
+_WIDTHS = (0.0005, 0.001, 0.0025, 0.005, 0.01)  # default widths of bands [rod lengths]
 
 
 def sensitivity(

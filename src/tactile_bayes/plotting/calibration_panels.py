@@ -21,20 +21,12 @@ __all__ = ["calibration_ranks", "coverage"]
 
 _MOST_COLUMNS = 4
 _BAND = 0.95
-_ROOM = 1.55
-"""Limits of the panels over the largest value drawn, with room for text above and below."""
-
-_LETTERS = 82
-"""Letters in a line of the heading."""
-
-_FEWEST = 2
-"""Number of replicates below which a claim is left out."""
-
-_LETTERS_PER_INCH = 10.0
-"""Letters per inch in the note on claims that are left out."""
-
+_ROOM = 1.55  # limits of the panels over the largest value drawn, with room for text above and below
+_LETTERS = 82  # letters in a line of the heading
+_FEWEST = 2  # number of replicates below which a claim is left out
+_LETTERS_PER_INCH = 10.0  # letters per inch in the note on claims that are left out
+# Colour of a line, by the label of its panel.
 _COLOURS = {"": PALETTE["median"], "leaves the band": "#E69F00", "not uniform": "#D55E00"}
-"""Colour of a line, by the label of its panel."""
 
 
 class _Ranks(NamedTuple):

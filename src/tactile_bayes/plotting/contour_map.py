@@ -25,12 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["band_detail", "contour", "gap"]
 
-_MARGIN = 0.12
-"""Margin beside the gap, as a share of its width."""
-
-_ROOM = 0.12
-"""Margin above and below the curves, as a share of their height."""
-
+_MARGIN = 0.12  # margin beside the gap, as a share of its width
+_ROOM = 0.12  # margin above and below the curves, as a share of their height
 _ENDS: dict[str, Any] = {
     "color": "black",
     "marker": "o",

@@ -20,15 +20,9 @@ if TYPE_CHECKING:
 
 __all__ = ["design"]
 
-_HEIGHTS_OF_A_MAP = 3
-"""Smallest number of rows and columns of pivots that is drawn as a map, not as lines."""
-
-_ROW_WIDTH = 44
-"""Largest number of characters in a line of a candidate's words."""
-
-_HIGHEST, _ROOM = 7.0, 0.1
-"""Largest height of a map's figure, and the margin in it [inches]."""
-
+_HEIGHTS_OF_A_MAP = 3  # smallest number of rows and columns of pivots that is drawn as a map, not as lines
+_ROW_WIDTH = 44  # largest number of characters in a line of a candidate's words
+_HIGHEST, _ROOM = 7.0, 0.1  # largest height of a map's figure, and the margin in it [inches]
 _KINDS = {
     "band": ("width", "expected width of the band", True),
     "gap": ("gap", "width that no sweep touches", True),
@@ -179,8 +173,7 @@ class _Grid(NamedTuple):
 
     x: Floats
     y: Floats
-    values: Floats
-    """Shape (rows, columns); NaN without a candidate or without an expected value."""
+    values: Floats  # shape (rows, columns); NaN without a candidate or without an expected value
     drive_step: float
     has_other_steps: bool
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["DriveAxis", "drive_axis"]
 
+# Widths [degrees] between which an axis of angles has ticks at multiples of 15° or 30°.
 _SHORTEST, _LONGEST = 60.0, 400.0
-"""Widths [degrees] between which an axis of angles has ticks at multiples of 15° or 30°."""
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,7 @@ Quantity = Literal["across", "along", "touched", "gap"]
 
 _MARKS: list[dict[str, Any]] = [{"marker": mark, "markersize": 5.0} for mark in "osD^vP*X<>"]
 _MOST_TICKS = 8
-_MOST_IN_LINE = 6
-"""Largest number of legend entries in a row."""
-
+_MOST_IN_LINE = 6  # largest number of legend entries in a row
 _BANDS = {"touched": "where it is touched", "gap": "in the gap"}
 
 

@@ -18,18 +18,11 @@ if TYPE_CHECKING:
 
 __all__ = ["families"]
 
+# Marker, distance from the bar's middle, and label.
 _WIDTHS = {0.5: ("v", -0.26, "priors half as wide"), 2.0: ("^", 0.26, "priors twice as wide")}
-"""Marker, distance from the bar's middle, and label."""
-
-_LITTLE = 4.0
-"""Difference of elpd below which it is inconclusive."""
-
-_FAR = -100.0
-"""Difference beyond which the axis is logarithmic."""
-
-_LEGEND_BELOW = 34.0
-"""Distance of the legend from the panel, with room for ticks and label [points]."""
-
+_LITTLE = 4.0  # difference of elpd below which it is inconclusive
+_FAR = -100.0  # difference beyond which the axis is logarithmic
+_LEGEND_BELOW = 34.0  # distance of the legend from the panel, with room for ticks and label [points]
 _WARNING = "#D55E00"
 _DOTS: dict[str, Any] = {"linestyle": "none", "markersize": 5.0, "zorder": 3}
 

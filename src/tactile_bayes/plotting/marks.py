@@ -7,6 +7,7 @@ from typing import Any
 
 __all__ = ["BASES", "BEST", "CONTACT_MARKERS", "PALETTE", "PHASES", "SWEEP_LINES", "SWEEP_MARKERS", "TRUTH"]
 
+# Colours after Okabe and Ito, distinguishable with any colour vision.
 PALETTE: Mapping[str, str] = {
     "tip": "#0072B2",
     "tangential": "#D55E00",
@@ -18,19 +19,15 @@ PALETTE: Mapping[str, str] = {
     "median": "#0072B2",
     "gap": "#F0E442",
 }
-"""Colours after Okabe and Ito, distinguishable with any colour vision."""
-
+# Colours of bases in their order, after Okabe and Ito, without the gap's; the seventh base has the first again.
 BASES = ("#0072B2", "#E69F00", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
-"""Colours of bases in their order, after Okabe and Ito, without the gap's; the seventh base has the first again."""
-
+# The mark on the best of several choices.
 BEST: Mapping[str, Any] = {"marker": "*", "color": "#D55E00", "markeredgecolor": "white", "linestyle": "none"}
-"""The mark on the best of several choices."""
-
 SWEEP_LINES: Mapping[str, str] = {"forward": "-", "backward": "--"}
 SWEEP_MARKERS: Mapping[str, str] = {"forward": "o", "backward": "^"}
 
 PHASES = {"tip": "tip contact", "tangential": "tangential contact"}
 CONTACT_MARKERS = {"tip": "o", "tangential": "s", "none": "o"}
 
+# The line of the true contour.
 TRUTH: Mapping[str, Any] = {"color": PALETTE["change"], "linewidth": 1.0, "linestyle": "--"}
-"""The line of the true contour."""

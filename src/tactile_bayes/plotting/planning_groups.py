@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["check_among", "group_of", "set_log_scale"]
 
+# Ticks in a decade of a logarithmic axis, by the largest number of decades.
 _TICKS = {0.9: (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0), 2.2: (1.0, 2.0, 5.0), np.inf: (1.0,)}
-"""Ticks in a decade of a logarithmic axis, by the largest number of decades."""
 
 
 def group_of(found: Any, name: str, variables: set[str]) -> xr.Dataset:

@@ -181,8 +181,7 @@ class _Parameter(NamedTuple):
     name: str
     label: str
     unit: str
-    draws: Floats
-    """Shape (chains, draws)."""
+    draws: Floats  # shape (chains, draws)
 
 
 def _parameters(posterior: xr.DataTree | xr.Dataset, names: Sequence[str] | None) -> list[_Parameter]:

@@ -23,21 +23,11 @@ if TYPE_CHECKING:
 
 __all__ = ["posterior_contours", "prior_contours"]
 
-_ROOM = 0.06
-"""Margin of the map beside the rod's reach [rod lengths]."""
-
-_BELOW = 0.2
-"""Smallest extent of the map below the pivot [rod lengths]."""
-
-_DRAWS = 400
-"""Number of draws for the posterior's median."""
-
-_THIN = 0.6
-"""Width of a contour's line [points]."""
-
-_PRIOR = "#E69F00"
-"""Colour of the prior below the posterior."""
-
+_ROOM = 0.06  # margin of the map beside the rod's reach [rod lengths]
+_BELOW = 0.2  # smallest extent of the map below the pivot [rod lengths]
+_DRAWS = 400  # number of draws for the posterior's median
+_THIN = 0.6  # width of a contour's line [points]
+_PRIOR = "#E69F00"  # colour of the prior below the posterior
 _COUNT = "give a whole number from 1 up, like 40"
 _DASHED: dict[str, Any] = {"linestyle": (0, (6.0, 3.0)), "linewidth": 1.0}
 

@@ -24,16 +24,11 @@ if TYPE_CHECKING:
 
 __all__ = ["observables", "predictive"]
 
+# Colours of residuals of two overlapping sweeps, after Okabe and Ito.
 _SWEEPS = {"forward": "#0072B2", "backward": "#B34700"}
-"""Colours of residuals of two overlapping sweeps, after Okabe and Ito."""
-
 _ENDS = ("lower", "upper")
-_ALONG = "along_drive"
-"""Variable with the coordinate of a sample in the figure."""
-
-_FARTHEST = 8.0
-"""Largest residual within a panel's limits: a single outlier must not flatten all others."""
-
+_ALONG = "along_drive"  # variable with the coordinate of a sample in the figure
+_FARTHEST = 8.0  # largest residual within a panel's limits: a single outlier must not flatten all others
 _TURNING_LABELS = {
     **LABELS,
     "force_x": r"axial force $f_{\mathrm{A}\parallel}$",

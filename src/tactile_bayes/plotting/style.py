@@ -17,12 +17,9 @@ __all__ = ["COLUMN_WIDTH", "PAGE_WIDTH", "STYLES", "Style", "own_style", "save_f
 
 Style = Literal["print", "screen"]
 
-COLUMN_WIDTH = 3.5
-"""Width of a figure that fills one column of a journal [inches]."""
-
+COLUMN_WIDTH = 3.5  # width of a figure that fills one column of a journal [inches]
+# Width of a figure that fills both columns, or a page [inches]; the default of all functions of `plotting`.
 PAGE_WIDTH = 7.0
-"""Width of a figure that fills both columns, or a page [inches]; the default of all functions of `plotting`."""
-
 _COMMON: Mapping[str, Any] = {
     "font.family": ["sans-serif"],
     "font.sans-serif": ["DejaVu Sans"],
@@ -36,8 +33,7 @@ _COMMON: Mapping[str, Any] = {
     "savefig.facecolor": "white",
 }
 
-_TICKS = {"major.width": 0.6, "minor.width": 0.4, "major.size": 3.0, "minor.size": 1.8}
-"""Ticks of both axes, in print."""
+_TICKS = {"major.width": 0.6, "minor.width": 0.4, "major.size": 3.0, "minor.size": 1.8}  # ticks of both axes, in print
 
 
 def _letters(size: float, at_ticks: float) -> dict[str, float]:
@@ -45,6 +41,7 @@ def _letters(size: float, at_ticks: float) -> dict[str, float]:
     return dict.fromkeys(names, size) | dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), at_ticks)
 
 
+# Settings of matplotlib by the name of the style.
 STYLES: Mapping[Style, Mapping[str, Any]] = {
     "print": {
         **_COMMON,
@@ -60,7 +57,6 @@ STYLES: Mapping[Style, Mapping[str, Any]] = {
     },
     "screen": {**_COMMON, **_letters(10.0, 9.0), "axes.linewidth": 0.8, "hatch.linewidth": 0.8, "savefig.dpi": 150.0},
 }
-"""Settings of matplotlib by the name of the style."""
 
 
 @contextmanager

@@ -27,8 +27,8 @@ EVENT_MARKERS: Mapping[str, Mapping[str, Any]] = {
     "snap-off": {"marker": "X", "markersize": 7.0, "markeredgecolor": "white"},
     "release": {"marker": "v", "markersize": 7.0, "markeredgecolor": "white"},
 }
+# Labels of the end of contact other than by a snap-off, by its kind.
 ENDINGS: Mapping[str, str] = {"release": "release", "never": "end of the drive"}
-"""Labels of the end of contact other than by a snap-off, by its kind."""
 
 
 def reading_style(direction: str, colour: str) -> dict[str, Any]:

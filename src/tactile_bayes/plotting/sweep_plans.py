@@ -41,11 +41,9 @@ _VARIABLES = {
 }
 _STYLES = {"along": "-", "across": "--"}
 
+# Distance from first contact and snap-off, over the sweep's length, beyond which all errors are within the limits.
 _CLOSEST = 0.004
-"""Distance from first contact and snap-off, over the sweep's length, beyond which all errors are within the limits."""
-
-_STRIP = 0.035
-"""Height of the strips below the curves, over that of the Axes."""
+_STRIP = 0.035  # height of the strips below the curves, over that of the Axes
 
 
 def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes | None = None) -> Axes:

@@ -28,11 +28,8 @@ _DETAILS = "abc"
 _ON_MAP = 18
 _ALONG, _ACROSS = "#009E73", "#CC79A7"
 _IMPLIED = "#000000"
-_HIGHEST = 0.9
-"""Largest height of the map over that of each row below it."""
-
-_PANEL = 0.25
-"""Height of a row below the map over the width of the figure."""
+_HIGHEST = 0.9  # largest height of the map over that of each row below it
+_PANEL = 0.25  # height of a row below the map over the width of the figure
 
 
 def tightening(

@@ -27,15 +27,13 @@ if TYPE_CHECKING:
 
 __all__ = ["touched"]
 
+# Distance [L] below which contacts coincide: at a fold, rounding leaves a contact half of its digits.
 _SAME_PLACE = 1e-7
-"""Distance [L] below which contacts coincide: at a fold, rounding leaves a contact half of its digits."""
-
+# Line styles: the first for as many bases as there are colours, the next for as many further bases, and so on.
 _STYLES: tuple[Any, ...] = ("solid", (0, (3.0, 1.0)), (0, (1.0, 0.5)))
-"""Line styles: the first for as many bases as there are colours, the next for as many further bases, and so on."""
-
 _ARC_WIDTH = 3.0
+# Distance [points] of the arcs of a base below those of the base before: side by side up to slopes of 45°.
 _OFFSET = np.sqrt(2.0) * _ARC_WIDTH
-"""Distance [points] of the arcs of a base below those of the base before: side by side up to slopes of 45°."""
 
 
 def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:

@@ -20,9 +20,7 @@ _QUANTITY = re.compile(
 _KNOWN = (*ATTRIBUTE_UNITS, "load_cell_frame")
 _PREFIXES = {"rod_": "rod", "load_cell_": "load cell"}
 
-USED = frozenset((*_KNOWN, "units", "units_source"))
-"""Attributes of a record that have a meaning."""
-
+USED = frozenset((*_KNOWN, "units", "units_source"))  # attributes of a record that have a meaning
 _STRAY = re.compile(r'"?(?P<key>[^:=;,\t"]{1,80})"?\s*[:=;,\t]\s*(?P<value>.*)', re.DOTALL)
 _WORDS = re.compile(r"(?P<key>\w+_\w+)\s+(?P<value>\S.*)", re.DOTALL)
 

@@ -17,6 +17,7 @@ from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, UNITS, Frame
 from tactile_bayes.record.storable import not_storable
 from tactile_bayes.record.table import Source
 
+# Properties by which a rod differs from a straight, uniform one.
 _SHAPE = (
     "rest_curvature",
     "taper",
@@ -26,11 +27,8 @@ _SHAPE = (
     "rest_shape_modes",
     "taper_deviation",
 )
-"""Properties by which a rod differs from a straight, uniform one."""
-
+# Points at which properties along rods are compared, and the difference over the largest value that counts as zero.
 _POINTS, _SAME = 101, 1e-9
-"""Points at which properties along rods are compared, and the difference over the largest value that counts as zero."""
-
 _SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_lever_", "_curve_", "_offset", "_backlash")
 
 __all__ = [

@@ -19,23 +19,15 @@ from tactile_bayes.record.table import Cells, Source, Table
 
 __all__ = ["is_bag", "read_bag_table"]
 
-_BAGS = (".mcap", ".bag", ".db3")
-"""Suffixes of bags."""
-
+_BAGS = (".mcap", ".bag", ".db3")  # suffixes of bags
+# Columns that are interpolated in time: a drive moves smoothly, and its encoder hardly scatters.
 _SMOOTH = ("drive_angle", "base_x", "base_y")
-"""Columns that are interpolated in time: a drive moves smoothly, and its encoder hardly scatters."""
-
+# Largest time from a message to the next one of its field, over the usual one, within which samples are kept.
 _INTERVALS = 5.0
-"""Largest time from a message to the next one of its field, over the usual one, within which samples are kept."""
-
-_ROUNDING = 1e-6
-"""Relative excess of the range of an angle over a turn, in which it stays all the same."""
-
-_MOST_NAMED = 5
-"""Largest number of names of joints in a message."""
-
+_ROUNDING = 1e-6  # relative excess of the range of an angle over a turn, in which it stays all the same
+_MOST_NAMED = 5  # largest number of names of joints in a message
+# Largest difference between the delays of two topics, from header to reception, if their clocks are the same [ns].
 _DELAY = 10 * 10**9
-"""Largest difference between the delays of two topics, from header to reception, if their clocks are the same [ns]."""
 
 
 def is_bag(path: Path) -> bool:
@@ -87,12 +79,10 @@ class _Column(NamedTuple):
     """A field of a topic from which columns of the record come."""
 
     topic: str
-    inner: str
-    """Name within a message."""
+    inner: str  # name within a message
     field: Field
     targets: tuple[str, ...]
-    turn: float | None
-    """A turn in the unit of the field, if it is an angle."""
+    turn: float | None  # a turn in the unit of the field, if it is an angle
 
     def series(self, times: Index) -> tuple[Index, NDArray[Any]]:
         """Return times and values in ascending order, each once; refuse times that go back or have two values."""

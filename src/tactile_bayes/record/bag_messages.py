@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Field", "Topic", "example", "messages_of", "opened_bag"]
 
-_LONGEST = 64
-"""Largest number of elements of an array that are columns."""
+_LONGEST = 64  # largest number of elements of an array that are columns
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,7 @@ from tactile_bayes.record.validation import checked_record
 
 __all__ = ["completed_record", "table_of_columns"]
 
-_FRAME = "the DataFrame"
-"""Name of a table of pandas in messages."""
+_FRAME = "the DataFrame"  # name of a table of pandas in messages
 
 
 def table_of_columns(columns: Mapping[str, Any] | pd.DataFrame, attrs: Mapping[str, Any] | None) -> Table:

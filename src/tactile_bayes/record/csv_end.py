@@ -15,18 +15,11 @@ from tactile_bayes.record.csv_header import Header, cells_in
 
 __all__ = ["without_cut_row"]
 
-_TAIL = 1 << 16
-"""Bytes of the end of a file in which rows are compared with the last one."""
-
+_TAIL = 1 << 16  # bytes of the end of a file in which rows are compared with the last one
+# Largest number of rows that are compared; smallest numbers for a comparison of values, and of notations.
 _COMPARED, _FEWEST, _ENOUGH = 50, 3, 10
-"""Largest number of rows that are compared; smallest numbers for a comparison of values, and of notations."""
-
-_WIDTHS = 8.0
-"""Usual steps from row to row by which a cut number is off."""
-
-_INTEGER = (None, None)
-"""Notation of a number without decimals and exponent, which is the same if digits are cut off."""
-
+_WIDTHS = 8.0  # usual steps from row to row by which a cut number is off
+_INTEGER = (None, None)  # notation of a number without decimals and exponent, which is the same if digits are cut off
 _NOTATION = re.compile(r"[+-]?[0-9]*(?:[.,](?P<decimals>[0-9]*))?(?:[eE][+-]?(?P<power>[0-9]*))?")
 
 

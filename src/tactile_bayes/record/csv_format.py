@@ -36,9 +36,7 @@ from tactile_bayes.tasks import write_atomically
 
 __all__ = ["read_csv", "read_csv_content", "write_csv"]
 
-_ROWS = 20_000
-"""Number of samples that are written at once."""
-
+_ROWS = 20_000  # number of samples that are written at once
 _BRACKETS = re.compile(r"\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)")
 
 

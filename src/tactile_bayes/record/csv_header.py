@@ -35,9 +35,7 @@ __all__ = [
 FORMAT = 1
 KINDS = {"i": "integer", "f": "number", "U": "text", "O": "text"}
 _DELIMITERS = ",;\t"
-_SEARCHED, _LONGEST = 50, 100_000
-"""Number of lines, and of bytes of each, that are inspected ahead of reading."""
-
+_SEARCHED, _LONGEST = 50, 100_000  # number of lines, and of bytes of each, that are inspected ahead of reading
 _NAME = r"[\w.\-]+"
 _QUOTED = r'"(?:[^"\\]|\\.)*"'
 _UNIT = r'(?!\s)[^\]"]*(?<!\s)'

@@ -23,16 +23,14 @@ from tactile_bayes.record.table import Source
 
 __all__ = ["Layout", "read_rows"]
 
+# Bytes that are read at once: first a small chunk, from which the kinds of columns are inferred.
 _FIRST, _CHUNK = 1 << 16, 1 << 21
-"""Bytes that are read at once: first a small chunk, from which the kinds of columns are inferred."""
-
+# Last cell of each line for the fast reader, which shows whether cells are in the right columns.
 _MARK = 5_790_842_613_117
-"""Last cell of each line for the fast reader, which shows whether cells are in the right columns."""
-
+# Options for rounding to the nearest double, the only behaviour since pandas 3.1.
 _ROUNDING: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 )
-"""Options for rounding to the nearest double, the only behaviour since pandas 3.1."""
 
 
 @dataclass

@@ -15,14 +15,10 @@ __all__ = ["curves_in"]
 
 _CURVES = "LINE LWPOLYLINE POLYLINE ARC CIRCLE ELLIPSE SPLINE"
 
+# Size of a unit of the drawing, by its number in $INSUNITS; 0 is none.
 _METRES = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}
-"""Size of a unit of the drawing, by its number in $INSUNITS; 0 is none."""
-
-_COARSENESS = 1e-5
-"""Largest distance of a curve from its segments, as a share of its size."""
-
-_BEZIERS = 64
-"""Number of Bézier curves for an arc, which then is off by 1e-9 of its radius; a single one by 3e-4."""
+_COARSENESS = 1e-5  # largest distance of a curve from its segments, as a share of its size
+_BEZIERS = 64  # number of Bézier curves for an arc, which then is off by 1e-9 of its radius; a single one by 3e-4
 
 
 def curves_in(path: Path) -> tuple[list[Floats], float]:

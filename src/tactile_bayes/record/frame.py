@@ -18,14 +18,14 @@ from tactile_bayes.record.validation import validate
 
 __all__ = ["frame_of", "in_frame", "to_fixed_axes", "turned"]
 
+# Entries of a load cell's data sheet that are valid only along its own axes; with errors of the encoder the angle
+# between the frames is not known.
 _BOUND = {name for name in LOAD_CELL_UNITS if "force" in name or name.startswith("drive_angle")} - {"force_noise"} | {
     "degrees_of_freedom",
     "relative_noise",
     "lever_x",
     "lever_y",
 }
-"""Entries of a load cell's data sheet that are valid only along its own axes; with errors of the encoder the angle
-between the frames is not known."""
 
 
 def frame_of(record: xr.Dataset) -> Frame:

@@ -27,8 +27,7 @@ Content = TypeVar("Content", xr.Dataset, xr.DataTree)
 _SEAL = b"\ntactile_bayes: SHA-256 of all bytes before this line "
 _SEAL_BYTES = len(_SEAL) + 64 + 1
 
-_SUPERBLOCK = 48
-"""Number of first bytes of an HDF5 file that contain the number of all its bytes."""
+_SUPERBLOCK = 48  # number of first bytes of an HDF5 file that contain the number of all its bytes
 
 
 def write_netcdf(

@@ -32,28 +32,18 @@ __all__ = [
     "time_limit",
 ]
 
-_DEPTH, _OBJECTS = 32, 10_000
-"""Largest depth of groups, and number of groups and variables."""
-
-_LARGEST, _RATIO = 1 << 28, 8
-"""Content [bytes] that any file may have, and that of a larger one in its own sizes."""
-
-_FILTERS = (1, 2, 3, 4, 5, 6, 32000)
-"""Filters that come with HDF5 and h5py; others are in plugins, which are programs."""
-
+_DEPTH, _OBJECTS = 32, 10_000  # largest depth of groups, and number of groups and variables
+_LARGEST, _RATIO = 1 << 28, 8  # content [bytes] that any file may have, and that of a larger one in its own sizes
+_FILTERS = (1, 2, 3, 4, 5, 6, 32000)  # filters that come with HDF5 and h5py; others are in plugins, which are programs
 _PLAIN = (h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING, h5py.h5t.ENUM)
 
+# Attributes of references, by which variables have their dimensions.
 _OF_DIMENSIONS = ("DIMENSION_LIST", "REFERENCE_LIST")
-"""Attributes of references, by which variables have their dimensions."""
-
+# Part of the attribute NAME of a dimension that is no variable.
 _NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable."
-"""Part of the attribute NAME of a dimension that is no variable."""
-
+# Time of the processor [s], bytes that are read in each second more, and the whole time over that of the processor.
 _SECONDS, _RATE, _PATIENCE = 5, 10_000_000, 12
-"""Time of the processor [s], bytes that are read in each second more, and the whole time over that of the processor."""
-
-_WORKSPACE = 1 << 28
-"""Memory for reading, besides file and content [bytes]."""
+_WORKSPACE = 1 << 28  # memory for reading, besides file and content [bytes]
 
 
 class UnsafeError(ValueError):
@@ -63,8 +53,8 @@ class UnsafeError(ValueError):
 class Group(NamedTuple):
     """A group of a file."""
 
+    # Dimensions, values as stored, and attributes, by name.
     variables: Mapping[str, tuple[tuple[str, ...], NDArray[Any], Mapping[str, Any]]]
-    """Dimensions, values as stored, and attributes, by name."""
     attrs: Mapping[str, Any]
 
 

@@ -34,13 +34,10 @@ __all__ = [
     "with_origin",
 ]
 
+# Name of the origin of a column as text: an attribute of tables and results, and an encoding of a record, which is not
+# written with it.
 ORIGIN = "origin_in_file"
-"""Name of the origin of a column as text: an attribute of tables and results, and an encoding of a record, which is not
-written with it."""
-
-CONSTANTS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
-"""Columns for which a single value can be given."""
-
+CONSTANTS = ("sweep", "direction", "base_x", "base_y", "drive_angle")  # columns for which a single value can be given
 _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _LEAD = re.compile(rf"(?:(?P<offset>[+-]?{_NUMBER})\s*)?(?P<sign>[+-])\s*+(?P<rest>.+)")
 _FACTOR = re.compile(rf"(?P<factor>{_NUMBER})\s*\*\s*+(?P<rest>.+)")

@@ -15,8 +15,7 @@ from tactile_bayes.record.table import Source
 
 __all__ = ["FREE", "parsed_column", "text_array"]
 
-FREE = 1 << 26
-"""Bytes that a column of text may always take."""
+FREE = 1 << 26  # bytes that a column of text may always take
 
 
 def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[Any]:

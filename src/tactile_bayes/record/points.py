@@ -27,10 +27,9 @@ _CALLED = {"m": "a unit of length", "1": "rod lengths"}
 class Points(NamedTuple):
     """Points of a file."""
 
+    # Shape (n, 2) each, or (n, 3) with a column beside x and y, in their order, in metres if a unit is stated.
     pieces: list[Floats]
-    """Shape (n, 2) each, or (n, 3) with a column beside x and y, in their order, in metres if a unit is stated."""
-    unit: str
-    """"m", "1" for rod lengths, or "" if the file states none."""
+    unit: str  # "m", "1" for rod lengths, or "" if the file states none
 
     def in_unit(self, unit: str, name: str) -> list[Floats]:
         """Return the pieces in "m" or "1", as which numbers without a unit are taken; the name is for the message."""

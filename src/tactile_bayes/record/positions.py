@@ -8,17 +8,13 @@ from tactile_bayes.arrays import Floats, Index
 
 __all__ = ["end_of_rest", "means_of_positions", "positions_of"]
 
-_APART = 1.5
-"""Least ratio of the smallest step between positions to the largest difference of readings at one position."""
-
+_APART = 1.5  # least ratio of the smallest step between positions to the largest difference of readings at one position
 _FEWEST_STEPS = 3
 
-_MOST_POSITIONS = 2.0 / 3.0
-"""Largest number of steps between positions, over the number of all steps."""
-
+_MOST_POSITIONS = 2.0 / 3.0  # largest number of steps between positions, over the number of all steps
+# Largest net motion at positions over the way between them; share of their differences that it may make up; and largest
+# sum of these differences, over the way between positions, for which it may make up more.
 _DRIFT, _ONE_SIDED, _CREEP = 0.3, 0.5, 0.03
-"""Largest net motion at positions over the way between them; share of their differences that it may make up; and
-largest sum of these differences, over the way between positions, for which it may make up more."""
 
 
 def positions_of(travel: Floats) -> Index:

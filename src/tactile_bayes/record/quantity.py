@@ -16,9 +16,7 @@ from tactile_bayes.record.spelling import plain
 
 __all__ = ["OTHER_UNITS", "Unit", "accepted_units", "converted", "unit_of", "units_disagree"]
 
-Dimension = tuple[int, int, int, int]
-"""Powers of length, force, time and angle."""
-
+Dimension = tuple[int, int, int, int]  # powers of length, force, time and angle
 _PREFIXES = {
     "": Fraction(1),
     "da": Fraction(10),
@@ -67,9 +65,8 @@ _COMMON = {
     (0, 0, 0, 1): ("rad", "mrad", "deg", "°"),
 }
 _LONGEST = 100
-_LARGEST = 10**100
-"""Largest number of characters of a unit, and its largest size in SI."""
-
+_LARGEST = 10**100  # largest number of characters of a unit, and its largest size in SI
+# Units that are often stated with a column, and are none of its quantity, or not known here.
 OTHER_UNITS = frozenset(
     (
         *("kg", "mg", "lb", "lbs", "lbf", "kgf", "kp", "oz", "ozf", "dyn", "dyne", "inch", "inches", "ft"),
@@ -77,8 +74,6 @@ OTHER_UNITS = frozenset(
         *("count", "counts", "digits", "LSB", "turns", "rev", "%", "gon", "grad"),
     )
 )
-"""Units that are often stated with a column, and are none of its quantity, or not known here."""
-
 _SYMBOL = re.compile(
     rf"(?P<prefix>{'|'.join(sorted(_PREFIXES, key=len, reverse=True))})"
     rf"(?P<base>{'|'.join(sorted(_BASES, key=len, reverse=True))})"

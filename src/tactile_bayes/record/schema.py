@@ -41,8 +41,8 @@ Frame = Literal["fixed", "turning"]
 Kind = Literal["integer", "number", "text"]
 Scale = Literal["length_unit", "moment_unit", "force_unit"]
 
+# Largest drive angle of a record in radians: a turn, and what the zero of an encoder may be off by.
 LARGEST_DRIVE_ANGLE = 2.0 * math.pi + 0.5
-"""Largest drive angle of a record in radians: a turn, and what the zero of an encoder may be off by."""
 
 
 @dataclass(frozen=True)
@@ -69,15 +69,13 @@ class Column:
         return self.turning_name if frame == "turning" and self.turning_name else self.long_name
 
 
+# Channels of the load cell, in the order of every array with a channel axis.
 CHANNELS = ("holding_moment", "force_x", "force_y")
-"""Channels of the load cell, in the order of every array with a channel axis."""
-
+# Columns of a record; all others are further columns.
 MEASURED = ("sweep", "direction", "base_x", "base_y", "drive_angle", *CHANNELS)
-"""Columns of a record; all others are further columns."""
-
+# Columns that a table must have to be a record (a channel may be empty); base_x and base_y are 0 by default.
 REQUIRED = ("sweep", "direction", "drive_angle", *CHANNELS)
-"""Columns that a table must have to be a record (a channel may be empty); base_x and base_y are 0 by default."""
-
+# All columns with a known meaning; the prefix `truth_` means the same quantity without error.
 COLUMNS: Mapping[str, Column] = MappingProxyType(
     {
         column.name: column
@@ -99,20 +97,15 @@ COLUMNS: Mapping[str, Column] = MappingProxyType(
         )
     }
 )
-"""All columns with a known meaning; the prefix `truth_` means the same quantity without error."""
-
-DIRECTIONS = ("forward", "backward")
-"""Senses of the drive: increasing and decreasing drive angles."""
-
+DIRECTIONS = ("forward", "backward")  # senses of the drive: increasing and decreasing drive angles
+# Values of the attribute `load_cell_frame` of a record: force_x and force_y along the axes x and y of the laboratory,
+# or along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0).
 FRAMES: tuple[Frame, Frame] = ("fixed", "turning")
-"""Values of the attribute `load_cell_frame` of a record: force_x and force_y along the axes x and y of the laboratory,
-or along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0)."""
-
-UNITS = ("SI", "dimensionless")
-"""Values of the attribute `units` of a record."""
-
+UNITS = ("SI", "dimensionless")  # values of the attribute `units` of a record
 _GAIN_UNITS = {("N", "N m"): "1/m", ("N m", "N"): "m"}
 
+# Quantities in a load cell's data sheet, with their units in SI; `LoadCell` describes them. As attributes of a record
+# their names begin with "load_cell_".
 LOAD_CELL_UNITS: Mapping[str, str] = MappingProxyType(
     {
         "force_noise": "N",
@@ -145,9 +138,7 @@ LOAD_CELL_UNITS: Mapping[str, str] = MappingProxyType(
         "drive_angle_resolution": "rad",
     }
 )
-"""Quantities in a load cell's data sheet, with their units in SI; `LoadCell` describes them. As attributes of a record
-their names begin with "load_cell_"."""
-
+# Attributes that are quantities, with their units in an SI record.
 ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
     {
         "rod_length": "m",
@@ -163,7 +154,6 @@ ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
         **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
     }
 )
-"""Attributes that are quantities, with their units in an SI record."""
 
 
 def column_of(name: str) -> Column | None:

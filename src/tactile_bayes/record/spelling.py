@@ -11,6 +11,7 @@ from tactile_bayes.errors import ParameterError
 
 __all__ = ["is_misspelling", "look_alikes", "nearest", "plain", "plain_number", "refuse_unknown_keys", "visible"]
 
+# What characters stand for; beside them are those of full width, and digits of any script.
 _STAND_FOR = {
     **dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2015\u2212\ufe63\uff0d", "-"),
     **dict.fromkeys("\u00ba\u02da\u2218", "°"),
@@ -21,17 +22,11 @@ _STAND_FOR = {
     "\u066b": ".",
     "\u00b5": "μ",
 }
-"""What characters stand for; beside them are those of full width, and digits of any script."""
-
 _FULL_WIDTH, _TO_ASCII = range(0xFF01, 0xFF5F), 0xFEE0
+# Separators of thousands that are used for nothing else; a blank or a comma may separate columns.
 _THOUSANDS = re.compile(r"(?<=[0-9])[\u00a0\u2007\u2009\u202f\u066c\u2019](?=[0-9]{3}(?![0-9]))")
-"""Separators of thousands that are used for nothing else; a blank or a comma may separate columns."""
-
-_MOST_NAMED = 8
-"""Largest number of keys that the message about an unknown key lists."""
-
-_LONGEST = 200
-"""Largest number of characters of a name that is compared."""
+_MOST_NAMED = 8  # largest number of keys that the message about an unknown key lists
+_LONGEST = 200  # largest number of characters of a name that is compared
 
 
 def nearest(name: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | None:

@@ -7,17 +7,12 @@ from typing import Any
 
 __all__ = ["LONGEST_CELL", "is_storable", "is_storable_attribute", "not_storable", "storable"]
 
-LONGEST_CELL = 131_072
-"""Largest number of characters in a cell, that of Python's CSV reader."""
-
-_LONGEST_NAME = 200
-"""Largest number of bytes of a name; NetCDF limits it, and names derived from it, to 256."""
-
+LONGEST_CELL = 131_072  # largest number of characters in a cell, that of Python's CSV reader
+_LONGEST_NAME = 200  # largest number of bytes of a name; NetCDF limits it, and names derived from it, to 256
+# Attributes that NetCDF and HDF5 reserve.
 _RESERVED = frozenset(
     ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_nc3_strict")
 ) | {"_NCProperties"}
-"""Attributes that NetCDF and HDF5 reserve."""
-
 _NOT_STORABLE = re.compile("[\0\ud800-\udfff]")
 _WITH_UNIT = re.compile(r"(?P<stem>[^/]*\S)\s+/\s+(?P<unit>\S.*)")
 

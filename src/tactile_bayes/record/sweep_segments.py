@@ -16,20 +16,12 @@ from tactile_bayes.record.table import Source, Table
 
 __all__ = ["split_at_turns", "turning_points"]
 
-_ROUNDING = 1e-9
-"""Share of the motion that must be across the rod for a side of it to lead."""
-
-_WIDEST = 0.5
-"""Largest distance of neighbouring samples of a sweep [rad]."""
-
-_MOST = 0.5
-"""Share of the steps beyond which a base that moves is carried, and not one of several pivots."""
-
+_ROUNDING = 1e-9  # share of the motion that must be across the rod for a side of it to lead
+_WIDEST = 0.5  # largest distance of neighbouring samples of a sweep [rad]
+_MOST = 0.5  # share of the steps beyond which a base that moves is carried, and not one of several pivots
+# Angle that a drive turns about a pivot [rad], and number of samples beyond which a base between pivots is carried.
 _LEAST_TURN, _FEW = 0.05, 2
-"""Angle that a drive turns about a pivot [rad], and number of samples beyond which a base between pivots is carried."""
-
-SHARE = 0.1
-"""Least return of the drive angle after a turning point, as a share of its whole range."""
+SHARE = 0.1  # least return of the drive angle after a turning point, as a share of its whole range
 
 
 def turning_points(angle: Floats, least: float) -> list[int]:

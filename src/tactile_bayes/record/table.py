@@ -15,37 +15,25 @@ from tactile_bayes.errors import RecordError
 
 __all__ = ["Cells", "Source", "Table", "table_of"]
 
-Cells = tuple[NDArray[Any], Mapping[str, Any]]
-"""Values of a column, shape (n_samples,), and its attributes."""
-
-_LONGEST = 1500
-"""Largest number of characters of a message."""
+Cells = tuple[NDArray[Any], Mapping[str, Any]]  # values of a column, shape (n_samples,), and its attributes
+_LONGEST = 1500  # largest number of characters of a message
 
 
 @dataclass(frozen=True)
 class Source:
     """Source of a table, for the positions in messages."""
 
-    name: str = ""
-    """Name of the file; "" for columns that come from none."""
-    lines: Sequence[int] | NDArray[np.int64] | None = None
-    """First line of each sample in the file."""
-    heads: Mapping[str, int] = field(default_factory=dict)
-    """Line of the description of each column."""
-    aliases: Mapping[str, str] = field(default_factory=dict)
-    """Name of a column in the file, if it differs."""
-    names: Sequence[str] = ()
-    """Columns of the file."""
+    name: str = ""  # name of the file; "" for columns that come from none
+    lines: Sequence[int] | NDArray[np.int64] | None = None  # first line of each sample in the file
+    heads: Mapping[str, int] = field(default_factory=dict)  # line of the description of each column
+    aliases: Mapping[str, str] = field(default_factory=dict)  # name of a column in the file, if it differs
+    names: Sequence[str] = ()  # columns of the file
+    # Origins of columns, with sign and zero, in the form of `FileFormat`, without the unit.
     origins: Mapping[str, str] = field(default_factory=dict)
-    """Origins of columns, with sign and zero, in the form of `FileFormat`, without the unit."""
-    stated: Mapping[str, int] = field(default_factory=dict)
-    """Line of each attribute."""
-    units: Mapping[str, str] = field(default_factory=dict)
-    """Unit that is stated for a column, before conversion."""
-    remarks: Sequence[str] = ()
-    """Commented lines without a meaning."""
-    notes: Sequence[str] = ()
-    """What was assumed or left out as the file was read."""
+    stated: Mapping[str, int] = field(default_factory=dict)  # line of each attribute
+    units: Mapping[str, str] = field(default_factory=dict)  # unit that is stated for a column, before conversion
+    remarks: Sequence[str] = ()  # commented lines without a meaning
+    notes: Sequence[str] = ()  # what was assumed or left out as the file was read
 
     def row(self, sample: int) -> str:
         """Return the name of a sample in messages."""

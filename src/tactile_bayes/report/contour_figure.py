@@ -24,8 +24,8 @@ _DETAIL_HEIGHT = 230.0
 
 _TABLED = 21
 
+# Half widths of the band to which an overlay extends the enlarged drawing, which it may leave.
 _MOST_OFF, _SIGNS = 5.0, np.array([-1.0, 1.0])
-"""Half widths of the band to which an overlay extends the enlarged drawing, which it may leave."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,8 @@ class ContourFigure(NamedTuple):
     map: Markup
     detail: Markup
     legend: Markup
-    band: Mapping[str, Any]
-    """Grid points in both drawings, and the text for each."""
-    rows: list[list[str]]
-    """x, lower, median, upper at some grid points, as text in the unit shown."""
+    band: Mapping[str, Any]  # grid points in both drawings, and the text for each
+    rows: list[list[str]]  # x, lower, median, upper at some grid points, as text in the unit shown
     unit: Shown
 
 

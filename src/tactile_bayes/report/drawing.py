@@ -16,14 +16,9 @@ from tactile_bayes.report.wording import Shown
 
 __all__ = ["Plot", "Scale", "dots", "element", "figure", "legend"]
 
-_WIDTH = 640
-"""Width of every drawing, in its own units, in which letters are 13 high."""
-
-_LEFT, _RIGHT, _TOP, _BOTTOM = 96, 24, 12, 46
-"""Margins beside a plot's frame."""
-
-_TALLEST, _LOWEST = 460.0, 140.0
-"""Largest and smallest height of a map's frame."""
+_WIDTH = 640  # width of every drawing, in its own units, in which letters are 13 high
+_LEFT, _RIGHT, _TOP, _BOTTOM = 96, 24, 12, 46  # margins beside a plot's frame
+_TALLEST, _LOWEST = 460.0, 140.0  # largest and smallest height of a map's frame
 
 
 def element(name: str, *content: str, **attributes: object) -> Markup:

@@ -28,16 +28,13 @@ from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
 __all__ = ["FINDING_STEPS", "Findings", "contour_posterior", "findings_of", "probability_of"]
 
-FINDING_STEPS = 4
-"""Number of steps that `findings_of` reports: posterior, contacts, check, and all the rest."""
-
+FINDING_STEPS = 4  # number of steps that `findings_of` reports: posterior, contacts, check, and all the rest
 _GROUPS = ("posterior", "sample_stats", "posterior_predictive", "events", "observed_data", "constant_data", "prior")
 _SAID = ("family", "units", "friction", "nuisances", "priors", "settings", "seed", "message", "data_sha256")
 
 _COMPARISON = ("probability", "log_evidence", "p_value", "fits", "sampled")
 
-_USUAL = 0.95
-"""Probability of intervals if a posterior does not state one."""
+_USUAL = 0.95  # probability of intervals if a posterior does not state one
 
 
 @dataclass(frozen=True)

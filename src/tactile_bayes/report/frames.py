@@ -21,9 +21,7 @@ from tactile_bayes.sweep import ManyUnits, to_lab_frame
 
 __all__ = ["Motion", "motion_of"]
 
-_MOST = 900
-"""Largest number of samples shown; of a longer record every second, or third, and so on."""
-
+_MOST = 900  # largest number of samples shown; of a longer record every second, or third, and so on
 _POINTS = 33
 
 

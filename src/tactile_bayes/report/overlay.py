@@ -26,15 +26,14 @@ __all__ = [
     "put_overlay_band",
 ]
 
+# Heads of `distance_cells`, with places for the unit.
 DISTANCE_HEADS = ["rms distance{}", "largest{}", "inside the band"]
-"""Heads of `distance_cells`, with places for the unit."""
 
 
 class Laid(NamedTuple):
     """Distances of runs from a contour laid over them."""
 
-    unit: str
-    """"m", or "1" for rod lengths."""
+    unit: str  # "m", or "1" for rod lengths
     distances: dict[str, Distance]
 
     @classmethod

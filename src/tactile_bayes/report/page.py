@@ -22,8 +22,7 @@ from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence
 
 __all__ = ["page_of", "parameter_cells"]
 
-_WELL = "All is well"
-"""Beginning of the first verdict if nothing is wrong."""
+_WELL = "All is well"  # beginning of the first verdict if nothing is wrong
 
 
 def page_of(findings: Findings, name: str) -> dict[str, Any]:

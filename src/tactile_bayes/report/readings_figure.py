@@ -38,11 +38,9 @@ _TURNING_AXES = {"force_x": "along", "force_y": "across"}
 
 _READINGS_HEIGHT = 190.0
 
-_ARROW = 110.0
-"""Length of the largest force."""
-
+_ARROW = 110.0  # length of the largest force
+# Largest number of samples drawn of each channel; of a longer record every second, or third, and so on.
 _MOST_DOTS = 1500
-"""Largest number of samples drawn of each channel; of a longer record every second, or third, and so on."""
 
 
 class ReadingsFigure(NamedTuple):
@@ -52,14 +50,11 @@ class ReadingsFigure(NamedTuple):
     readings: Markup
     rods_legend: Markup
     readings_legend: Markup
-    channels: list[tuple[str, str, str]]
-    """Name, label and unit of every channel."""
-    data: Mapping[str, Any]
-    """Frames of the moving rod."""
+    channels: list[tuple[str, str, str]]  # name, label and unit of every channel
+    data: Mapping[str, Any]  # frames of the moving rod
+    # Sample, sweep, drive angle [degrees], then travel if the base is carried in some sweep, then readings.
     rows: list[list[str]]
-    """Sample, sweep, drive angle [degrees], then travel if the base is carried in some sweep, then readings."""
-    travel_unit: str | None
-    """Unit of the travel; None if the base is never carried."""
+    travel_unit: str | None  # unit of the travel; None if the base is never carried
     shown: dict[str, Shown]
     drawn_every: int
 

@@ -17,9 +17,7 @@ from tactile_bayes.uncertainty.overlay import Overlay
 
 __all__ = ["RunsFigure", "runs_figure"]
 
-_COLOURS = 6
-"""Number of colours; of more runs, each has a panel of its own."""
-
+_COLOURS = 6  # number of colours; of more runs, each has a panel of its own
 _PARTS = ("lower", "median", "upper")
 _HEIGHT = 260.0
 
@@ -28,8 +26,7 @@ class RunsFigure(NamedTuple):
     """Drawings of several runs for a page."""
 
     map: Markup
-    panels: list[tuple[str, Markup]]
-    """Bands measured from the reference: of all runs, without a name, or of each."""
+    panels: list[tuple[str, Markup]]  # bands measured from the reference: of all runs, without a name, or of each
     legend: Markup
     reference: str
 

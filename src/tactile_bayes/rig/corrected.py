@@ -24,20 +24,16 @@ __all__ = ["Corrected", "corrected"]
 class Corrected(NamedTuple):
     """What Step 2 takes to correct a record for the deviations of its rig."""
 
-    record: xr.Dataset
-    """Record with the pivots and the rod's shape as they are, and without drift."""
+    record: xr.Dataset  # record with the pivots and the rod's shape as they are, and without drift
+    # Load cell with bias, gain (which includes the stiffness of the rod), lever and encoder as they are. Its noise is
+    # inferred only where it was not stated: `noise_scale` is not applied, so that misfits show it.
     load_cell: LoadCell
-    """Load cell with bias, gain (which includes the stiffness of the rod), lever and encoder as they are.
-
-    Its noise is inferred only where it was not stated: `noise_scale` is not applied, so that misfits show it.
-    """
-    friction: float = 0.0
-    """Coulomb's coefficient."""
+    friction: float = 0.0  # Coulomb's coefficient
+    # Turn of the pivot per holding moment, relative to the stated rod [rad/(N m), or rad/(EI/L)].
     suspension_compliance: float = 0.0
-    """Turn of the pivot per holding moment, relative to the stated rod [rad/(N m), or rad/(EI/L)]."""
+    # Units of the record that was measured. Where it is dimensionless and the rod's length was inferred, `record` is in
+    # lengths of the stated rod, and SI by name. Empty if they are those of `record`.
     stated_units: str = ""
-    """Units of the record that was measured. Where it is dimensionless and the rod's length was inferred, `record` is
-    in lengths of the stated rod, and SI by name. Empty if they are those of `record`."""
 
     @property
     def units(self) -> str:

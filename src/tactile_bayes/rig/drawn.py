@@ -21,11 +21,11 @@ from tactile_bayes.rig.unknown import Unknown, of_modes, of_pivots
 
 __all__ = ["calibrated_at", "drawn_numbers", "refuse_undrawn", "unknown_of"]
 
+# Parameters that are not drawn, and what to do.
 _PLACES = {
     **dict.fromkeys(GROUPS["discrepancy"], "a discrepancy is a function and no number: leave it out where you draw"),
     **dict.fromkeys(("moment_noise", "force_noise"), "state it in the load cell, and give noise_scale where it varies"),
 }
-"""Parameters that are not drawn, and what to do."""
 
 
 class Described(Protocol):

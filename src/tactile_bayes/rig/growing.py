@@ -24,37 +24,25 @@ from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["GrowingRecord", "Growth"]
 
-_FEWEST = 10
-"""Smallest number of rows that are left out for most of a file to count as unreadable."""
-
+_FEWEST = 10  # smallest number of rows that are left out for most of a file to count as unreadable
+# Smallest and largest number of samples of a sweep from which the scatter of its encoder is estimated.
 _ENOUGH, _RECENT = 12, 50
-"""Smallest and largest number of samples of a sweep from which the scatter of its encoder is estimated."""
-
-_STRAY = 2
-"""Largest number of samples with the number of another sweep within a sweep."""
-
-_WIDTHS = 6.0
-"""Scatters of the encoder by which a drive angle may be behind."""
+_STRAY = 2  # largest number of samples with the number of another sweep within a sweep
+_WIDTHS = 6.0  # scatters of the encoder by which a drive angle may be behind
 
 
-_TICK = 2.0
-"""Longest time between two changes to which a file system may give the same time [s]."""
+_TICK = 2.0  # longest time between two changes to which a file system may give the same time [s]
 
 
 class Growth(NamedTuple):
     """The record in a file after it has changed."""
 
-    record: xr.Dataset | None
-    """All samples so far; None if there are none, or `error` states why they cannot be read."""
-    messages: tuple[str, ...]
-    """Messages on new faults of rows, which are left out, or of the file."""
-    is_other: bool
-    """True if the file no longer begins as it did."""
+    record: xr.Dataset | None  # all samples so far; None if there are none, or `error` states why they cannot be read
+    messages: tuple[str, ...]  # messages on new faults of rows, which are left out, or of the file
+    is_other: bool  # true if the file no longer begins as it did
     error: RecordError | None
-    sha256: str
-    """Digest of all whole lines."""
-    written_at: float
-    """Time at which the file was last written [s since the epoch]."""
+    sha256: str  # digest of all whole lines
+    written_at: float  # time at which the file was last written [s since the epoch]
 
 
 class GrowingRecord:

@@ -26,9 +26,7 @@ __all__ = [
     "parameter_named",
 ]
 
-BASE = re.compile(r"base_(\d+)_([xy])")
-"""Shift of a pivot of the record, counted from 1, along an axis."""
-
+BASE = re.compile(r"base_(\d+)_([xy])")  # shift of a pivot of the record, counted from 1, along an axis
 _DEGREE = float(np.radians(1.0))
 
 _CHANNELS = ("moment", "force_x", "force_y")
@@ -42,24 +40,19 @@ class Parameter(NamedTuple):
 
     name: str
     meaning: str
-    unit: str
-    """SI unit."""
+    unit: str  # SI unit
+    # Default distribution: about the stated value where there is one, else about `neutral`; that of what may vanish is
+    # cut off at the bounds.
     default: Literal["normal", "log_normal", "half_normal", "log_uniform"]
-    """Default distribution: about the stated value where there is one, else about `neutral`; that of what may vanish is
-    cut off at the bounds."""
+    # Standard deviation, or that of the logarithm, or the scale of the default distribution, in units of the rod; of a
+    # log-uniform one the smallest value.
     width: float
-    """Standard deviation, or that of the logarithm, or the scale of the default distribution, in units of the rod; of a
-    log-uniform one the smallest value."""
-    neutral: float | None = 0.0
-    """Value of a rig that is as stated; None if the rod or the load cell states it."""
+    neutral: float | None = 0.0  # value of a rig that is as stated; None if the rod or the load cell states it
     low: float = -np.inf
     high: float = np.inf
-    of_moment: int = 0
-    """Power of the unit of moments."""
-    of_length: int = 0
-    """Power of the unit of lengths."""
-    hidden: str = ""
-    """When no record shows it, or which one does not."""
+    of_moment: int = 0  # power of the unit of moments
+    of_length: int = 0  # power of the unit of lengths
+    hidden: str = ""  # when no record shows it, or which one does not
 
 
 _NO_MOMENT = "without the moment"
@@ -265,12 +258,11 @@ _ROWS = (
     ),
 )
 
+# All parameters by name, except the shifts of pivots, of which there are as many as pivots.
 PARAMETERS = {row.name: row for row in _ROWS}
-"""All parameters by name, except the shifts of pivots, of which there are as many as pivots."""
-
+# Values of parameters that change nothing, where there are such.
 NEUTRAL = {name: row.neutral for name, row in PARAMETERS.items() if row.neutral is not None}
-"""Values of parameters that change nothing, where there are such."""
-
+# Names that stand for several parameters; "base" stands for the shifts of all pivots but the first.
 GROUPS = {
     **{what: tuple(f"{channel}_{what}" for channel in _CHANNELS) for what in ("bias", "drift", "gain")},
     "lever": ("lever_x", "lever_y"),
@@ -279,8 +271,7 @@ GROUPS = {
     "gauge": ("gauge_x", "gauge_y"),
     "discrepancy": ("discrepancy_scale", "discrepancy_length"),
 }
-"""Names that stand for several parameters; "base" stands for the shifts of all pivots but the first."""
-
+# What is unknown of a real rig, unless it is said to be known.
 STANDARD = (
     "rigidity_scale",
     "drive_angle_offset",
@@ -291,10 +282,8 @@ STANDARD = (
     "rest_shape",
     "taper_error",
 )
-"""What is unknown of a real rig, unless it is said to be known."""
-
+# Parameters that are zero or positive, and may be zero.
 MAY_VANISH = ("friction", "suspension_compliance", "taper", "stem")
-"""Parameters that are zero or positive, and may be zero."""
 
 
 def parameter_named(name: str) -> Parameter | None:

@@ -69,9 +69,7 @@ TABLES = {
 _ONE_OF_BOTH = "[rod] states youngs_modulus: give the diameter beside it, and leave out flexural_rigidity"
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
-_LARGEST = 1 << 20
-"""Largest number of characters of a file."""
-
+_LARGEST = 1 << 20  # largest number of characters of a file
 _HEAD = """\
 # A rig, for the option --rig of tactile-bayes and for tactile_bayes.Rig.read: what its data sheets state, how its files
 # are written, and what is unknown. A number is known, a distribution is unknown; `tactile-bayes rig --parameters` lists

@@ -16,8 +16,7 @@ from tactile_bayes.distributions import Distribution, in_words, numbers_of
 
 __all__ = ["RigPrior"]
 
-_FARTHEST = 30.0
-"""Largest normal score, beyond which densities vanish anyway."""
+_FARTHEST = 30.0  # largest normal score, beyond which densities vanish anyway
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,7 @@ from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, NEUTRAL, parameter_
 
 __all__ = ["Stated", "cell_with", "stated_values", "unit_of", "within_bounds"]
 
-_LOUDEST = 10.0
-"""Largest noise in the default prior of an unknown one [EI/L, EI/L²]."""
+_LOUDEST = 10.0  # largest noise in the default prior of an unknown one [EI/L, EI/L²]
 
 
 class Units(Protocol):
@@ -51,10 +50,9 @@ class Stated(NamedTuple):
     """What the data sheets of a rig state; with arrays, those of many rigs."""
 
     units: Units
+    # Parameters of a rig that is as stated, as `stated_values`; those that are zero may be left out.
     values: Mapping[str, Any]
-    """Parameters of a rig that is as stated, as `stated_values`; those that are zero may be left out."""
-    own_gains: Sequence[Any]
-    """Reading of each channel for a unit of its own load, without sign."""
+    own_gains: Sequence[Any]  # reading of each channel for a unit of its own load, without sign
     rest_curvature_deviation: Any = 0.0
     taper_deviation: float = 0.0
 

@@ -19,18 +19,15 @@ from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, S
 
 __all__ = ["DEFAULT", "NOTHING", "Unknown", "checked_unknown", "expanded", "of_modes", "of_pivots", "pivot_shifts"]
 
+# What is said of a parameter: a number if it is known, a distribution, or "default" for its default distribution.
 Unknown = float | Distribution | Literal["default"]
-"""What is said of a parameter: a number if it is known, a distribution, or "default" for its default distribution."""
-
 DEFAULT: Literal["default"] = "default"
 
+# Unknowns of a rig that is as stated: everything that is unknown of a real rig is known, and is as stated.
 NOTHING: Mapping[str, float] = MappingProxyType(
     {name: float(PARAMETERS[next(members(name))].neutral or 0.0) for name in STANDARD}
 )
-"""Unknowns of a rig that is as stated: everything that is unknown of a real rig is known, and is as stated."""
-
-_BASES = ("base", "base_x", "base_y")
-"""Names of the shifts of all pivots but the first."""
+_BASES = ("base", "base_x", "base_y")  # names of the shifts of all pivots but the first
 
 
 def expanded(unknown: Mapping[str, Unknown]) -> dict[str, Unknown]:

@@ -43,8 +43,7 @@ __all__ = ["ContourRun", "RunFolder", "analyse", "complete", "file_of", "origin_
 
 _POSTERIOR = "posterior.nc"
 
-_MOST_PARAMETERS = 5
-"""Largest number of parameters in a figure, unless a contour has more."""
+_MOST_PARAMETERS = 5  # largest number of parameters in a figure, unless a contour has more
 
 
 @dataclass(frozen=True)

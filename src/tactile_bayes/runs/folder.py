@@ -22,8 +22,8 @@ __all__ = ["Folder", "Run", "panels", "posterior_in"]
 
 Result = TypeVar("Result")
 
+# Other contents of a folder, by a file that shows them.
 _OTHERS = {"comparison.nc": "a comparison of shapes", "design.nc": "a design", "manifest.json": "a data set"}
-"""Other contents of a folder, by a file that shows them."""
 
 
 @dataclass(frozen=True)

@@ -39,9 +39,8 @@ INFERENCE = (
 )
 TRUST = ("trust.nc", "trust.txt", "assumptions.png")
 OVERLAY = "overlay.png"
+# Files of other commands that belong to the posterior of a folder.
 OF_POSTERIOR = ("report.html", OVERLAY, *TRUST, "trust/replicates.json", "trust/alternatives.json")
-"""Files of other commands that belong to the posterior of a folder."""
-
 WATCH_PAGE = "watch.html"
 WATCH = ("stream.nc", WATCH_PAGE)
 INSPECTION = ("inspection.txt", "sweeps.csv", "channels.csv", "samples.csv", "inspection.png", "rig.toml")

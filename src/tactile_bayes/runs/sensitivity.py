@@ -31,17 +31,15 @@ __all__ = ["Material", "SensitivityRun", "rod_message", "sensitivity_into", "ste
 
 _OF_PLAN = tuple(field.name for field in fields(Plan))
 _LENGTHS = np.array([0.7, 0.85, 1.0, 1.2, 1.4])
+# Lengths and diameters of the rods that are tried, over those of the present rod.
 _DIAMETERS = np.array([0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0])
-"""Lengths and diameters of the rods that are tried, over those of the present rod."""
 
 
 class Material(NamedTuple):
     """Material of a rod."""
 
-    youngs_modulus: float
-    """Young's modulus [Pa]."""
-    elastic_strain: float
-    """Largest elastic bending strain."""
+    youngs_modulus: float  # Young's modulus [Pa]
+    elastic_strain: float  # largest elastic bending strain
 
 
 @dataclass(frozen=True)

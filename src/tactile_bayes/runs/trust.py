@@ -16,8 +16,7 @@ from tactile_bayes.tasks import refuse_replacing
 
 __all__ = ["REPLICATES_FOLDER", "trust_into"]
 
-REPLICATES_FOLDER = "trust"
-"""Subfolder of the replicates, from which a stopped run resumes."""
+REPLICATES_FOLDER = "trust"  # subfolder of the replicates, from which a stopped run resumes
 
 
 def trust_into(

@@ -30,43 +30,32 @@ from tactile_bayes.uncertainty.summary import reach, summary
 
 __all__ = ["Watch", "WatchUpdate", "open_watch"]
 
-_STATE = "stream.nc"
-"""File of the stream in a folder, from which a watch resumes."""
-
-_POINTS = 201
-"""Number of grid points of the band."""
+_STATE = "stream.nc"  # file of the stream in a folder, from which a watch resumes
+_POINTS = 201  # number of grid points of the band
 
 
 class WatchUpdate(NamedTuple):
     """The answer after some samples."""
 
-    samples: int
-    """Number of samples that are taken into account so far."""
-    new: int
-    """Number of those that came with this update."""
-    seconds: float
-    """Time that the update took, with its files [s]."""
+    samples: int  # number of samples that are taken into account so far
+    new: int  # number of those that came with this update
+    seconds: float  # time that the update took, with its files [s]
+    # True if all samples were taken again since they do not continue those before, and not since others of them are
+    # left out.
     restarted: bool
-    """True if all samples were taken again since they do not continue those before, and not since others of them are
-    left out."""
-    every: int
-    """Stride of the samples that are taken into account; 1 if all are."""
+    every: int  # stride of the samples that are taken into account; 1 if all are
     posterior: xr.DataTree
-    summary: xr.Dataset
-    """Parameters with intervals."""
+    summary: xr.Dataset  # parameters with intervals
+    # Band between the given ends, or over the arcs that sweeps touch if they continue; None if they touch nothing.
     band: xr.Dataset | None
-    """Band between the given ends, or over the arcs that sweeps touch if they continue; None if they touch nothing."""
-    width: float
-    """Largest width of the band [length]; NaN without one."""
-    probabilities: Mapping[str, float]
-    """Probability of each family, if there are several."""
+    width: float  # largest width of the band [length]; NaN without one
+    probabilities: Mapping[str, float]  # probability of each family, if there are several
+    # Families whose evidence is too small, since their particles had lost the posterior for a while.
     underrated: Sequence[str]
-    """Families whose evidence is too small, since their particles had lost the posterior for a while."""
-    e_value: float
-    """That of `Stream.update`; of several families the least; NaN if there is none."""
+    e_value: float  # that of `Stream.update`; of several families the least; NaN if there is none
+    # Reason why measuring may stop; empty if it may not, or the posterior has not converged. Probabilities are none if
+    # an evidence is too small.
     enough: str
-    """Reason why measuring may stop; empty if it may not, or the posterior has not converged. Probabilities are none if
-    an evidence is too small."""
 
 
 @contextmanager

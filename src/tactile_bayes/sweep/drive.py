@@ -30,15 +30,10 @@ __all__ = ["Carried", "Drive", "Motion", "Rotation", "Translation", "drives_of",
 
 _ROUNDING = 1e-15
 _TURN = 2.0 * math.pi
+# Least step of a rotation [rad], and of other drives over their travel; finer ones give millions of samples.
 _FINEST = 1e-6
-"""Least step of a rotation [rad], and of other drives over their travel; finer ones give millions of samples."""
-
-_COARSEST = 0.5
-"""Largest step of a rotation [rad]; a larger one is probably in degrees."""
-
-_SHARE = 1e-9
-"""Share of a step by which the last one may be too short."""
-
+_COARSEST = 0.5  # largest step of a rotation [rad]; a larger one is probably in degrees
+_SHARE = 1e-9  # share of a step by which the last one may be too short
 _IN_DEGREES = "give an angle in radians, at most a turn (2π); one in degrees is converted by np.radians"
 
 

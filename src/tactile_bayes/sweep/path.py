@@ -24,16 +24,15 @@ __all__ = ["carried_paths", "frame_of", "friction_angle_of", "rotated_paths", "s
 
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
+# Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: its side
+# is then the one to which it is turned less.
 _SAME = 1e-9
-"""Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: its side
-is then the one to which it is turned less."""
-
+# Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
+# of the object on one side seems to have passed it on the other.
 _PLAIN = (Reachability.TOUCHES, -1, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
-"""Outcomes on the two sides of a carried rod, the most informative first; −1 stands for all others. A rod that is clear
-of the object on one side seems to have passed it on the other."""
-
 _FREE = "without friction the rod has a path (friction = 0 under [unknown] of rig.toml); with it, "
 
+# Why there is no path although the rod touches the contour.
 _IN_CONTACT: dict[Reachability, tuple[type[TactileBayesError], str]] = {
     Reachability.GRAZES: (
         ReachError,
@@ -64,7 +63,6 @@ _IN_CONTACT: dict[Reachability, tuple[type[TactileBayesError], str]] = {
         "less curved, sweep in the other direction, or move the pivot",
     ),
 }
-"""Why there is no path although the rod touches the contour."""
 
 
 def sweep_paths(

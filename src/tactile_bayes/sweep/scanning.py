@@ -34,26 +34,20 @@ from tactile_bayes.sweep.path import carried_paths, friction_angle_of, sweep_pat
 
 __all__ = ["Scan", "acting", "equilibria", "scan"]
 
-_MARGIN = 15
-"""Number of drive steps before first contact and after snap-off."""
-
+_MARGIN = 15  # number of drive steps before first contact and after snap-off
+# Largest number of corrections of a tapered rod's standoff, and the last change of the arc length [L].
 _MOST_MOVES, _SETTLED = 50, 1e-15
-"""Largest number of corrections of a tapered rod's standoff, and the last change of the arc length [L]."""
-
+# Default steps of rotations [rad], and of drives that carry the base, over the rod's length.
 _STEP, _SHARE = float(np.radians(1.0)), 0.01
-"""Default steps of rotations [rad], and of drives that carry the base, over the rod's length."""
-
-_FEWEST_POSES = 8
-"""Number of poses of a motion up to which it is sampled by steps, and not at these."""
-
+_FEWEST_POSES = 8  # number of poses of a motion up to which it is sampled by steps, and not at these
 _TURN = 2.0 * math.pi
 
+# Parameters that do not act in sweeps nor in readings, and what to do.
 _NOT_SWEPT = {
     **dict.fromkeys(GROUPS["gauge"], "it is the place of a gauge, so sweep along a contour that is there"),
     **dict.fromkeys(GROUPS["discrepancy"], "a discrepancy is a function and no number, and no sweep has it"),
     **dict.fromkeys(("moment_noise", "force_noise"), "state it in the load cell, which `Rig.measure` applies"),
 }
-"""Parameters that do not act in sweeps nor in readings, and what to do."""
 
 
 class _ByDirection(dict[str, SweepEvents]):

@@ -15,12 +15,8 @@ from tactile_bayes.errors import ParameterError
 
 __all__ = ["LARGEST", "read_json", "read_toml", "toml_value"]
 
-_DEEPEST = 64
-"""Largest depth of lists and tables in one another, and largest number of parts of a dotted key."""
-
-LARGEST = 1 << 23
-"""Largest number of characters of a TOML text, which takes seconds to parse."""
-
+_DEEPEST = 64  # largest depth of lists and tables in one another, and largest number of parts of a dotted key
+LARGEST = 1 << 23  # largest number of characters of a TOML text, which takes seconds to parse
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _BRACKET = re.compile(r"[\[\]{}]")
 _JSON_STRING = re.compile(r'"(?:[^"\\]++|\\.)*+"?', re.DOTALL)

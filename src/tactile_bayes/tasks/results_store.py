@@ -24,23 +24,18 @@ Outcome = TypeVar("Outcome")
 
 _FORMAT = 1
 
-_WRITING_SHARE = 0.05
-"""Share of the time that is spent on writing outcomes."""
-
-_LONGEST = 60
-"""Largest number of characters of a text in a message."""
+_WRITING_SHARE = 0.05  # share of the time that is spent on writing outcomes
+_LONGEST = 60  # largest number of characters of a text in a message
 
 
 class Kind(NamedTuple):
     """Kind of the outcomes in a results store."""
 
-    what: str
-    """Name of the outcomes, and of the file."""
+    what: str  # name of the outcomes, and of the file
     error: type[TactileBayesError]
-    encode: Callable[[Any], dict[str, Any]]
-    """Maps an outcome to names and values; NaN becomes null, and a tuple a list."""
+    encode: Callable[[Any], dict[str, Any]]  # maps an outcome to names and values; NaN becomes null, and a tuple a list
+    # Inverse of `encode`; raises KeyError, TypeError, ValueError or AttributeError.
     decode: Callable[[dict[str, Any]], Any]
-    """Inverse of `encode`; raises KeyError, TypeError, ValueError or AttributeError."""
 
     @property
     def file(self) -> str:

@@ -13,9 +13,7 @@ import numpy as np
 
 __all__ = ["cores", "in_parts", "one_thread"]
 
-_PARTS = 2
-"""Parts for each thread, of which some take longer than others."""
-
+_PARTS = 2  # parts for each thread, of which some take longer than others
 _here = threading.local()
 
 

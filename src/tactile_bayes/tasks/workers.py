@@ -28,11 +28,8 @@ __all__ = ["TaskProgress", "Workers", "run_tasks", "workers_of"]
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-_PATIENCE = "10s"
-"""Timeout of the connection to a scheduler."""
-
-_RETRIES = 3
-"""Number of retries of a task after its process died."""
+_PATIENCE = "10s"  # timeout of the connection to a scheduler
+_RETRIES = 3  # number of retries of a task after its process died
 
 
 class TaskProgress(NamedTuple):
@@ -40,10 +37,8 @@ class TaskProgress(NamedTuple):
 
     done: int
     wanted: int
-    made: int
-    """Number of tasks done in this run."""
-    seconds: float
-    """Time since the beginning of this run [s]."""
+    made: int  # number of tasks done in this run
+    seconds: float  # time since the beginning of this run [s]
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ COARSE = np.radians(12.0)
 OTHER_FORCE_X = 'force_x had the other sign (force_x = "-force_x" under [file] of rig.toml).'
 OTHER_MOMENT = 'holding_moment had the other sign (holding_moment = "-holding_moment" under [file] of rig.toml)'
 NOTHING = ("Nothing looks wrong.",)
+# Gain beside which the noise of loads is five times that of readings.
 FAINT = ((0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2))
-"""Gain beside which the noise of loads is five times that of readings."""
 
 
 @pytest.fixture(scope="module")

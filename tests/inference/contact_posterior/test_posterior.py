@@ -20,8 +20,8 @@ from tactile_bayes.record import CHANNELS, record_hash
 from tactile_bayes.rig import Rig
 from tactile_bayes.sweep import scan
 
+# No contact; tip or tangential; clearly tangential; before snap-off; backward ones.
 SOME = np.array([2, 20, 21, 30, 61, 99, 120])
-"""No contact; tip or tangential; clearly tangential; before snap-off; backward ones."""
 
 
 def some(kind="plain", which=SOME):

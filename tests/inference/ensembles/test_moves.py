@@ -12,9 +12,7 @@ from tactile_bayes.inference.ensembles.moves import FittedMove, NormalMove, stan
 from tactile_bayes.inference.ensembles.run_state import Block, make_block
 from tactile_bayes.inference.ensembles.walkers import first_random_state
 
-WALKERS = 40
-"""Of an ensemble; 5 for each of 8 parameters, and the default has 6."""
-
+WALKERS = 40  # of an ensemble; 5 for each of 8 parameters, and the default has 6
 CASES = [(8, 1.0, False)]
 
 

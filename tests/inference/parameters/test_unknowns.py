@@ -105,8 +105,7 @@ def test_what_unknowns_cost_is_what_was_found_independently(unknowns, channels, 
             assert found == pytest.approx(quoted, rel=0.25)
 
 
-FEW = SamplerSettings(ensembles=2, walkers=26, block_steps=10, max_steps=10)
-"""Enough for names and units."""
+FEW = SamplerSettings(ensembles=2, walkers=26, block_steps=10, max_steps=10)  # enough for names and units
 
 
 def scanned(degrees=5.0, rod=None, friction=0.0, **options):

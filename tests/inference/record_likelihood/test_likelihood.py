@@ -26,9 +26,7 @@ from tactile_bayes.record.units import with_rod
 from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.sweep import Motion, Translation, scan
 
-SHARE = {False: 3e-4, True: 1e-6}
-"""Error of the interpolated loads over their largest value, at worst, in 150 contours."""
-
+SHARE = {False: 3e-4, True: 1e-6}  # error of the interpolated loads over their largest value, at worst, in 150 contours
 WIRE = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
 WIRE_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
 
@@ -112,9 +110,8 @@ def exact_by(rig):
     return exact_loads(measured_by(rig), RIGS[rig][0], RIGS[rig][5])
 
 
+# Rigs of which the loads are compared in every run, and sums of densities on demand.
 ALIKE = ("far off", "circle", "diameter")
-"""Rigs of which the loads are compared in every run, and sums of densities on demand."""
-
 SUMMED = [pytest.param(rig, marks=pytest.mark.slow) if rig in ALIKE else rig for rig in RIGS]
 
 
@@ -445,6 +442,7 @@ def test_interpolation_is_not_felt_where_the_tip_touches_for_a_millionth_of_the_
     assert off_at_the_truth(0.01, "parabola", [610]).max() < 0.05
 
 
+# Rods, friction coefficients, and whether taper, rest curvature and friction vary from one contour to the next.
 VARIED = {
     "taper of a half": (Rod(taper=0.5), 0.3, False),
     "taper of nine tenths": (Rod(taper=0.9), 0.0, False),
@@ -453,7 +451,6 @@ VARIED = {
     "tapered arc": (Rod(rest_curvature=-0.4, taper=0.4), 0.2, False),
     "all of the rig inferred": (Rod(taper=0.5), 0.0, True),
 }
-"""Rods, friction coefficients, and whether taper, rest curvature and friction vary from one contour to the next."""
 
 
 @pytest.mark.slow

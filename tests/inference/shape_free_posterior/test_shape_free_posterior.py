@@ -24,8 +24,7 @@ from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.band import contour_band
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
-ALL: dict[str, float] = {}
-"""All that is unknown of a real rig."""
+ALL: dict[str, float] = {}  # all that is unknown of a real rig
 SMOOTH = {"friction": 0.0}
 RADIUS = RandomRadius(shortest=0.4, longest=4.0, tolerance=0.01)
 
@@ -84,8 +83,8 @@ def whitened(model):
 
 
 SI = Rod(length=0.1, flexural_rigidity=2e-4)
+# With those that may vanish, between others.
 RUBBING = only("friction", "bias", "suspension_compliance", "rigidity_scale")
-"""With those that may vanish, between others."""
 
 
 @pytest.mark.parametrize(

@@ -55,6 +55,7 @@ def drawn(name, rod, count, seed=1):
     return family.build(*points[:, inside])
 
 
+# Each family, each rod with halves of two kinds, with and without friction.
 ALWAYS = (
     ("parabola", "thin", 0.0),
     ("circle", "thick", 0.2),
@@ -64,7 +65,6 @@ ALWAYS = (
     ("circle/ellipse", "thin", 0.0),
     ("circle", "thin", 0.6),
 )
-"""Each family, each rod with halves of two kinds, with and without friction."""
 
 
 @pytest.mark.parametrize(

@@ -23,10 +23,9 @@ from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 PHASES = pytest.mark.parametrize("phase", [TIP, TANGENTIAL], ids=["tip", "tangential"])
 FREE = {TIP: [FORCE, PSI1, DRIVE_ANGLE], TANGENTIAL: [FORCE, ARCLENGTH, DRIVE_ANGLE]}
 
+# Amplitudes χ at the pivot; at π the line of force passes through it.
 BENT = (0.3, 0.8, 1.6, 2.4, 3.0, np.pi - 1e-3, np.pi - 1e-6)
-"""Amplitudes χ at the pivot; at π the line of force passes through it."""
-WEAK = (1e-4, 1e-3, 0.02)
-"""Amplitudes of loads of about χ² EI/L²."""
+WEAK = (1e-4, 1e-3, 0.02)  # amplitudes of loads of about χ² EI/L²
 
 
 class Rods(NamedTuple):

@@ -18,8 +18,8 @@ _Varied, _mirrored_beam = beam.Varied, beam.mirrored_beam
 
 RODS = {name: drawn_rods()[name].profile for name in ("uniform", "half cone", "cone", "parabolic")}
 
+# Largest errors of a pose, over the arc length, and of its derivatives by share of the ranges.
 ERROR, ERROR_OF_SLOPES = 1e-5, 1e-3
-"""Largest errors of a pose, over the arc length, and of its derivatives by share of the ranges."""
 
 
 @cached

@@ -18,9 +18,8 @@ __all__ = ["OTHER_ANGLE", "Correction", "as_it_is", "corrections_for"]
 
 Transform = Callable[[xr.Dataset], xr.Dataset]
 
+# Beginning of the texts of corrections that change the drive angle, and with it perhaps the directions.
 OTHER_ANGLE = "the drive angle were counted otherwise"
-"""Beginning of the texts of corrections that change the drive angle, and with it perhaps the directions."""
-
 _FRICTIONS = (0.1, 0.2, 0.3, 0.5)
 
 _FRAME_TEXTS = {
@@ -32,14 +31,10 @@ _FRAME_TEXTS = {
 class Correction(NamedTuple):
     """A change of a record with which its samples may fit."""
 
-    text: str
-    """Text that follows "nearly all would if"."""
-    apply: Transform
-    """Function from the record to the corrected record."""
-    friction: float
-    """Coefficient of friction for Step 2."""
-    changes: int = 1
-    """Number of things that are changed."""
+    text: str  # text that follows "nearly all would if"
+    apply: Transform  # function from the record to the corrected record
+    friction: float  # coefficient of friction for Step 2
+    changes: int = 1  # number of things that are changed
 
 
 def corrections_for(record: xr.Dataset, friction: float) -> list[Correction]:

@@ -18,30 +18,21 @@ from tactile_bayes.rig.corrected import Corrected
 
 __all__ = ["Fit", "fit_of"]
 
-_FEWEST = 10
-"""Number of loaded samples below which the fit is not judged."""
-
-_CORRECTED = 1 / 3
-"""Share of the misfits that may remain for a correction to be named."""
-
+_FEWEST = 10  # number of loaded samples below which the fit is not judged
+_CORRECTED = 1 / 3  # share of the misfits that may remain for a correction to be named
+# Share of the samples that a further change must correct: loads that are mirrored twice fit as well as before.
 _CHANGE = 0.1
-"""Share of the samples that a further change must correct: loads that are mirrored twice fit as well as before."""
-
-_TRIED = 40
-"""Largest number of loaded samples on which corrections are tried: where nothing fits, each takes long."""
+_TRIED = 40  # largest number of loaded samples on which corrections are tried: where nothing fits, each takes long
 
 
 class Fit(NamedTuple):
     """Shares of samples that no contact above the pivot explains."""
 
-    share: float
-    """Share of the loaded samples whose status is "does not fit"; NaN if there are too few."""
-    below: float
-    """Share of the loaded samples whose contact would lie below the pivot, where no object is."""
-    loaded: int
-    """Number of samples that carry a load and are not cut off."""
+    share: float  # share of the loaded samples whose status is "does not fit"; NaN if there are too few
+    below: float  # share of the loaded samples whose contact would lie below the pivot, where no object is
+    loaded: int  # number of samples that carry a load and are not cut off
+    # Text of the correction with which most of them fit above the pivot; "" if none of those tried does.
     correction: str
-    """Text of the correction with which most of them fit above the pivot; "" if none of those tried does."""
 
 
 def fit_of(

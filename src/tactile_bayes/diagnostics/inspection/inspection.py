@@ -28,8 +28,8 @@ from tactile_bayes.rig.rig import Rig, rig_of
 
 __all__ = ["Inspection", "inspect_record"]
 
+# Number of steps of an inspection: unloaded samples, Step 2, fit of contacts; each correction tried adds one.
 _STEPS = 3
-"""Number of steps of an inspection: unloaded samples, Step 2, fit of contacts; each correction tried adds one."""
 
 
 @dataclass(frozen=True, eq=False)

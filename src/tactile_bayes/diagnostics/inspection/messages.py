@@ -22,21 +22,14 @@ from tactile_bayes.rig.parameters import PARAMETERS
 
 __all__ = ["UNFIT", "far_off", "inspection_messages", "prefix_of", "quantity"]
 
+# Share of loaded samples without a fitting contact above which it is reported: a rod 10 % stiffer than stated stays
+# below it at the usual noise.
 UNFIT = 0.25
-"""Share of loaded samples without a fitting contact above which it is reported: a rod 10 % stiffer than stated stays
-below it at the usual noise."""
-
-_FAR = 3.0
-"""Standard deviations of a bias's prior beyond which `verdicts` would report the bias."""
-
-_CORRELATED = 0.2
-"""Autocorrelation of neighbours below which noise counts as white."""
-
+_FAR = 3.0  # standard deviations of a bias's prior beyond which `verdicts` would report the bias
+_CORRELATED = 0.2  # autocorrelation of neighbours below which noise counts as white
 _FEWEST_IN_CONTACT = 10
 
-_SHOWN = 5
-"""Largest number of samples that a message lists."""
-
+_SHOWN = 5  # largest number of samples that a message lists
 _DRIFT = rig_entry("drift", "default", "unknown")
 
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))

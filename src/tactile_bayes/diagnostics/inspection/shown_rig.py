@@ -14,11 +14,8 @@ from tactile_bayes.rig import Rig
 
 __all__ = ["shown_rig"]
 
-_MOVED = 1e-3
-"""Probability that a zero which stays where it is seems to have moved as far between unloaded stretches."""
-
-_DIGITS = 3
-"""Number of significant digits of a noise that is estimated."""
+_MOVED = 1e-3  # probability that a zero which stays where it is seems to have moved as far between unloaded stretches
+_DIGITS = 3  # number of significant digits of a noise that is estimated
 
 
 def shown_rig(found: Inspection, rig: Rig) -> Rig:

@@ -13,28 +13,22 @@ from tactile_bayes.record import means_of_positions
 
 __all__ = ["Autocorrelation", "PositionScatter", "autocorrelation", "centred", "position_scatter", "unloaded_stretches"]
 
-_CUT = 4.0
-"""Robust standard deviations at which residuals are clipped, so that no single outlier dominates."""
+_CUT = 4.0  # robust standard deviations at which residuals are clipped, so that no single outlier dominates
 
 
 class Autocorrelation(NamedTuple):
     """Lag-one autocorrelation of unloaded residuals."""
 
-    value: float
-    """Coefficient, corrected for the bias from subtracting means; NaN if there are too few samples."""
-    score: float
-    """Coefficient in standard errors, about standard normal for white noise."""
+    value: float  # coefficient, corrected for the bias from subtracting means; NaN if there are too few samples
+    score: float  # coefficient in standard errors, about standard normal for white noise
 
 
 class PositionScatter(NamedTuple):
     """Scatter of the means of unloaded positions; NaN where the drive does not stop, or positions are too few."""
 
-    found: float
-    """Standard deviation about the mean of the stretch."""
-    expected: float
-    """The same if only the noise of single readings causes it."""
-    p_value: float
-    """p-value of the hypothesis that it does (analysis of variance)."""
+    found: float  # standard deviation about the mean of the stretch
+    expected: float  # the same if only the noise of single readings causes it
+    p_value: float  # p-value of the hypothesis that it does (analysis of variance)
 
 
 def unloaded_stretches(sweeps: list[Index], unloaded: Flags) -> list[Index]:

@@ -28,85 +28,60 @@ from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
 __all__ = ["FIRST_LENGTH", "LONGEST", "Here", "Setting", "Step", "advance", "next_length"]
 
+# Length of the first leg, and those between which all lie; see `leg_from`. First legs of 0.1 and 1 take 4 and 20 % more
+# Newton steps in likelihoods; legs of more than 1 save nothing, and one of 1e-6 is beside a singularity.
 FIRST_LENGTH, LONGEST, _SHORTEST = 0.5, 1.0, 1e-6
-"""Length of the first leg, and those between which all lie; see `leg_from`. First legs of 0.1 and 1 take 4 and 20 %
-more Newton steps in likelihoods; legs of more than 1 save nothing, and one of 1e-6 is beside a singularity."""
-
+# Errors over the tolerated one: the largest that is accepted, the one that is aimed at, and the largest that may be
+# rounding in an exact leg. Tails underestimate the errors of singular series: with 0.5 they are three times as large,
+# for 8 % fewer Newton steps; 0.01 takes 34 % more. Aiming at 0.05 takes 38 % more, since legs are then tried twice.
 _ACCEPT, _AIM, _NOISE = 0.05, 0.01, 1e3
-"""Errors over the tolerated one: the largest that is accepted, the one that is aimed at, and the largest that may be
-rounding in an exact leg. Tails underestimate the errors of singular series: with 0.5 they are three times as large, for
-8 % fewer Newton steps; 0.01 takes 34 % more. Aiming at 0.05 takes 38 % more, since legs are then tried twice."""
-
+# Largest change of the length after a failure, and bounds of any change: others between 0.5 and 0.95, 0.1 and 0.6, and
+# 1.2 and 5 change the number of Newton steps by less than 15 %.
 _BACK, _LEAST_PACE, _MOST_PACE = 0.8, 0.3, 2.0
-"""Largest change of the length after a failure, and bounds of any change: others between 0.5 and 0.95, 0.1 and 0.6, and
-1.2 and 5 change the number of Newton steps by less than 15 %."""
-
-_MOST_TRIES = 64
-"""Largest number of trials of a leg: as many as `_BACK` takes from `LONGEST` to `_SHORTEST`."""
-
+_MOST_TRIES = 64  # largest number of trials of a leg: as many as `_BACK` takes from `LONGEST` to `_SHORTEST`
+# Largest distances by which a leg of a rod that is not smooth at its tip passes the change of the phase, in ψ1 [rad]
+# and in arc length [L].
 _ROOM_IN_TIP, _ROOM_PAST_TIP = 0.3, 0.02
-"""Largest distances by which a leg of a rod that is not smooth at its tip passes the change of the phase, in ψ1 [rad]
-and in arc length [L]."""
-
-_PAST_TIP = 1e-6
-"""Share of a leg by which it passes the tip of a rod that is not smooth there."""
-
-_SCATTER = 1e-12
-"""Distance from a knot, in the contour's parameter, which rounding does not pass where a leg ends."""
-
-_IN_A_DIP = 1e-5
-"""Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
-
+_PAST_TIP = 1e-6  # share of a leg by which it passes the tip of a rod that is not smooth there
+_SCATTER = 1e-12  # distance from a knot, in the contour's parameter, which rounding does not pass where a leg ends
+_IN_A_DIP = 1e-5  # error of the drive angle beyond a maximum, over the least fall that makes it the snap-off
+# Tail of the series of a drive angle that its rounding leaves [rad], and where a contact sticks, which hardly yields.
 _ROUNDING, _ROUNDING_STUCK = 1e-14, 3e-11
-"""Tail of the series of a drive angle that its rounding leaves [rad], and where a contact sticks, which hardly
-yields."""
-
+# Error of loads that no tolerance is below, over the loads: rounding may leave it where the rod bears on its base.
 _RESOLVED_LOADS = 1e-10
-"""Error of loads that no tolerance is below, over the loads: rounding may leave it where the rod bears on its base."""
 
 
 class Setting(NamedTuple):
     """What is the same all along a branch."""
 
-    lines: Floats | None
-    """Lines of a drive that carries the base, in rod lengths, NaN after the last; see `line_of`."""
-    knots: Floats
-    """Parameters at which the contour may not be smooth."""
-    ends: tuple[float, float]
-    """Least and greatest parameter of the contour."""
-    may_release: bool
-    """Whether the force may vanish: for a straight rod that turns about a pivot it does not."""
+    lines: Floats | None  # lines of a drive that carries the base, in rod lengths, NaN after the last; see `line_of`
+    knots: Floats  # parameters at which the contour may not be smooth
+    ends: tuple[float, float]  # least and greatest parameter of the contour
+    may_release: bool  # whether the force may vanish: for a straight rod that turns about a pivot it does not
 
 
 class Here(NamedTuple):
     """Where a branch goes on."""
 
-    scene: Scene
-    """With the phase, the line of the drive, and the sense of the friction."""
+    scene: Scene  # with the phase, the line of the drive, and the sense of the friction
     line: int
     begin: Balance
-    before: Balance
-    """An equilibrium before that, if the branch is smooth there, else NaN."""
-    onward: Equilibrium
-    """Direction of the branch, of any length."""
-    longest: float
-    """Largest length of a leg."""
+    before: Balance  # an equilibrium before that, if the branch is smooth there, else NaN
+    onward: Equilibrium  # direction of the branch, of any length
+    longest: float  # largest length of a leg
 
 
 class Step(NamedTuple):
     """A leg, with its series in the workspace."""
 
-    is_sound: bool
-    """False if the branch does not cut all planes of the leg."""
+    is_sound: bool  # false if the branch does not cut all planes of the leg
     leg: Leg
     length: float
     end: Balance
     before_end: Balance
-    knot: float
-    """Knot of the contour at its end, else NaN."""
+    knot: float  # knot of the contour at its end, else NaN
     at_knot: Balance
-    is_released: bool
-    """Whether the force vanishes at its end."""
+    is_released: bool  # whether the force vanishes at its end
 
 
 @inlined

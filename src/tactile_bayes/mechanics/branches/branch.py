@@ -52,15 +52,10 @@ from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 
 __all__ = ["MOST_CHANGES", "BranchWorkspace", "branch_workspace", "follow_branch", "refuse"]
 
-MOST_CHANGES = 16
-"""Largest number of phases of a branch that are recorded."""
-
+MOST_CHANGES = 16  # largest number of phases of a branch that are recorded
+# Largest number of legs of a path, to which one for each knot and this number for each line of its drive are added.
 _MOST, _MOST_ON_LINE = 256, 2
-"""Largest number of legs of a path, to which one for each knot and this number for each line of its drive are added."""
-
-_LEAST_TRAVEL = 1e-12
-"""Travel of a path that rounding may leave of none."""
-
+_LEAST_TRAVEL = 1e-12  # travel of a path that rounding may leave of none
 _TOUCHES, _GRAZES, _SLIPS_OFF = int(Reachability.TOUCHES), int(Reachability.GRAZES), int(Reachability.SLIPS_OFF)
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
@@ -72,8 +67,7 @@ class BranchWorkspace(NamedTuple):
 
     leg: LegSeries
     legs: Legs
-    knots: Floats
-    """Parameters at which the contour may not be smooth."""
+    knots: Floats  # parameters at which the contour may not be smooth
 
 
 def branch_workspace(accuracy: Accuracy, order: int, samples: int, knots: int, lines: int) -> BranchWorkspace:

@@ -14,15 +14,11 @@ from tactile_bayes.mechanics.poses.beam import Beam, rest_point
 
 __all__ = ["travel_into"]
 
+# Parts of stem and rod at whose ends depths are compared, and steps of the search between them.
 _PARTS, _SHRINKS = 16, 24
-"""Parts of stem and rod at whose ends depths are compared, and steps of the search between them."""
-
+# Depth [L] of a rod that has just been released, which errors of exact events and of others may cause.
 _DEEP, _DEEP_IN_FAST = 1e-6, 1e-5
-"""Depth [L] of a rod that has just been released, which errors of exact events and of others may cause."""
-
-_STEP, _SHARE = 2e-3, 0.5
-"""Least way of the rod [L] between two looks, and the way over its distance from the object."""
-
+_STEP, _SHARE = 2e-3, 0.5  # least way of the rod [L] between two looks, and the way over its distance from the object
 _HALVINGS = 40
 
 
@@ -40,10 +36,8 @@ class _Unloaded(NamedTuple):
 class _Depth(NamedTuple):
     """Depth of a point of the rod in the object; beside what is known of the object, minus the distance from that."""
 
-    upright: float
-    """Measured upright: concave along a straight rod, since the object is convex."""
-    across: float
-    """Measured across the contour."""
+    upright: float  # measured upright: concave along a straight rod, since the object is convex
+    across: float  # measured across the contour
 
 
 @compiled

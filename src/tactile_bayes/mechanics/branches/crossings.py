@@ -40,28 +40,17 @@ __all__ = [
     "release",
 ]
 
+# Least fall of the drive angle beyond a maximum that makes it the snap-off [rad]. After a smaller fall the rod hardly
+# jumps, since the same object stops it at once.
 DIP = 1e-4
-"""Least fall of the drive angle beyond a maximum that makes it the snap-off [rad]. After a smaller fall the rod hardly
-jumps, since the same object stops it at once."""
-
-LOST = -1.0
-"""Return value of `regained` where contact does not continue after a maximum of the drive angle."""
-
-_WEAK = 0.5
-"""Share of its force that a leg loses along its tangent for a release to be looked for on it."""
-
-NOT_SLIPPING = 1e-9
-"""Slip per length of a leg, or per travel, whose sense rounding may decide."""
-
+LOST = -1.0  # return value of `regained` where contact does not continue after a maximum of the drive angle
+_WEAK = 0.5  # share of its force that a leg loses along its tangent for a release to be looked for on it
+NOT_SLIPPING = 1e-9  # slip per length of a leg, or per travel, whose sense rounding may decide
+# Angle by which the force of a contact that sticks is beyond the cone [rad], and not by rounding; and on a leg that
+# begins at its edge, where the force may move inward to second order only.
 _BEYOND, _BEYOND_BEGIN = 1e-9, 1e-5
-"""Angle by which the force of a contact that sticks is beyond the cone [rad], and not by rounding; and on a leg that
-begins at its edge, where the force may move inward to second order only."""
-
-_MOST_HALVINGS = 60
-"""Largest number of steps to where the slip vanishes."""
-
-_LAST = 1e-13
-"""Newton step, as a share of a leg, below which its interpolants have rounding errors only."""
+_MOST_HALVINGS = 60  # largest number of steps to where the slip vanishes
+_LAST = 1e-13  # Newton step, as a share of a leg, below which its interpolants have rounding errors only
 
 
 @compiled

@@ -60,19 +60,12 @@ __all__ = [
     "unloaded",
 ]
 
-_MOST_STEPS = 25
-"""Newton steps of a search; those that converge take two to six."""
-
-_MOST_TURN, _MOST_LOADING = 0.4, 1.0
-"""Largest changes of q, and of f over 1 + f, in a step."""
-
-SETTLED = 1e-8
-"""Step, over the largest, after which a first-order correction leaves rounding errors only: its square."""
-
+_MOST_STEPS = 25  # Newton steps of a search; those that converge take two to six
+_MOST_TURN, _MOST_LOADING = 0.4, 1.0  # largest changes of q, and of f over 1 + f, in a step
+SETTLED = 1e-8  # step, over the largest, after which a first-order correction leaves rounding errors only: its square
+# Error of the equations that is rounding, and the largest step that it may cause, over the largest, where a contact
+# sticks: the rod hardly yields to a turn of a small force.
 _ROUNDING, _UNRESOLVED = 2e-15, 1e-4
-"""Error of the equations that is rounding, and the largest step that it may cause, over the largest, where a contact
-sticks: the rod hardly yields to a turn of a small force."""
-
 _NONE = Pose(0.0, 0.0, 0.0)
 
 
@@ -89,13 +82,11 @@ class Balance(NamedTuple):
     """An equilibrium with its loads, and its tangent."""
 
     at: Equilibrium
-    travel: float
-    """Travel of the drive: its angle, with the turn of the suspension [rad], or the way along its line."""
+    travel: float  # travel of the drive: its angle, with the turn of the suspension [rad], or the way along its line
     holding_moment: float
     force_x: float
     force_y: float
-    tangent: Equilibrium
-    """Null vector of the equations, in no particular length."""
+    tangent: Equilibrium  # null vector of the equations, in no particular length
     rates: Rates
 
 
@@ -127,12 +118,9 @@ class _Force(NamedTuple):
 class _Motion(NamedTuple):
     """Derivatives of contact and rod by a coordinate."""
 
-    along: float
-    """Way of the contact along the contour."""
-    closer: float
-    """Way of the rod toward the object."""
-    turn: float
-    """Turn of the force."""
+    along: float  # way of the contact along the contour
+    closer: float  # way of the rod toward the object
+    turn: float  # turn of the force
     psi1: float
     pose: Pose
 

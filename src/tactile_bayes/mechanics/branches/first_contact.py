@@ -45,12 +45,9 @@ __all__ = ["Beginning", "beginning", "clear_angle"]
 class _Sought(IntEnum):
     """Function whose root is sought; it decreases away from the side of the pivot."""
 
-    LEVER = 0
-    """Lever arm of a force across the contour."""
-    TURNED = 1
-    """Angle of the contour's direction to the unloaded rod."""
-    WITHIN = 2
-    """Margin to the rod's reach."""
+    LEVER = 0  # lever arm of a force across the contour
+    TURNED = 1  # angle of the contour's direction to the unloaded rod
+    WITHIN = 2  # margin to the rod's reach
 
 
 _TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reachability.TOUCHES), int(Reachability.TOO_FAR), int(Reachability.CUTS_PIVOT)
@@ -59,71 +56,52 @@ _BEGINS_INSIDE, _SLIPS_OFF = int(Reachability.BEGINS_INSIDE), int(Reachability.S
 _TOUCHES_TWICE, _HEAD_ON = int(Reachability.TOUCHES_TWICE), int(Reachability.HEAD_ON)
 _CLEARANCE = CLEARANCE
 
+# Largest number of corrections of a standoff. Each reduces the error to a share of the order of the cone's angle.
 _MOST_MOVES = 50
-"""Largest number of corrections of a standoff. Each reduces the error to a share of the order of the cone's angle."""
-
-_ROUNDING = 1e-14
-"""Distance from the end of the rod's reach [L] that counts as zero."""
-
+_ROUNDING = 1e-14  # distance from the end of the rod's reach [L] that counts as zero
+# Largest number of steps of the search between two looks, and its last step where a rod comes within reach and is past
+# the object.
 _MOST_HALVINGS, _LAST = 100, 1e-6
-"""Largest number of steps of the search between two looks, and its last step where a rod comes within reach and is past
-the object."""
-
+# Parts of a drive, and fewest of a line, between which a carried rod is looked at, and last step of searches there.
 _LOOKS, _FEWEST_LOOKS, _COARSE = 8, 2, 1e-3
-"""Parts of a drive, and fewest of a line, between which a carried rod is looked at, and last step of searches there."""
-
+# Angle [rad] to which first contact of a carried rod is found; a search for the equilibrium there follows.
 _CLOSE = 1e-3
-"""Angle [rad] to which first contact of a carried rod is found; a search for the equilibrium there follows."""
-
+# Number of steps of the search for the pose in which a rod reaches farthest into an object that it hardly reaches.
 _DEEPEST = 20
-"""Number of steps of the search for the pose in which a rod reaches farthest into an object that it hardly reaches."""
-
-_JUMP = 0.02
-"""Angle [rad] by which a rod that comes within reach of an object is past it, and has not touched it."""
+_JUMP = 0.02  # angle [rad] by which a rod that comes within reach of an object is past it, and has not touched it
 
 
+# Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried: as
+# near as its first contact is found.
 _NOT_TURNED = 1e-3
-"""Angle [rad] by which a tip that is found to touch first may lie along the contour all the same, if it is carried: as
-near as its first contact is found."""
 
 
-_HARDLY_SLIPS = 1e-5
-"""Slip per travel whose sense errors of a table may decide, ten times these."""
-
+_HARDLY_SLIPS = 1e-5  # slip per travel whose sense errors of a table may decide, ten times these
+# Travel [rad or L] on which the sense of a slip is decided that vanishes to first order, as that of straight rods does.
 _SLIGHT = 1e-3
-"""Travel [rad or L] on which the sense of a slip is decided that vanishes to first order, as that of straight rods
-does."""
 
 
-_RIGID = 1e-9
-"""Travel per force [L³/EI] that rounding makes of none: a contact at 0.02 L from the base gives 3e-6."""
+_RIGID = 1e-9  # travel per force [L³/EI] that rounding makes of none: a contact at 0.02 L from the base gives 3e-6
 
 
 class Approach(NamedTuple):
     """First contact with an outline, as a parameter of the contour."""
 
-    reach: int
-    """A `Reachability`."""
-    distance: float
-    """Least distance of contour and base [L]."""
-    begin: float
-    """First contact."""
-    tip_first: bool
-    """True if the tip touches first, and not a point before it."""
-    ends: tuple[float, float]
-    """Least and greatest parameter of the contour."""
+    reach: int  # a `Reachability`
+    distance: float  # least distance of contour and base [L]
+    begin: float  # first contact
+    tip_first: bool  # true if the tip touches first, and not a point before it
+    ends: tuple[float, float]  # least and greatest parameter of the contour
+    # Angle by which the rod would turn until it touches [rad]; out of reach, one and the distance that is missing.
     gap: float
-    """Angle by which the rod would turn until it touches [rad]; out of reach, one and the distance that is missing."""
 
 
 class Beginning(NamedTuple):
     """First contact and the state there."""
 
-    reach: int
-    """A `Reachability`."""
+    reach: int  # a `Reachability`
     near: Approach
-    scene: Scene
-    """With the phase, the line of the drive, and the friction that the rod has there."""
+    scene: Scene  # with the phase, the line of the drive, and the friction that the rod has there
     line: int
     state: Balance
 
@@ -186,15 +164,11 @@ class _Nearest(NamedTuple):
 
     ends: tuple[float, float]
     p: float
-    distance: float
-    """Distance from the base [L]."""
-    missing: float
-    """Distance of the point beside which the tip lies, less the rod's reach [L]."""
-    is_above: bool
-    """Whether the base is outside of the object."""
+    distance: float  # distance from the base [L]
+    missing: float  # distance of the point beside which the tip lies, less the rod's reach [L]
+    is_above: bool  # whether the base is outside of the object
     beyond_low: bool
-    beyond_high: bool
-    """Whether it would be beyond the least or the greatest parameter."""
+    beyond_high: bool  # whether it would be beyond the least or the greatest parameter
 
 
 @compiled

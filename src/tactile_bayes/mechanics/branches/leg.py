@@ -48,59 +48,42 @@ __all__ = [
     "shortened",
 ]
 
+# Weights of q and f in the length of a leg, the last if the base is carried. Away from first contact all is smooth in
+# p, where it is monotone: five times these weights, or a fifth, change the Newton steps of likelihoods by 12 %.
 _BY_ROD, _BY_FORCE, _BY_FORCE_ON_LINE = 0.2, 0.03, 0.3
-"""Weights of q and f in the length of a leg, the last if the base is carried. Away from first contact all is smooth in
-p, where it is monotone: five times these weights, or a fifth, change the Newton steps of likelihoods by 12 %."""
-
+# First distance at which a tangent is compared, in p, how often it is divided by ten, and turn of the force there that
+# is small enough [rad].
 _BESIDE, _MOST_BESIDE, _LITTLE = 1e-3, 7, 0.1
-"""First distance at which a tangent is compared, in p, how often it is divided by ten, and turn of the force there
-that is small enough [rad]."""
-
+# Change of p over that of f below which a contact that sticks is followed by f, which may pass a maximum.
 _HARDLY_TURNS = 0.05
-"""Change of p over that of f below which a contact that sticks is followed by f, which may pass a maximum."""
-
-NUDGE = 1e-9
-"""Distance beyond a knot of the contour, in its parameter, at which it is smooth."""
-
+NUDGE = 1e-9  # distance beyond a knot of the contour, in its parameter, at which it is smooth
+# Force from which a contact that sticks is extrapolated to none, over that of a leg: rounding leaves 1e-11 rad of its
+# direction.
 HARDLY = 1e-5
-"""Force from which a contact that sticks is extrapolated to none, over that of a leg: rounding leaves 1e-11 rad of its
-direction."""
-
-_COARSE = 1e-5
-"""Last step to a node where noise hides what is finer, and the rod clearly slides."""
-
+_COARSE = 1e-5  # last step to a node where noise hides what is finer, and the rod clearly slides
+# Rows of series after the three loads: the coordinate q of the rod, the contour's parameter, the travel (in a rotation
+# the drive angle), and its derivative.
 REST, PLACE, ANGLE, RATE = 3, 4, 5, 6
-"""Rows of series after the three loads: the coordinate q of the rod, the contour's parameter, the travel (in a rotation
-the drive angle), and its derivative."""
 
 
 class Accuracy(NamedTuple):
     """Accuracy of a path."""
 
-    tolerance: Floats
-    """Tolerated errors of moment and forces [EI/L and EI/L²], shape (3,)."""
-    resolved: float
-    """Tolerated error of an interpolant, as a share of the change of the travel on a leg."""
-    sharp: float
-    """Tolerated error of the travel of an event [rad]."""
-    halvings: int
-    """Largest number of halvings of a leg; a singularity at its end exhausts them."""
-    first_step: float
-    """Newton step, as a share of the bracket, at which the search for first contact ends."""
-    last_step: float
-    """Newton step, as a share of the bracket, at which searches on a leg end."""
-    polished: bool
-    """True if states at drive angles are solved for, and not taken from the series."""
-    exact: bool
-    """True if events are computed to rounding."""
+    tolerance: Floats  # tolerated errors of moment and forces [EI/L and EI/L²], shape (3,)
+    resolved: float  # tolerated error of an interpolant, as a share of the change of the travel on a leg
+    sharp: float  # tolerated error of the travel of an event [rad]
+    halvings: int  # largest number of halvings of a leg; a singularity at its end exhausts them
+    first_step: float  # Newton step, as a share of the bracket, at which the search for first contact ends
+    last_step: float  # Newton step, as a share of the bracket, at which searches on a leg end
+    polished: bool  # true if states at drive angles are solved for, and not taken from the series
+    exact: bool  # true if events are computed to rounding
 
 
 class Leg(NamedTuple):
     """A part of a branch, and the planes that cut it: normal · (z − begin) = way, from 0 to 1, for z = (p, q, f)."""
 
     begin: Equilibrium
-    along: Equilibrium
-    """Change of the coordinates along the tangent at the beginning; its product with the normal is 1."""
+    along: Equilibrium  # change of the coordinates along the tangent at the beginning; its product with the normal is 1
     normal: Equilibrium
 
 
@@ -108,27 +91,18 @@ class LegSeries(NamedTuple):
     """Workspace for the series of a leg, from values and derivatives at half as many nodes."""
 
     accuracy: Accuracy
-    nodes: Floats
-    """Positions from 0 to 1: legs have their ends in common."""
+    nodes: Floats  # positions from 0 to 1: legs have their ends in common
+    # Weights of values and derivatives at the beginning and the last nodes in an extrapolation to the next node, shape
+    # (nodes, 6).
     onward: Floats
-    """Weights of values and derivatives at the beginning and the last nodes in an extrapolation to the next node, shape
-    (nodes, 6)."""
-    fit: Floats
-    """Coefficients of the series of which one value or derivative is 1 and all others are 0, a row each."""
-    slopes: Floats
-    """Coefficients of the derivative of each polynomial, a row each."""
-    grid: Floats
-    """Positions at which signs are checked."""
-    on_grid: Floats
-    """Values of each polynomial there."""
-    at_nodes: Floats
-    """Values of the series at the nodes, and then their derivatives, shape (6, order)."""
-    series: Floats
-    """Shape (7, order)."""
-    slope: Floats
-    """Derivative of one of them, where it is wanted."""
-    sampled: Floats
-    """Values on the grid."""
+    fit: Floats  # coefficients of the series of which one value or derivative is 1 and all others are 0, a row each
+    slopes: Floats  # coefficients of the derivative of each polynomial, a row each
+    grid: Floats  # positions at which signs are checked
+    on_grid: Floats  # values of each polynomial there
+    at_nodes: Floats  # values of the series at the nodes, and then their derivatives, shape (6, order)
+    series: Floats  # shape (7, order)
+    slope: Floats  # derivative of one of them, where it is wanted
+    sampled: Floats  # values on the grid
 
 
 def leg_series(accuracy: Accuracy, order: int) -> LegSeries:

@@ -31,9 +31,9 @@ __all__ = [
     "pose_at",
 ]
 
+# Columns of a line in an array: its beginning (x, y, drive angle), the change of these with the travel, and travel at
+# beginning and end.
 LINE_COLUMNS = 8
-"""Columns of a line in an array: its beginning (x, y, drive angle), the change of these with the travel, and travel at
-beginning and end."""
 
 
 class Offset(NamedTuple):
@@ -48,22 +48,15 @@ class Line(NamedTuple):
     """A straight part of a drive, in the sweep frame and in rod lengths."""
 
     begin: Offset
-    along: Offset
-    """Change of the pose with the travel."""
-    onward: Offset
-    """Change of the travel with the pose."""
+    along: Offset  # change of the pose with the travel
+    onward: Offset  # change of the travel with the pose
     across: Offset
-    other: Offset
-    """Directions across the line and each other."""
-    travel: float
-    """Travel at its beginning."""
-    end: float
-    """Travel at its end."""
+    other: Offset  # directions across the line and each other
+    travel: float  # travel at its beginning
+    end: float  # travel at its end
 
 
-_STRAIGHT = 1e-9
-"""Distance from a line that is rounding [L and rad]."""
-
+_STRAIGHT = 1e-9  # distance from a line that is rounding [L and rad]
 _ORIGIN = Offset(0.0, 0.0, 0.0)
 NO_LINE = Line(_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, 0.0, 0.0)
 
@@ -71,10 +64,8 @@ NO_LINE = Line(_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, 0.0, 0.0)
 class LinePath(NamedTuple):
     """A drive that carries the base, in the sweep frame and in rod lengths, from its first pose."""
 
-    lines: Floats
-    """Shape (lines, `LINE_COLUMNS`)."""
-    travels: Floats
-    """Travel at each pose, shape (n,)."""
+    lines: Floats  # shape (lines, `LINE_COLUMNS`)
+    travels: Floats  # travel at each pose, shape (n,)
 
 
 def lines_through(poses: Floats, length: float, *, backward: bool = False, off: float = _STRAIGHT) -> LinePath:

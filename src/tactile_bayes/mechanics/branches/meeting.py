@@ -66,48 +66,37 @@ from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 
 __all__ = ["KNOT", "OPEN", "Meeting", "fate_of", "go_on", "in_mode", "meet", "slid_back"]
 
+# How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase between tip
+# and rod, the end of a line of the drive, or sliding or sticking ends.
 _SMOOTHLY, KNOT, _PHASE, _LINE, _MODE = range(5)
-"""How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase between tip
-and rod, the end of a line of the drive, or sliding or sticking ends."""
-
-OPEN = -1
-"""In place of a `SnapOff` as long as the end of a path is not known."""
-
-_NO_MOMENT = 1e-7
-"""Holding moment [EI/L] that counts as zero: a hundred times the error of the loads of exact legs."""
-
+OPEN = -1  # in place of a `SnapOff` as long as the end of a path is not known
+_NO_MOMENT = 1e-7  # holding moment [EI/L] that counts as zero: a hundred times the error of the loads of exact legs
+# Force [EI/L²] at the end of a leg on which a release was found that is zero. There may be another state without force
+# on the plane across its end.
 _NO_LOAD = 1e-8
-"""Force [EI/L²] at the end of a leg on which a release was found that is zero. There may be another state without force
-on the plane across its end."""
-
 _NEVER, _FOLD, _CORNER, _THRUST, _RELEASE, _JUMP = (int(kind) for kind in SnapOff)
 _RUNS_OUT = int(Reachability.RUNS_OUT)
 
 
+# Slip per travel in the wrong sense of a contact that has stuck for less than that; and per length of a leg that begins
+# where a contact has stuck for hardly more.
 _HIDDEN, _UNCLEAR = 1e-4, 1e-6
-"""Slip per travel in the wrong sense of a contact that has stuck for less than that; and per length of a leg that
-begins where a contact has stuck for hardly more."""
-
-_FAINT = 4e-3
-"""Force [EI/L²] that rounding turns by 3e-6 rad where a rod that is as good as straight sticks."""
-
+_FAINT = 4e-3  # force [EI/L²] that rounding turns by 3e-6 rad where a rod that is as good as straight sticks
+# Largest travel of a leg on a line of the drive, over the travel up to its end: a path of 40 lines takes half the
+# Newton steps that it takes without.
 _ROOM_PAST_LINE = 1.1
-"""Largest travel of a leg on a line of the drive, over the travel up to its end: a path of 40 lines takes half the
-Newton steps that it takes without."""
 
 
 class Meeting(NamedTuple):
     """How a leg is left, and its part on which the travel of the drive grows before that."""
 
     kind: int
-    share: float
-    """Position on the leg at which it is left."""
+    share: float  # position on the leg at which it is left
     left: Balance
+    # Position at which it ends growing: 0 if it falls from the beginning, −1 if the leg lies beyond a maximum.
     stop: float
-    """Position at which it ends growing: 0 if it falls from the beginning, −1 if the leg lies beyond a maximum."""
     at: Balance
-    is_maximum: bool
-    """Whether the travel falls beyond it."""
+    is_maximum: bool  # whether the travel falls beyond it
 
 
 @inlined

@@ -36,12 +36,10 @@ __all__ = [
 ]
 
 _UPRIGHT = 0.5 * np.pi
-_FAR = 1e3
-"""Rod lengths beyond which an end of a contour does not matter."""
-
+_FAR = 1e3  # rod lengths beyond which an end of a contour does not matter
+# Largest number of steps in which the parameter at an x is sought, and the last one over the range: beside it the
+# contour is straight.
 _MOST_STEPS, _SETTLED = 60, 1e-7
-"""Largest number of steps in which the parameter at an x is sought, and the last one over the range: beside it the
-contour is straight."""
 
 
 class Half(NamedTuple):
@@ -50,8 +48,7 @@ class Half(NamedTuple):
     kind: int
     size: float
     shape: float
-    unit: float
-    """Unit of the contour's own parameter in rod lengths, for a power law; 1 for others."""
+    unit: float  # unit of the contour's own parameter in rod lengths, for a power law; 1 for others
 
 
 class Outline(NamedTuple):
@@ -60,23 +57,15 @@ class Outline(NamedTuple):
     left: Half
     right: Half
     low: float
-    high: float
-    """Least and greatest parameter of a table; they have no meaning without one."""
-    sign: float
-    """−1 if the table is mirrored."""
+    high: float  # least and greatest parameter of a table; they have no meaning without one
+    sign: float  # −1 if the table is mirrored
     x: float
-    y: float
-    """Vertex."""
-    standoff: float
-    """Distance of the centreline at the base of the rod."""
-    half_angle: float
-    """Half angle ε of the cone [rad]."""
-    narrowing: float
-    """Distance less per arc length, sin ε."""
-    reach: float
-    """Lengths of rod and stem, beyond which a contour is cut."""
-    table: Floats
-    """In rod lengths."""
+    y: float  # vertex
+    standoff: float  # distance of the centreline at the base of the rod
+    half_angle: float  # half angle ε of the cone [rad]
+    narrowing: float  # distance less per arc length, sin ε
+    reach: float  # lengths of rod and stem, beyond which a contour is cut
+    table: Floats  # in rod lengths
 
 
 class Place(NamedTuple):
@@ -85,12 +74,9 @@ class Place(NamedTuple):
     x: float
     y: float
     sin: float
-    cos: float
-    """Sine and cosine of the slope angle."""
-    speed: float
-    """dσ/dp ≥ 0 with the arc length σ."""
-    bend: float
-    """dα/dp ≥ 0."""
+    cos: float  # sine and cosine of the slope angle
+    speed: float  # dσ/dp ≥ 0 with the arc length σ
+    bend: float  # dα/dp ≥ 0
 
 
 @compiled

@@ -53,34 +53,23 @@ __all__ = [
     "turned_over",
 ]
 
+# Codes of the phases in which a tip, or the rod, sticks, beside `TIP` and `TANGENTIAL`, in which they slide.
 STUCK, ROLLING = 3, 4
-"""Codes of the phases in which a tip, or the rod, sticks, beside `TIP` and `TANGENTIAL`, in which they slide."""
-
-_LONGEST = 1.5
-"""Largest arc length [L] at which a contact is sought: a Newton step may pass the tip by half the rod."""
-
+_LONGEST = 1.5  # largest arc length [L] at which a contact is sought: a Newton step may pass the tip by half the rod
+# ψ1 between which a contact is sought: a quarter turn more than those of a rod on the outside of the contour.
 _LEAST_PSI1, _MOST_PSI1 = -0.5 * math.pi, 1.5 * math.pi
-"""ψ1 between which a contact is sought: a quarter turn more than those of a rod on the outside of the contour."""
-
-_CLEARLY = 0.03
-"""Slip over the way on a leg, a hundred times the errors of coarse nodes."""
-
+_CLEARLY = 0.03  # slip over the way on a leg, a hundred times the errors of coarse nodes
+# Gauss–Legendre quadrature of the way that a rod rolls on a leg, to rounding.
 _NODES, _WEIGHTS = (tuple(column.tolist()) for column in np.polynomial.legendre.leggauss(16))
-"""Gauss–Legendre quadrature of the way that a rod rolls on a leg, to rounding."""
-
-_MOST_STEPS = 8
-"""Newton steps to where a rod has rolled to its tip."""
+_MOST_STEPS = 8  # Newton steps to where a rod has rolled to its tip
 
 
 class Contact(NamedTuple):
     """Where rod and object touch, and the direction of the force."""
 
-    p: float
-    """Parameter of the contour."""
-    friction_angle: float
-    """Angle γ from its normal to the force [rad]."""
-    psi1: float
-    """Angle from the force to the rod, as in `pose` [rad]."""
+    p: float  # parameter of the contour
+    friction_angle: float  # angle γ from its normal to the force [rad]
+    psi1: float  # angle from the force to the rod, as in `pose` [rad]
     arclength: float
 
 
@@ -96,11 +85,9 @@ class Move(NamedTuple):
 class Limit(NamedTuple):
     """Where a phase ends."""
 
-    is_p: bool
-    """True if p ends there, else q."""
+    is_p: bool  # true if p ends there, else q
     value: float
-    sense: float
-    """1 if it grows toward the end, −1 if it falls."""
+    sense: float  # 1 if it grows toward the end, −1 if it falls
 
 
 @inlined

@@ -48,92 +48,65 @@ STATE_COLUMNS = (
     *("phase", "parameter", "x", "y", "slope_angle", "drive_angle"),
     *("holding_moment", "force_x", "force_y", "arclength", "tip_angle", "travel", "friction_angle", "sticks"),
 )
+# A state in the sweep frame; the drive angle is that of the unloaded rod, without the turn of the suspension, the
+# friction angle that from the contour's normal to the force, and `sticks` is 1 where the contact does not slip.
 STATE = np.dtype([(name, np.float64) for name in STATE_COLUMNS])
-"""A state in the sweep frame; the drive angle is that of the unloaded rod, without the turn of the suspension, the
-friction angle that from the contour's normal to the force, and `sticks` is 1 where the contact does not slip."""
-
+# Newton step, as a share of the leg, after which the search in series ends, and the largest number of steps.
 _NEAR, _MOST_STEPS = 1e-5, 6
-"""Newton step, as a share of the leg, after which the search in series ends, and the largest number of steps."""
-
-_PAST = 1e-6
-"""Share of a leg by which a step may pass the end."""
-
+_PAST = 1e-6  # share of a leg by which a step may pass the end
+# Newton step to an exact state, over the distance from the end of its leg, after which a first-order correction leaves
+# rounding errors only: its square; the rounding of a travel; and that of one by Taylor series, below which a step that
+# does not halve what is missing is noise (at 1e-8, 2 of 40 paths had a state just before a fold off by 5e-10 rad).
 _SETTLED, _ROUNDING, _NOISE = 1e-8, 1e-15, 1e-13
-"""Newton step to an exact state, over the distance from the end of its leg, after which a first-order correction leaves
-rounding errors only: its square; the rounding of a travel; and that of one by Taylor series, below which a step that
-does not halve what is missing is noise (at 1e-8, 2 of 40 paths had a state just before a fold off by 5e-10 rad)."""
-
-_STEADY = 1e-6
-"""Steadiness of a leg below which it ends at a fold, up to rounding: also where this is at a knot."""
-
-_MOST_HALVINGS = 100
-"""Largest number of steps to an exact state: more than halvings of a leg to rounding."""
-
-_PIECES = 16
-"""Pieces of a leg between which curvatures are compared: the largest is found to some 1e-5 of itself."""
+_STEADY = 1e-6  # steadiness of a leg below which it ends at a fold, up to rounding: also where this is at a knot
+_MOST_HALVINGS = 100  # largest number of steps to an exact state: more than halvings of a leg to rounding
+_PIECES = 16  # pieces of a leg between which curvatures are compared: the largest is found to some 1e-5 of itself
 
 
 class Samples(NamedTuple):
     """Samples of one path."""
 
-    angles: Floats
-    """Travels, or drive angles as read, in the sweep frame, increasing."""
-    rows: Index
-    """Rows of their loads and states."""
-    relative: bool
-    """True if angles are shares of the travel from first contact to snap-off."""
+    angles: Floats  # travels, or drive angles as read, in the sweep frame, increasing
+    rows: Index  # rows of their loads and states
+    relative: bool  # true if angles are shares of the travel from first contact to snap-off
 
 
 class Found(NamedTuple):
     """Results of a path."""
 
-    loads: Floats
-    """Loads with the sign of the sweep and the rod's rigidity, initially zero, shape (rows, 3)."""
-    states: Any
-    """States of samples, initially zero, structured as `STATE`, shape (rows,)."""
+    loads: Floats  # loads with the sign of the sweep and the rod's rigidity, initially zero, shape (rows, 3)
+    states: Any  # states of samples, initially zero, structured as `STATE`, shape (rows,)
+    # States where phases begin, and at the end of the last, structured as `STATE`, shape (phases + 1,); none if no
+    # states are computed.
     events: Any
-    """States where phases begin, and at the end of the last, structured as `STATE`, shape (phases + 1,); none if no
-    states are computed."""
-    event: Any
-    """Events of the path, one record; see `Solutions`."""
+    event: Any  # events of the path, one record; see `Solutions`
 
 
 class Course(NamedTuple):
     """Course of the travel along a leg."""
 
-    stop: float
-    """Position at which the leg, or the path, ends."""
-    begin: float
-    """Travel at the beginning."""
+    stop: float  # position at which the leg, or the path, ends
+    begin: float  # travel at the beginning
     end: float
-    steadiness: float
-    """Rate at the end over the mean rate: 0 where the drive turns back, 1 if the rate is constant."""
+    steadiness: float  # rate at the end over the mean rate: 0 where the drive turns back, 1 if the rate is constant
 
 
 class Legs(NamedTuple):
     """Legs that have been followed, one in each row, and room for the samples on one of them."""
 
     phase: Index
-    line: Index
-    """Number of the line of the drive."""
+    line: Index  # number of the line of the drive
+    # Angle of the friction, and the anchor of a contact that sticks, as in `Rig` and `Anchor`, shape (legs, 3).
     friction: Floats
-    """Angle of the friction, and the anchor of a contact that sticks, as in `Rig` and `Anchor`, shape (legs, 3)."""
-    leg: Floats
-    """As in `Leg`, and the equilibrium where its growing part ends, shape (legs, 4, 3)."""
-    course: Floats
-    """As in `Course`, shape (legs, 4)."""
-    series: Floats
-    """As in `LegSeries`, shape (legs, 7, order)."""
-    angles: Floats
-    """Drive angles of all samples, if shares were given."""
-    wanted: Floats
-    """Travels of the samples on a leg."""
-    twice: Floats
-    """Their positions z, as 4 z − 2."""
+    leg: Floats  # as in `Leg`, and the equilibrium where its growing part ends, shape (legs, 4, 3)
+    course: Floats  # as in `Course`, shape (legs, 4)
+    series: Floats  # as in `LegSeries`, shape (legs, 7, order)
+    angles: Floats  # drive angles of all samples, if shares were given
+    wanted: Floats  # travels of the samples on a leg
+    twice: Floats  # their positions z, as 4 z − 2
     now: Floats
     before: Floats
-    found: Floats
-    """Values of up to five series, shape (5, samples)."""
+    found: Floats  # values of up to five series, shape (5, samples)
 
 
 class Followed(NamedTuple):

@@ -20,12 +20,8 @@ from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
 __all__ = ["ruled_out"]
 
-_SHORT_END = 1e-3
-"""Length of a free end [L] up to which its curvature at the contact tells whether it is in the object."""
-
-_ROUNDING = 1e-9
-"""How far beyond the end of the contour rounding may put a contact at it."""
-
+_SHORT_END = 1e-3  # length of a free end [L] up to which its curvature at the contact tells whether it is in the object
+_ROUNDING = 1e-9  # how far beyond the end of the contour rounding may put a contact at it
 _ACROSS = 0.5 * math.pi
 _TOUCHES, _TOO_CLOSE, _ENDS = int(Reachability.TOUCHES), int(Reachability.TOO_CLOSE), int(Reachability.ENDS)
 _TOUCHES_TWICE, _FOLDS_OVER = int(Reachability.TOUCHES_TWICE), int(Reachability.FOLDS_OVER)

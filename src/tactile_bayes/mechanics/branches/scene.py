@@ -47,25 +47,20 @@ NO_FORCE = Equilibrium(0.0, 0.0, 0.0)
 class Rig(NamedTuple):
     """Parameters of the loads other than rod and contour."""
 
+    # Angle from the contour's normal to the force of a contact that slides, ± arctan μ [rad]: > 0 where it slides to
+    # lesser parameters. Of one that sticks, that of the last that slid.
     friction_angle: float
-    """Angle from the contour's normal to the force of a contact that slides, ± arctan μ [rad]: > 0 where it slides to
-    lesser parameters. Of one that sticks, that of the last that slid."""
-    compliance: float
-    """Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]."""
-    offset: float
-    """Encoder offset in the sweep frame [rad]."""
-    sign: float
-    """−1 in backward sweeps, else 1."""
+    compliance: float  # turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]
+    offset: float  # encoder offset in the sweep frame [rad]
+    sign: float  # −1 in backward sweeps, else 1
     moment_unit: float
-    force_unit: float
-    """EI/L and EI/L² of the rod, in the units of loads."""
+    force_unit: float  # EI/L and EI/L² of the rod, in the units of loads
 
 
 class Anchor(NamedTuple):
     """A contact of object and rod that does not slip."""
 
-    p: float
-    """Parameter of the contour."""
+    p: float  # parameter of the contour
     arclength: float
 
 
@@ -78,11 +73,10 @@ class Scene(NamedTuple):
     outline: Outline
     beam: Beam
     rig: Rig
+    # Drive that carries the base, which is at the origin at its beginning; None for a rotation about a pivot.
     line: Line | None
-    """Drive that carries the base, which is at the origin at its beginning; None for a rotation about a pivot."""
     phase: int
-    anchor: Anchor
-    """Where it sticks, if it does."""
+    anchor: Anchor  # where it sticks, if it does
 
 
 @compiled

@@ -39,14 +39,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "shapes_of", "solve_sweeps"]
 
+# Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force.
 _SAME_ANGLE = 1e-5
-"""Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force."""
-
 _TOUCHES, _TOO_FAR, _BEGINS_INSIDE = (
     int(reach) for reach in (Reachability.TOUCHES, Reachability.TOO_FAR, Reachability.BEGINS_INSIDE)
 )
 _NEVER, _RELEASE = int(SnapOff.NEVER), int(SnapOff.RELEASE)
 
+# Accuracy with states and events to rounding.
 _EXACT = Accuracy(
     np.full(3, np.inf),
     resolved=1e-9,
@@ -57,35 +57,21 @@ _EXACT = Accuracy(
     polished=True,
     exact=True,
 )
-"""Accuracy with states and events to rounding."""
-
-_SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
-"""Accuracy with events to rounding and states from series."""
-
+_SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)  # accuracy with events to rounding and states from series
+# Accuracy that noise requires, beside its tolerance.
 _FAST = _EXACT._replace(resolved=1e-3, sharp=1e-6, first_step=1e-6, last_step=1e-4, exact=False)
-"""Accuracy that noise requires, beside its tolerance."""
-
-_LAST_STEP_STUCK = 4e-16
-"""Last step where a rod may stick: what hardly slips is lost by coarser ones."""
-
-_EXACT_ORDER, _FAST_ORDER = 32, 12
-"""Numbers of terms of the series of a leg."""
-
-_FEWEST = 16
-"""Fewest sweeps that another thread shares."""
+_LAST_STEP_STUCK = 4e-16  # last step where a rod may stick: what hardly slips is lost by coarser ones
+_EXACT_ORDER, _FAST_ORDER = 32, 12  # numbers of terms of the series of a leg
+_FEWEST = 16  # fewest sweeps that another thread shares
 
 
 class Shapes(NamedTuple):
     """Contours, in their own unit of length."""
 
-    kinds: tuple[int, int]
-    """Kinds of the left and the right half of all contours."""
-    halves: Floats
-    """Size and shape of the left and the right half, and the vertex, shape (n, 6)."""
-    tables: Floats
-    """Tables, shape (n, rows, columns), without rows if there are formulas."""
-    knots: Floats
-    """Parameters at which contours may not be smooth, increasing, shape (n, knots)."""
+    kinds: tuple[int, int]  # kinds of the left and the right half of all contours
+    halves: Floats  # size and shape of the left and the right half, and the vertex, shape (n, 6)
+    tables: Floats  # tables, shape (n, rows, columns), without rows if there are formulas
+    knots: Floats  # parameters at which contours may not be smooth, increasing, shape (n, knots)
 
 
 def shapes_of(contours: Contour, low: Floats | None = None, high: Floats | None = None) -> Shapes:
@@ -108,10 +94,8 @@ def shapes_of(contours: Contour, low: Floats | None = None, high: Floats | None 
 class Sweeps(NamedTuple):
     """Sweeps to solve, as arrays of shape (sweeps,)."""
 
-    contour: Index
-    """Index of the contour; the loads of a contour's sweeps are put together."""
-    segment: Index
-    """Index of the sweep segment whose samples are read."""
+    contour: Index  # index of the contour; the loads of a contour's sweeps are put together
+    segment: Index  # index of the sweep segment whose samples are read
     base_x: Floats
     base_y: Floats
     length: Floats
@@ -119,63 +103,48 @@ class Sweeps(NamedTuple):
     backward: Flags
     friction_angle: Floats
     compliance: Floats
+    # Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]; with a profile, what is added to its own.
     rest_curvature: Floats
-    """Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]; with a profile, what is added to its own."""
-    rest_shape: Floats
-    """Amplitudes of the modes of a profile, shape (sweeps, MOST_MODES)."""
-    taper: Floats
-    """Taper, for rods with a profile."""
-    stem: Floats
-    """Rigid piece between pivot and rod [L]."""
-    offset: Floats
-    """Encoder offset in the laboratory frame [rad]."""
-    rigidity: Floats
-    """Flexural rigidity over the rigidity in the units of loads."""
-    relative_length: Floats
-    """Length of the rod over the length in the units of loads and drives."""
+    rest_shape: Floats  # amplitudes of the modes of a profile, shape (sweeps, MOST_MODES)
+    taper: Floats  # taper, for rods with a profile
+    stem: Floats  # rigid piece between pivot and rod [L]
+    offset: Floats  # encoder offset in the laboratory frame [rad]
+    rigidity: Floats  # flexural rigidity over the rigidity in the units of loads
+    relative_length: Floats  # length of the rod over the length in the units of loads and drives
 
 
 class Segments(NamedTuple):
     """Samples of sweep segments, one segment after the other."""
 
-    first: Index
-    """First sample of every segment, and the number of samples at the end."""
-    rows: Index
-    """Row of the results of each sample."""
-    angles: Floats
-    """Drive angles as read, in the sweep frame, increasing in each segment [rad]."""
+    first: Index  # first sample of every segment, and the number of samples at the end
+    rows: Index  # row of the results of each sample
+    angles: Floats  # drive angles as read, in the sweep frame, increasing in each segment [rad]
+    # Lines of the drives that carry the base, in the sweep frame from their beginnings, as in `lines_through`, shape
+    # (segments, lines, columns), NaN after the last; without any, the pivots rest. Angles are then travels.
     lines: Floats | None = None
-    """Lines of the drives that carry the base, in the sweep frame from their beginnings, as in `lines_through`, shape
-    (segments, lines, columns), NaN after the last; without any, the pivots rest. Angles are then travels."""
-    relative: bool = False
-    """True if they are shares of the drive angle from first contact to snap-off."""
+    relative: bool = False  # true if they are shares of the drive angle from first contact to snap-off
 
 
 class Solutions(NamedTuple):
     """Solutions of sweeps. Drive angles are in the sweep frame; events have the shape (sweeps,), NaN without a path."""
 
+    # Loads in the laboratory frame [EI/L, EI/L² for a rigidity of 1], 0 out of contact, shape (contours, rows, 3).
     loads: Floats
-    """Loads in the laboratory frame [EI/L, EI/L² for a rigidity of 1], 0 out of contact, shape (contours, rows, 3)."""
-    states: Floats
-    """States with the columns of `STATE`, shape (contours, rows or 0, columns)."""
+    states: Floats  # states with the columns of `STATE`, shape (contours, rows or 0, columns)
+    # States where phases begin, and at the end of the last, shape (sweeps, phases + 1 or 0, columns).
     event_states: Floats
-    """States where phases begin, and at the end of the last, shape (sweeps, phases + 1 or 0, columns)."""
-    phases: Index
-    """Number of phases."""
+    phases: Index  # number of phases
     reach: NDArray[np.int8]
-    distance: Floats
-    """Least distance of contour and pivot [L]."""
+    distance: Floats  # least distance of contour and pivot [L]
     first_angle: Floats
     first_parameter: Floats
     snap_angle: Floats
-    snap_parameter: Floats
-    """Parameter at the end of the path, or at a second contact and the like if there is one."""
+    snap_parameter: Floats  # parameter at the end of the path, or at a second contact and the like if there is one
     snap_off: NDArray[np.int8]
-    curvature: Floats
-    """Largest curvature of the rod up to snap-off [1/L], if states are computed."""
+    curvature: Floats  # largest curvature of the rod up to snap-off [1/L], if states are computed
+    # Drive angle beyond which the unloaded rod is clear [rad]; on lines, the travel from snap-off on at which it lies
+    # in the object, −∞ if it does so nowhere; NaN if it is not computed.
     clear_angle: Floats
-    """Drive angle beyond which the unloaded rod is clear [rad]; on lines, the travel from snap-off on at which it lies
-    in the object, −∞ if it does so nowhere; NaN if it is not computed."""
 
 
 _INDICES, _FLAGS, _CODES = ("contour", "segment", "phases"), ("backward",), ("reach", "snap_off")

@@ -31,11 +31,8 @@ from tactile_bayes.mechanics.poses.pose import pose
 
 __all__ = ["MOST_LOAD", "NO_CONTACT", "Found", "arc_contact", "arc_zeros", "is_moderate"]
 
-MOST_LOAD = 1e6
-"""Largest load f s1² and square of the bend κ0 s1: a rod would make a hundred turns."""
-
-_CLOSE = 0.012
-"""Spread of the arguments of Carlson's R_F for which eight terms of its series (DLMF 19.36.1) are exact."""
+MOST_LOAD = 1e6  # largest load f s1² and square of the bend κ0 s1: a rod would make a hundred turns
+_CLOSE = 0.012  # spread of the arguments of Carlson's R_F for which eight terms of its series (DLMF 19.36.1) are exact
 
 
 class Found(NamedTuple):
@@ -103,15 +100,11 @@ class _Pendulum(NamedTuple):
 
     sin0: float
     cos0: float
-    square: float
-    """sin²A1 and cos²A1."""
+    square: float  # sin²A1 and cos²A1
     complement: float
-    excess: float
-    """sin²A1 − sin²A0."""
-    at_rest: float
-    """κ0²/4."""
-    gap: float
-    """y − x."""
+    excess: float  # sin²A1 − sin²A0
+    at_rest: float  # κ0²/4
+    gap: float  # y − x
 
 
 @compiled

@@ -33,33 +33,26 @@ __all__ = [
     "place_by_wrench",
 ]
 
-FORCE, PSI1, ARCLENGTH, DRIVE_ANGLE = range(4)
-"""Indices of the coordinates, also of derivatives by them."""
-
+FORCE, PSI1, ARCLENGTH, DRIVE_ANGLE = range(4)  # indices of the coordinates, also of derivatives by them
+# Rows of `ContactStates.place`, by the names of a record's columns.
 PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
-"""Rows of `ContactStates.place`, by the names of a record's columns."""
 
 
 class ContactStates(NamedTuple):
     """Contacts with given coordinates; NaN where there is none."""
 
-    loads: Floats
-    """Holding moment [EI/L] and support reaction [EI/L²], shape (3, n)."""
-    place: Floats
-    """Contact point [L], slope angle of the contour there [rad], and arc length [L], shape (4, n)."""
-    volume_tip: Floats
-    """|∂(contact_x, contact_y, slope_angle)/∂(force, psi1, drive_angle)| at s1 = 1, shape (n,)."""
+    loads: Floats  # holding moment [EI/L] and support reaction [EI/L²], shape (3, n)
+    place: Floats  # contact point [L], slope angle of the contour there [rad], and arc length [L], shape (4, n)
+    volume_tip: Floats  # |∂(contact_x, contact_y, slope_angle)/∂(force, psi1, drive_angle)| at s1 = 1, shape (n,)
+    # |∂(contact_x, contact_y, slope_angle)/∂(force, arclength, drive_angle)| at a fixed ψ1, shape (n,).
     volume_tangential: Floats
-    """|∂(contact_x, contact_y, slope_angle)/∂(force, arclength, drive_angle)| at a fixed ψ1, shape (n,)."""
 
 
 class ContactStateSlopes(NamedTuple):
     """Derivatives by the four coordinates."""
 
-    loads: Floats
-    """Shape (n, 3, 4)."""
-    place: Floats
-    """Shape (n, 4, 4)."""
+    loads: Floats  # shape (n, 3, 4)
+    place: Floats  # shape (n, 4, 4)
 
 
 def contact_states(

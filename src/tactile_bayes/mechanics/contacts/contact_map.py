@@ -17,12 +17,10 @@ from tactile_bayes.mechanics.poses.pose import Pose
 
 __all__ = ["contact_state", "moved", "wrench_slopes", "write_contact_states"]
 
-_MEANS = 20
-"""Steps of the arithmetic–geometric mean: more than enough."""
+_MEANS = 20  # steps of the arithmetic–geometric mean: more than enough
 
 
-_MOST_INTEGRATED = 1e3
-"""Largest load f s1² of a rod that is integrated."""
+_MOST_INTEGRATED = 1e3  # largest load f s1² of a rod that is integrated
 
 
 _NONE = Pose(math.nan, math.nan, math.nan)

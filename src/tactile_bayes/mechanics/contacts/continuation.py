@@ -23,20 +23,12 @@ __all__ = ["NOWHERE", "Start", "State", "continued_state", "unloaded_arc"]
 
 _MOST_STEPS = 200
 
-_LEAST_STEP = 1e-9
-"""Share of a continuation below which it ends."""
-
-_NEAR, _SHRINKS = 0.05, 0.25
-"""Largest first step of a Newton search in a continuation, and largest ratio of its steps."""
-
-_SETTLED = 1e-8
-"""Newton step after which rounding errors are left only."""
-
+_LEAST_STEP = 1e-9  # share of a continuation below which it ends
+_NEAR, _SHRINKS = 0.05, 0.25  # largest first step of a Newton search in a continuation, and largest ratio of its steps
+_SETTLED = 1e-8  # Newton step after which rounding errors are left only
+# Positions in a continuation: its beginning, that of the rod's rigidity, and that of its rest curvature as well.
 _UNIFORM, _STIFFENED, _WHOLE = 0.0, 1.0, 2.0
-"""Positions in a continuation: its beginning, that of the rod's rigidity, and that of its rest curvature as well."""
-
-_NUDGE = 1e-6
-"""Change of the share for a derivative by it, which serves for a first guess."""
+_NUDGE = 1e-6  # change of the share for a derivative by it, which serves for a first guess
 
 
 class State(NamedTuple):
@@ -49,8 +41,7 @@ class State(NamedTuple):
     arclength: float
     tip_angle: float
     by_slope: float
-    by_distance: float
-    """As in `Wrench`."""
+    by_distance: float  # as in `Wrench`
 
 
 NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)

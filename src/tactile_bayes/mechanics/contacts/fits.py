@@ -15,16 +15,11 @@ __all__ = ["ContactFit", "RawFit", "Reading", "SheetFit"]
 class Reading(NamedTuple):
     """Samples of forward contacts and their uncertainty, dimensionless."""
 
-    drive_angle: Floats
-    """Shape (n,)."""
-    loads: Floats
-    """Holding moment and support reaction, shape (n, 3)."""
-    angle_deviation: Floats
-    """Standard deviation of the drive angle, shape (n,)."""
-    leaning: Floats
-    """Derivative of the errors of the loads by the error of the drive angle, shape (n, 3)."""
-    covariance: Floats
-    """Covariance of the other errors of the loads, shape (n, 3, 3)."""
+    drive_angle: Floats  # shape (n,)
+    loads: Floats  # holding moment and support reaction, shape (n, 3)
+    angle_deviation: Floats  # standard deviation of the drive angle, shape (n,)
+    leaning: Floats  # derivative of the errors of the loads by the error of the drive angle, shape (n, 3)
+    covariance: Floats  # covariance of the other errors of the loads, shape (n, 3, 3)
 
     def take(self, where: Index | slice) -> Reading:
         return Reading(*(column[where] for column in self))
@@ -33,12 +28,9 @@ class Reading(NamedTuple):
 class SheetFit(NamedTuple):
     """Best contact of one phase, regardless of its bounds."""
 
-    coordinates: Floats
-    """Force, ψ1, arc length and drive angle, shape (n, 4); NaN where there is none."""
-    covariance: Floats
-    """Covariance of the coordinates, shape (n, 4, 4); zero for those that are not free."""
-    misfit: Floats
-    """Sum of squared deviations, shape (n,)."""
+    coordinates: Floats  # force, ψ1, arc length and drive angle, shape (n, 4); NaN where there is none
+    covariance: Floats  # covariance of the coordinates, shape (n, 4, 4); zero for those that are not free
+    misfit: Floats  # sum of squared deviations, shape (n,)
 
 
 class ContactFit(NamedTuple):
@@ -48,33 +40,25 @@ class ContactFit(NamedTuple):
     covariance: Floats
     misfit: Floats
     phase: NDArray[np.int8]
-    at_edge: Flags
-    """True if the contact lies on the edge, since the best contacts of both phases lie beyond it."""
-    clearance: Floats
-    """Distance from the edge, in standard deviations of the coordinate that leads to it."""
-    rival: Floats
-    """Excess of the sum of squares of the next best contact; infinite where there is none."""
-    other: Floats
-    """Coordinates of that contact, shape (n, 4)."""
+    at_edge: Flags  # true if the contact lies on the edge, since the best contacts of both phases lie beyond it
+    clearance: Floats  # distance from the edge, in standard deviations of the coordinate that leads to it
+    rival: Floats  # excess of the sum of squares of the next best contact; infinite where there is none
+    other: Floats  # coordinates of that contact, shape (n, 4)
     other_phase: NDArray[np.int8]
 
 
 class RawFit(NamedTuple):
     """Contacts of Step 2."""
 
-    place: Floats
-    """Contact point, slope angle and arc length, shape (n, 4)."""
+    place: Floats  # contact point, slope angle and arc length, shape (n, 4)
     tip_angle: Floats
-    covariance: Floats
-    """Covariance of the place to first order, shape (n, 4, 4), or without rows if there is no noise."""
+    covariance: Floats  # covariance of the place to first order, shape (n, 4, 4), or without rows if there is no noise
+    # Nonlinearity: squared distance, in the metric of the covariance, from the contact to the mean of two contacts one
+    # standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,), or
+    # (0,) without noise.
     bend: Floats
-    """Nonlinearity: squared distance, in the metric of the covariance, from the contact to the mean of two contacts one
-    standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,), or (0,)
-    without noise."""
+    # Deviation of the contact from one at the tip or along the rod, in its standard deviations, or in L and rad without
+    # noise, shape (n,).
     deviation: Floats
-    """Deviation of the contact from one at the tip or along the rod, in its standard deviations, or in L and rad
-    without noise, shape (n,)."""
-    other: Floats
-    """The other point without moment, shape (n, 4); NaN without one."""
-    other_deviation: Floats
-    """Shape (n,)."""
+    other: Floats  # the other point without moment, shape (n, 4); NaN without one
+    other_deviation: Floats  # shape (n,)

@@ -15,26 +15,21 @@ from tactile_bayes.mechanics.poses.beam import Beam, Varied, mirrored_by
 
 __all__ = ["Room", "Workspace", "descents", "raw_fits"]
 
-_SAME = 1e-9
-"""Distance [L] below which two contact points differ by rounding only."""
+_SAME = 1e-9  # distance [L] below which two contact points differ by rounding only
 
 
+# Largest deviation of a contact at which the moment does not vanish for the first time, in its standard deviations, or
+# in L and rad without noise.
 _POSSIBLE, _NEAR = 4.0, 1e-3
-"""Largest deviation of a contact at which the moment does not vanish for the first time, in its standard deviations, or
-in L and rad without noise."""
 
 
 class Workspace(NamedTuple):
     """Arrays to write to, for k free coordinates."""
 
-    trial: Floats
-    """Shape (1, 4)."""
-    slopes: Floats
-    """Derivatives of the deviations, and the deviations in the last column, shape (4, k + 1)."""
-    inverse: Floats
-    """Shape (k, k)."""
-    by: Floats
-    """As in `contact_state`."""
+    trial: Floats  # shape (1, 4)
+    slopes: Floats  # derivatives of the deviations, and the deviations in the last column, shape (4, k + 1)
+    inverse: Floats  # shape (k, k)
+    by: Floats  # as in `contact_state`
 
 
 @compiled
@@ -154,14 +149,11 @@ def _invert(normal: Floats, i: int, harder: float, inverse: Floats) -> None:
 class Room(NamedTuple):
     """Arrays that `raw_fits` writes to."""
 
-    z: Floats
-    """Coordinates of one contact, shape (1, 4)."""
+    z: Floats  # coordinates of one contact, shape (1, 4)
+    # Four independent errors of drive angle and loads, one standard deviation long, in rows, shape (4, 4).
     errors: Floats
-    """Four independent errors of drive angle and loads, one standard deviation long, in rows, shape (4, 4)."""
-    shifts: Floats
-    """Shifts of the place and of ψ1 by them, of the two points that may be the contact, shape (2, 4, 5)."""
-    by: Floats
-    """As in `contact_state`."""
+    shifts: Floats  # shifts of the place and of ψ1 by them, of the two points that may be the contact, shape (2, 4, 5)
+    by: Floats  # as in `contact_state`
 
 
 class _Sample(NamedTuple):

@@ -32,51 +32,37 @@ __all__ = [
     "workspace",
 ]
 
+# Largest friction angle of the tables [rad]: nearer to the fold of the map the series would be longer.
 MOST_FRICTION = 0.58
-"""Largest friction angle of the tables [rad]: nearer to the fold of the map the series would be longer."""
-
-_TERMS = 10
-"""Terms of each series in a cell of tip contact, in angle and in share."""
-
+_TERMS = 10  # terms of each series in a cell of tip contact, in angle and in share
+# Ends of the cells of tip contact, as shares of the right angle.
 _ANGLES = np.array([0.0, 0.1, 0.25, 0.45, 0.6, 0.75, 0.9, 1.0])
-"""Ends of the cells of tip contact, as shares of the right angle."""
-
+# Ends of the cells of tip contact, as shares of the largest radius.
 _SHARES = np.array([0.0, 0.5, 0.75, 0.9, 0.97, 0.993, 1.0])
-"""Ends of the cells of tip contact, as shares of the largest radius."""
-
-_TANGENTIAL_TERMS = 12, 20
-"""Terms of a cell in tangential contact, in the angle and in the friction angle."""
-
+_TANGENTIAL_TERMS = 12, 20  # terms of a cell in tangential contact, in the angle and in the friction angle
+# Ends of the cells of tangential contact, as shares of the largest angle.
 _LEVELS = np.array([0.0, 0.45, 0.65, 0.82, 1.0])
-"""Ends of the cells of tangential contact, as shares of the largest angle."""
-
-_MARGIN = 0.02
-"""Excess of the largest ε1 of the tables over ε1 of tangential contact [rad]."""
-
+_MARGIN = 0.02  # excess of the largest ε1 of the tables over ε1 of tangential contact [rad]
 _CHI_MAX = 3.2
 
 
 class Tables(NamedTuple):
     """Coefficients of all tables."""
 
-    tangential: Floats
-    """χ² over the angle in tangential contact, shape (friction angles, cells, terms)."""
-    radius: Floats
-    """Largest radius in tip contact in the angle, shape (angles, terms)."""
+    tangential: Floats  # χ² over the angle in tangential contact, shape (friction angles, cells, terms)
+    radius: Floats  # largest radius in tip contact in the angle, shape (angles, terms)
+    # χ² over the angle and ε1 over the share in tip contact, side by side, for one loop over both, shape (angles,
+    # shares, terms in the share, 2 · terms in the angle).
     tip: Floats
-    """χ² over the angle and ε1 over the share in tip contact, side by side, for one loop over both, shape (angles,
-    shares, terms in the share, 2 · terms in the angle)."""
 
 
 class Workspace(NamedTuple):
     """Workspace for one state, with the series for one friction angle."""
 
-    tangential: Floats
-    """Series of tangential contact in the angle, shape (cells, terms)."""
+    tangential: Floats  # series of tangential contact in the angle, shape (cells, terms)
     by_angle: Floats
     by_share: Floats
-    row: Floats
-    """Two series in the angle, one after the other."""
+    row: Floats  # two series in the angle, one after the other
 
 
 def workspace() -> Workspace:

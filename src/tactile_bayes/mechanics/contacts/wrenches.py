@@ -26,8 +26,7 @@ from tactile_bayes.mechanics.rods.profile import Profile
 
 __all__ = ["continued_wrenches", "wrenches"]
 
-_BEYOND = 1e-12
-"""Angle by which rounding may turn a chord beyond the line of force through the pivot [rad]."""
+_BEYOND = 1e-12  # angle by which rounding may turn a chord beyond the line of force through the pivot [rad]
 
 
 @compiled

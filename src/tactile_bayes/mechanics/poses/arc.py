@@ -39,14 +39,10 @@ __all__ = [
     "slopes_by_chi",
 ]
 
+# Cosine of the amplitude below which an arc is short: the closed forms of C and S cancel there; quadrature is used.
 SHORT_COSINE = math.cos(1.0)
-"""Cosine of the amplitude below which an arc is short: the closed forms of C and S cancel there; quadrature is used."""
-
-_HALVINGS = 5
-"""Halvings of F(χ) after the first; a few terms of a series are exact for the remainder."""
-
-_FLAT = 1e-6
-"""Parameter m below which the derivative of D is that at m = 0."""
+_HALVINGS = 5  # halvings of F(χ) after the first; a few terms of a series are exact for the remainder
+_FLAT = 1e-6  # parameter m below which the derivative of D is that at m = 0
 
 
 def _even_rule(count: int) -> tuple[Floats, Floats]:
@@ -65,14 +61,10 @@ _SQUARES, _WEIGHTS = _even_rule(10)
 class Arc(NamedTuple):
     """Piece of elastica from the contact to the amplitude χ, or its derivatives by one variable."""
 
-    length: float
-    """F(χ | m) = √f s1."""
-    shortfall: float
-    """C, the length minus the chord along the direction at the contact."""
-    offset: float
-    """S, the chord across the direction at the contact."""
-    turn: float
-    """ψ − ψ1 in [0, π]."""
+    length: float  # f(χ | m) = √f s1
+    shortfall: float  # C, the length minus the chord along the direction at the contact
+    offset: float  # S, the chord across the direction at the contact
+    turn: float  # ψ − ψ1 in [0, π]
 
 
 class _Amplitude(NamedTuple):
@@ -80,12 +72,10 @@ class _Amplitude(NamedTuple):
 
     sin: float
     cos: float
-    half: float
-    """sin(χ/2)."""
+    half: float  # sin(χ/2)
     m: float
     c: float
-    d2: float
-    """Δ²."""
+    d2: float  # Δ²
 
 
 @compiled

@@ -73,11 +73,8 @@ __all__ = [
     "with_sign",
 ]
 
-PARTS = 8
-"""Number of parts of a rod between which a second contact is sought in `loaded_part`."""
-
-_MOST_STEPS, _SETTLED = 20, 1e-10
-"""Largest number of Newton steps to a distance from the pivot, and the last one [L]."""
+PARTS = 8  # number of parts of a rod between which a second contact is sought in `loaded_part`
+_MOST_STEPS, _SETTLED = 20, 1e-10  # largest number of Newton steps to a distance from the pivot, and the last one [L]
 
 
 class Varied(NamedTuple):
@@ -85,32 +82,23 @@ class Varied(NamedTuple):
 
     profile: Profile
     work: Floats
-    sheet: NDArray[void]
-    """Coefficients of its pose, from a table."""
-    slenderness: float
-    """Slenderness of the table; 0 if there are no coefficients."""
+    sheet: NDArray[void]  # coefficients of its pose, from a table
+    slenderness: float  # slenderness of the table; 0 if there are no coefficients
+    # Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose.
     sign: float
-    """Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose."""
     other_sheet: NDArray[void]
-    other_slenderness: float
-    """Coefficients and slenderness for friction that acts in the other sense."""
+    other_slenderness: float  # coefficients and slenderness for friction that acts in the other sense
 
 
 class Beam(NamedTuple):
     """A rod in the sweep frame."""
 
-    curvature: float
-    """Constant rest curvature [1/L]; 0 for rods with a profile."""
-    reach: float
-    """Distance from pivot to tip at rest [L]."""
-    most_curvature: float
-    """Upper bound of the rest curvature [1/L]."""
-    varied: Varied | None
-    """Properties along the rod; None for uniform rods of constant rest curvature."""
-    stem: float
-    """Length of the rigid piece between pivot and rod [L]."""
-    own_reach: float
-    """Distance from where the rod begins to its tip at rest [L], for tables."""
+    curvature: float  # constant rest curvature [1/L]; 0 for rods with a profile
+    reach: float  # distance from pivot to tip at rest [L]
+    most_curvature: float  # upper bound of the rest curvature [1/L]
+    varied: Varied | None  # properties along the rod; None for uniform rods of constant rest curvature
+    stem: float  # length of the rigid piece between pivot and rod [L]
+    own_reach: float  # distance from where the rod begins to its tip at rest [L], for tables
 
 
 Rest = ParamSpec("Rest")

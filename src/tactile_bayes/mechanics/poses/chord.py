@@ -22,14 +22,10 @@ from tactile_bayes.mechanics.poses.arc import (
 
 __all__ = ["NO_ARC", "tangential_arc", "tip_arc"]
 
-_SETTLED = 1e-8
-"""Relative Newton step after which only rounding errors are left."""
-
+_SETTLED = 1e-8  # relative Newton step after which only rounding errors are left
 _MAX_STEPS = 40
 
-_CHI_MAX = 3.2
-"""Bound on the amplitude, a little over π, at which the line of force passes through the pivot."""
-
+_CHI_MAX = 3.2  # bound on the amplitude, a little over π, at which the line of force passes through the pivot
 NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
 
 

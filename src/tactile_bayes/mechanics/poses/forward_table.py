@@ -47,54 +47,37 @@ from tactile_bayes.tasks import in_parts
 
 __all__ = ["GRADES", "NO_TABLE", "NO_TABLES", "Box", "ForwardTable", "Tables", "forward_table", "prepare"]
 
-_WORST = 1e-5
-"""Largest error of the pose with which a table is of use."""
-
+_WORST = 1e-5  # largest error of the pose with which a table is of use
+# Nodes in a taper, bend and friction angle that vary, also for friction of either sense: angles of a wider range.
 _OUTER, _OUTER_OF_BOTH, _BOTH = (5, 5, 7), (5, 5, 12), 0.7
-"""Nodes in a taper, bend and friction angle that vary, also for friction of either sense: angles of a wider range."""
-
+# Powers of the amplitudes of modes, over the largest: the first mode deflects a rod ten times as far as the others.
 _POWERS = np.array(
     [(i, j, k) for i in range(5) for j in range(3) for k in range(3 - j) if i <= (4, 2, 0)[j + k]], dtype=np.intp
 )
-"""Powers of the amplitudes of modes, over the largest: the first mode deflects a rod ten times as far as the others."""
-
+# Amplitudes, over the largest, at which poses are calculated for least squares.
 _SHAPES = np.array(
     [(x, 0.0, 0.0) for x in (-1.0, -0.6, 0.0, 0.6, 1.0)]
     + [(x, *yz) for x in (-0.7, 0.0, 0.7) for yz in ((0.7, 0.0), (-0.7, 0.0), (0.0, 0.7), (0.0, -0.7))]
     + [(0.0, y, z) for y in (-0.7, 0.7) for z in (-0.7, 0.7)]
 )
-"""Amplitudes, over the largest, at which poses are calculated for least squares."""
-
-_NEGLIGIBLE, _AT_ONSET = 2e-7, 100.0
-"""Size of terms that are left out, and how much smaller it is without a force."""
-
-_THRUST = 20.0
-"""f Λ² before which sweeps end with a thrust through the pivot; their last series may go on."""
-
-_ROUNDING = 1e-12
-"""Distance from the end of a range that counts as zero."""
-
-_CHECKS = 400
-"""Points at which the error is measured."""
+_NEGLIGIBLE, _AT_ONSET = 2e-7, 100.0  # size of terms that are left out, and how much smaller it is without a force
+_THRUST = 20.0  # f Λ² before which sweeps end with a thrust through the pivot; their last series may go on
+_ROUNDING = 1e-12  # distance from the end of a range that counts as zero
+_CHECKS = 400  # points at which the error is measured
 
 
 class _Grade(NamedTuple):
     """Size and ranges of a table."""
 
-    rows: int
-    """Most terms in ψ1 or s1."""
-    below: float
-    """Largest amount of ψ1 below that of tangential contact [rad]."""
-    psi1: float
-    """Largest ψ1 [rad]."""
-    force: float
-    """Largest f Λ²."""
+    rows: int  # most terms in ψ1 or s1
+    below: float  # largest amount of ψ1 below that of tangential contact [rad]
+    psi1: float  # largest ψ1 [rad]
+    force: float  # largest f Λ²
 
 
 _GRADES = (_Grade(16, 0.4, 1.4, MOST_FORCE), _Grade(MOST_ROWS, 0.1, 2.4, _THRUST), _Grade(MOST_ROWS, 0.1, 2.4, 7.0))
 
-GRADES = len(_GRADES)
-"""Number of grades of tables."""
+GRADES = len(_GRADES)  # number of grades of tables
 
 
 class Box(NamedTuple):
@@ -103,52 +86,36 @@ class Box(NamedTuple):
     taper: tuple[float, float]
     bend: tuple[float, float]
     friction_angle: tuple[float, float]
-    shape: float = 0.0
-    """Largest root of the sum of the squares of the amplitudes of modes."""
+    shape: float = 0.0  # largest root of the sum of the squares of the amplitudes of modes
 
 
 class Terms(NamedTuple):
     """Coefficients in taper, bend, friction angle and shape that are not negligible."""
 
-    orders: Index
-    """Orders of the Chebyshev polynomials, and of the row of `_POWERS`, shape (terms, 4)."""
-    coefficients: Floats
-    """Coefficients of a rod and of its mirror image, shape (2, terms, rows, columns)."""
+    orders: Index  # orders of the Chebyshev polynomials, and of the row of `_POWERS`, shape (terms, 4)
+    coefficients: Floats  # coefficients of a rod and of its mirror image, shape (2, terms, rows, columns)
 
 
 class ForwardTable(NamedTuple):
     """Coefficients of all rods of a box."""
 
-    tip: Terms
-    """Tip contact."""
-    tangential: Terms
-    """Tangential contact up to the tip."""
-    beyond: Terms
-    """Tangential contact beyond it."""
-    chord: Terms
-    """Arc length, bearing and slope of the rod at rest at a distance, in one row."""
-    box: Floats
-    """Least and largest taper, bend and friction angle, shape (3, 2)."""
-    shape: float
-    """Largest amplitudes of modes, as in `Box`."""
-    slenderness: float
-    """Λ(1) without the taper."""
-    psi1: tuple[float, float]
-    """Range of ψ1 in tip contact."""
-    span: float
-    """Logarithm of 1 + f Λ²/10 at the largest force."""
+    tip: Terms  # tip contact
+    tangential: Terms  # tangential contact up to the tip
+    beyond: Terms  # tangential contact beyond it
+    chord: Terms  # arc length, bearing and slope of the rod at rest at a distance, in one row
+    box: Floats  # least and largest taper, bend and friction angle, shape (3, 2)
+    shape: float  # largest amplitudes of modes, as in `Box`
+    slenderness: float  # Λ(1) without the taper
+    psi1: tuple[float, float]  # range of ψ1 in tip contact
+    span: float  # logarithm of 1 + f Λ²/10 at the largest force
 
 
 _NONE = Terms(np.zeros((0, 4), dtype=np.intp), np.zeros((2, 0, 0, 0)))
 
+# Table without any rod.
 NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 0.0, 1.0, (0.0, 1.0), 1.0)
-"""Table without any rod."""
-
-Tables = tuple[ForwardTable, ForwardTable]
-"""Tables of which the first that holds a rod serves it."""
-
-NO_TABLES: Tables = (NO_TABLE, NO_TABLE)
-"""No tables."""
+Tables = tuple[ForwardTable, ForwardTable]  # tables of which the first that holds a rod serves it
+NO_TABLES: Tables = (NO_TABLE, NO_TABLE)  # no tables
 
 
 def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:

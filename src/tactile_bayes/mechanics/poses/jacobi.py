@@ -25,11 +25,8 @@ from tactile_bayes.mechanics.compiler import compiled, inlined
 
 __all__ = ["Jacobi", "jacobi", "jacobi_and_slopes"]
 
-_TERMS = 7
-"""Terms of the power series."""
-
-_SMALL = 0.02
-"""Largest parameter, with t scaled to one, for which these suffice: the remainder is below 1e-16."""
+_TERMS = 7  # terms of the power series
+_SMALL = 0.02  # largest parameter, with t scaled to one, for which these suffice: the remainder is below 1e-16
 
 
 class Jacobi(NamedTuple):
@@ -38,8 +35,7 @@ class Jacobi(NamedTuple):
     s: float
     c: float
     d: float
-    r: float
-    """(1 − d)/y, without cancellation."""
+    r: float  # (1 − d)/y, without cancellation
     j: float
 
 
@@ -84,8 +80,7 @@ def _series(table: Floats, total: float, product: float) -> tuple[float, float, 
     return value, by_total, by_product
 
 
-_MOST_HALVINGS = 600
-"""Largest number of halvings: enough for any number, and infinite ones are none."""
+_MOST_HALVINGS = 600  # largest number of halvings: enough for any number, and infinite ones are none
 
 
 @compiled

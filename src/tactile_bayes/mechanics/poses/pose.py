@@ -30,32 +30,24 @@ from tactile_bayes.mechanics.poses.jacobi import Jacobi, jacobi, jacobi_and_slop
 
 __all__ = ["ACROSS", "Chord", "Pose", "by_arclength", "pose", "pose_and_slopes"]
 
-ACROSS = 1e-6
-"""Cosine of the angle of a chord to the rod that counts as zero: the rod goes no farther from the pivot."""
+ACROSS = 1e-6  # cosine of the angle of a chord to the rod that counts as zero: the rod goes no farther from the pivot
 
 
 class Pose(NamedTuple):
     """Pose of the pivot, or its derivatives by a variable."""
 
-    u: float
-    """Component of the vector from pivot to contact across the contact force."""
-    v: float
-    """Its component against the force."""
-    turn: float
-    """Slope of the rod at the pivot less the slope at the contact [rad]."""
+    u: float  # component of the vector from pivot to contact across the contact force
+    v: float  # its component against the force
+    turn: float  # slope of the rod at the pivot less the slope at the contact [rad]
 
 
 class Chord(NamedTuple):
     """Line from the pivot to a point of the rod at rest."""
 
-    arclength: float
-    """Arc length of the point [L], < 0 on the stem."""
-    at_base: float
-    """Angle from the rod at the pivot to the chord [rad]."""
-    at_point: float
-    """Angle from the chord to the rod at the point [rad]."""
-    rate: float
-    """Derivative of `at_point` by the length of the chord."""
+    arclength: float  # arc length of the point [L], < 0 on the stem
+    at_base: float  # angle from the rod at the pivot to the chord [rad]
+    at_point: float  # angle from the chord to the rod at the point [rad]
+    rate: float  # derivative of `at_point` by the length of the chord
 
 
 class _Start(NamedTuple):
@@ -64,8 +56,7 @@ class _Start(NamedTuple):
     sin: float
     cos: float
     bend: float
-    load: float
-    """y."""
+    load: float  # y
 
 
 @compiled
@@ -77,17 +68,13 @@ def _start(psi1: float, arclength: float, force: float, curvature: float) -> _St
 class _Parts(NamedTuple):
     """Parts of a pose."""
 
-    u: float
-    """u and v over the arc length."""
+    u: float  # u and v over the arc length
     v: float
-    sin_turn: float
-    """Sine and cosine of A − A1."""
+    sin_turn: float  # sine and cosine of A − A1
     cos_turn: float
     sin_pivot: float
-    mixed: float
-    """cos²A1 + sin²A1 d."""
-    inverse: float
-    """1/D."""
+    mixed: float  # cos²A1 + sin²A1 d
+    inverse: float  # 1/D
 
 
 @compiled

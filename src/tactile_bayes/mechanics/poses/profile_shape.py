@@ -40,23 +40,17 @@ __all__ = [
     "shape_along",
 ]
 
-_SAMPLES = 48
-"""Points of a rod of length one, and one for each step, at which the bending is compared."""
+_SAMPLES = 48  # points of a rod of length one, and one for each step, at which the bending is compared
 
 
 class Chord(NamedTuple):
     """Point of a rod at rest, in the frame of its base."""
 
-    arclength: float
-    """Arc length from where the rod begins [L]."""
-    distance: float
-    """Distance from the pivot [L]."""
-    bearing: float
-    """Direction in which it is seen from the pivot [rad]."""
-    slope: float
-    """Slope of the rod there [rad]."""
-    curvature: float
-    """Rest curvature there [1/L]."""
+    arclength: float  # arc length from where the rod begins [L]
+    distance: float  # distance from the pivot [L]
+    bearing: float  # direction in which it is seen from the pivot [rad]
+    slope: float  # slope of the rod there [rad]
+    curvature: float  # rest curvature there [1/L]
 
 
 @compiled

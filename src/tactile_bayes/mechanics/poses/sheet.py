@@ -31,24 +31,16 @@ __all__ = [
     "sheet",
 ]
 
+# Most terms in ψ1 or s1, terms in the force and in the distance of the rod at rest, and most nodes in what differs
+# between rods.
 MOST_ROWS, TERMS, MOST_NODES = 28, 24, 14
-"""Most terms in ψ1 or s1, terms in the force and in the distance of the rod at rest, and most nodes in what differs
-between rods."""
-
 COLUMNS = 3 * TERMS
 
-GROUP = 4
-"""Terms in ψ1 or s1 that are summed at a time."""
-
-MOST_FORCE, BEYOND = 36.0, 0.6
-"""Largest f Λ², and largest Λ beyond the tip, over Λ(1)."""
-
-SCALE = 10.0
-"""f Λ² from which on polynomials are in its logarithm."""
-
-_CACHE_LINE = 64
-"""Bytes of a line of the processor's cache: numbers that lie in two of them take longer to load."""
-
+GROUP = 4  # terms in ψ1 or s1 that are summed at a time
+MOST_FORCE, BEYOND = 36.0, 0.6  # largest f Λ², and largest Λ beyond the tip, over Λ(1)
+SCALE = 10.0  # f Λ² from which on polynomials are in its logarithm
+_CACHE_LINE = 64  # bytes of a line of the processor's cache: numbers that lie in two of them take longer to load
+# Coefficients of one rod.
 _SHEET = np.dtype(
     [
         (
@@ -71,7 +63,6 @@ _SHEET = np.dtype(
     ],
     align=True,
 )
-"""Coefficients of one rod."""
 
 
 def sheet() -> NDArray[np.void]:

@@ -62,27 +62,19 @@ __all__ = [
     "write_shape",
 ]
 
-_TERMS = 24
-"""Terms of the series."""
-
+_TERMS = 24  # terms of the series
+# Size of the last terms of a slope [rad], and that with which a rod is followed roughly, to a part in a thousand.
 EXACT, ROUGH = 1e-15, 1e-6
-"""Size of the last terms of a slope [rad], and that with which a rod is followed roughly, to a part in a thousand."""
-
-FORWARD, BACKWARD = 1.0, -1.0
-"""Directions: from the pivot, and from the contact."""
-
-FARTHEST = 4.0
-"""Arc length up to which a rod is continued beyond its tip, as it is at its tip [L]."""
-
+FORWARD, BACKWARD = 1.0, -1.0  # directions: from the pivot, and from the contact
+FARTHEST = 4.0  # arc length up to which a rod is continued beyond its tip, as it is at its tip [L]
+# Steps inside cells after which a march ends with NaN: the load is beyond all reason, as in some searches for
+# equilibria.
 _MOST_STEPS = 1000
-"""Steps inside cells after which a march ends with NaN: the load is beyond all reason, as in some searches for
-equilibria."""
-
 _INVERSE = 1.0 / np.arange(1.0, _TERMS + 1.0)
 
 _RATE, _SIN, _COS, _PSI, _U, _V, _BENDING, _PSI_Q, _U_Q, _BENDING_Q = range(10)
+# Columns of a workspace: coefficients, and those of derivatives by ψ1 or arc length, and the force.
 _PSI_F, _U_F, _V_F, _BENDING_F, _CURVATURE, _RIGIDITY, _POLYNOMIAL, _POWERS = range(10, 18)
-"""Columns of a workspace: coefficients, and those of derivatives by ψ1 or arc length, and the force."""
 
 
 def workspace() -> Floats:
@@ -92,22 +84,16 @@ def workspace() -> Floats:
 
 _MOST_NEWTON_STEPS = 100
 
-_SETTLED = 1e-15
-"""Last step of Newton's method to a level."""
-
-_FLAT = 1e-9
-"""Distance from a maximum that does not matter to the value there."""
+_SETTLED = 1e-15  # last step of Newton's method to a level
+_FLAT = 1e-9  # distance from a maximum that does not matter to the value there
 
 
 class State(NamedTuple):
     """State of a rod at a point of it."""
 
-    psi: float
-    """Slope over the direction across the force [rad]."""
-    load: float
-    """P."""
-    u: float
-    """Way from the start, across and against the force."""
+    psi: float  # slope over the direction across the force [rad]
+    load: float  # P
+    u: float  # way from the start, across and against the force
     v: float
 
 
@@ -117,12 +103,10 @@ _NOWHERE = State(math.nan, math.nan, math.nan, math.nan)
 class March(NamedTuple):
     """State of a rod, and where it is."""
 
-    at: float
-    """Arc length from the pivot [L]."""
+    at: float  # arc length from the pivot [L]
     cell: int
     state: State
-    steps: int
-    """Steps so far that ended inside a cell."""
+    steps: int  # steps so far that ended inside a cell
 
 
 class Slopes(NamedTuple):
@@ -135,23 +119,18 @@ class Slopes(NamedTuple):
     v_f: float
 
 
-Followed = TypeVar("Followed", Slopes, None)
-"""Derivatives, followed or left out."""
+Followed = TypeVar("Followed", Slopes, None)  # derivatives, followed or left out
 
 
 class Step(NamedTuple):
     """A stretch of the rod on which series converge, in x from 0 to `share`."""
 
-    length: float
-    """Arc length at x = 1 [L]."""
+    length: float  # arc length at x = 1 [L]
     share: float
     terms: int
-    width: float
-    """Width at its beginning."""
-    fall: float
-    """Logarithm of the width at x = 0 over that at x = 1."""
-    span: float
-    """∫ ds/w up to x = 1."""
+    width: float  # width at its beginning
+    fall: float  # logarithm of the width at x = 0 over that at x = 1
+    span: float  # ∫ ds/w up to x = 1
 
 
 @compiled

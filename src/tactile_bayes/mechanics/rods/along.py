@@ -20,24 +20,13 @@ from tactile_bayes.tasks.documents import read_json
 
 __all__ = ["MISS", "Along", "GivenAlong", "along", "modes_along", "text_along"]
 
-_ORDER = 12
-"""Coefficients of the polynomials that represent a function."""
-
-MISS = 1e-12
-"""Largest error of these, as a share of the largest value, if no other is stated."""
-
-_ROUNDING = 1e-15
-"""Size of coefficients that are rounding errors, as a share of the largest."""
-
+_ORDER = 12  # coefficients of the polynomials that represent a function
+MISS = 1e-12  # largest error of these, as a share of the largest value, if no other is stated
+_ROUNDING = 1e-15  # size of coefficients that are rounding errors, as a share of the largest
 _HALVINGS = 10
-_MOST_CELLS = 256
-"""Largest number of halvings of a cell, and of cells of a function."""
-
-_SAME = 1e-9
-"""Share of the length that counts as zero."""
-
-_LARGEST = 1e100
-"""Largest number in the text of polynomials."""
+_MOST_CELLS = 256  # largest number of halvings of a cell, and of cells of a function
+_SAME = 1e-9  # share of the length that counts as zero
+_LARGEST = 1e100  # largest number in the text of polynomials
 
 
 @dataclass(frozen=True)
@@ -102,8 +91,8 @@ class Along:
         return json.dumps({"edges": self.edges, "coefficients": self.coefficients})
 
 
+# A property of a rod as users give it: a number, a function of s, or arrays (s, values).
 GivenAlong: TypeAlias = float | Along | Callable[[Floats], ArrayLike] | tuple[ArrayLike, ArrayLike]
-"""A property of a rod as users give it: a number, a function of s, or arrays (s, values)."""
 
 
 def along(name: str, given: Any, length: float, positive: bool = False, miss: float = MISS) -> float | Along:

@@ -18,35 +18,25 @@ from tactile_bayes.mechanics.rods.along import Along, GivenAlong, along
 
 __all__ = ["MOST_MODES", "STEEPEST_TAPER", "Profile", "Rods", "profile_of", "rods_of"]
 
-STEEPEST_TAPER = 0.95
-"""Largest taper: the rod bends 1.6e5 times as easily at its tip as at its base."""
-
+STEEPEST_TAPER = 0.95  # largest taper: the rod bends 1.6e5 times as easily at its tip as at its base
+# Modes of the rest curvature: three hold 99.8 % of how far traced rods deflect otherwise than their mean.
 MOST_MODES = 3
-"""Modes of the rest curvature: three hold 99.8 % of how far traced rods deflect otherwise than their mean."""
-
-_SAME = 1e-9
-"""Difference of the rigidity at the base from one that counts as zero."""
+_SAME = 1e-9  # difference of the rigidity at the base from one that counts as zero
 
 
 class Profile(NamedTuple):
     """A rod in the form that the compiled forward model takes."""
 
+    # Where cells begin, from base to tip, shape (n + 1,); the last one lies beyond the tip, with its values.
     edges: Floats
-    """Where cells begin, from base to tip, shape (n + 1,); the last one lies beyond the tip, with its values."""
+    # Coefficients of the rest curvature by powers of the arc length from the beginning of a cell, shape (n + 1, …).
     curvature: Floats
-    """Coefficients of the rest curvature by powers of the arc length from the beginning of a cell, shape (n + 1, …)."""
-    rigidity: Floats
-    """Coefficients of the rigidity without the taper, likewise."""
-    taper: float
-    """t of a diameter that falls linearly to 1 − t at the tip: a factor (1 − t s)⁴ on the rigidity."""
-    bend: float
-    """A number to be added to the rest curvature [1/L]."""
-    sign: float
-    """−1 for the mirrored rod of backward sweeps, else 1."""
-    modes: Floats
-    """Coefficients of the stated rest curvature, and of its modes, likewise, shape (1 + modes, n + 1, …)."""
-    shape: Floats
-    """Amplitudes of the modes in `curvature`, shape (MOST_MODES,)."""
+    rigidity: Floats  # coefficients of the rigidity without the taper, likewise
+    taper: float  # t of a diameter that falls linearly to 1 − t at the tip: a factor (1 − t s)⁴ on the rigidity
+    bend: float  # a number to be added to the rest curvature [1/L]
+    sign: float  # −1 for the mirrored rod of backward sweeps, else 1
+    modes: Floats  # coefficients of the stated rest curvature, and of its modes, likewise, shape (1 + modes, n + 1, …)
+    shape: Floats  # amplitudes of the modes in `curvature`, shape (MOST_MODES,)
 
     def shaped(self, shape: Floats) -> Profile:
         """Return the rod with amplitudes of its modes, in arrays of its own."""
@@ -57,11 +47,9 @@ class Profile(NamedTuple):
 class Rods(NamedTuple):
     """The rods of many contacts: arcs, or one rod, mirrored like the contacts."""
 
-    curvature: Floats
-    """Rest curvatures of arcs [1/L]; with a profile −1 for a mirrored rod, else 1, shape (n,)."""
+    curvature: Floats  # rest curvatures of arcs [1/L]; with a profile −1 for a mirrored rod, else 1, shape (n,)
     profile: Profile | None = None
-    stem: float = 0.0
-    """Rigid piece between pivot and rod [L]."""
+    stem: float = 0.0  # rigid piece between pivot and rod [L]
 
     @property
     def are_straight(self) -> bool:

@@ -20,20 +20,14 @@ from tactile_bayes.numerics import chebyshev
 
 __all__ = ["LARGEST_STRAIN", "Rod"]
 
-_THICKEST = 1e70
-"""Diameter whose fourth power overflows [m]."""
-
+_THICKEST = 1e70  # diameter whose fourth power overflows [m]
+# Turn between base and tip [rad] up to which every point of an arc is farther from the base than those before it.
 _MOST_TURN = math.pi
-"""Turn between base and tip [rad] up to which every point of an arc is farther from the base than those before it."""
-
-_POINTS = 2001
-"""Points of a rod at rest."""
-
+_POINTS = 2001  # points of a rod at rest
+# Error of a traced rest curvature over its standard deviation, and of modes over their size, that is negligible.
 _NEGLIGIBLE = 1e-2
-"""Error of a traced rest curvature over its standard deviation, and of modes over their size, that is negligible."""
-
+# Bending strain up to which a rod is slender and its bending moment is proportional to its curvature.
 LARGEST_STRAIN = 0.1
-"""Bending strain up to which a rod is slender and its bending moment is proportional to its curvature."""
 
 
 @dataclass(frozen=True)

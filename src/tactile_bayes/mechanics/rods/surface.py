@@ -21,8 +21,7 @@ __all__ = ["Surface"]
 class Surface(NamedTuple):
     """Surface of a rod; lengths in rod lengths."""
 
-    radius: float
-    """Half the diameter at the base."""
+    radius: float  # half the diameter at the base
     taper: float
 
     @property

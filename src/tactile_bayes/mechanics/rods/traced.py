@@ -30,80 +30,40 @@ from tactile_bayes.numerics import chebyshev
 
 __all__ = ["MeasuredCone", "TracedRod", "measured_cone", "traced_rod"]
 
-_FEWEST = 8
-"""Least number of points: four for a linear curvature, and four for their scatter."""
-
-_FREE = 4
-"""Unknowns without a prior: the offset of the base and its direction, level and trend of the curvature."""
-
-_TERMS = 20
-"""Terms of the curvature."""
-
-_INTEGRALS = (1, 2, 3)
-"""Numbers of integrals that make the curvature from white noise."""
-
+_FEWEST = 8  # least number of points: four for a linear curvature, and four for their scatter
+_FREE = 4  # unknowns without a prior: the offset of the base and its direction, level and trend of the curvature
+_TERMS = 20  # terms of the curvature
+_INTEGRALS = (1, 2, 3)  # numbers of integrals that make the curvature from white noise
+# Root mean squares of what level and trend leave of the curvature [1/L], over the scatter [L].
 _STRENGTHS = np.geomspace(1e-2, 1e18, 161)
-"""Root mean squares of what level and trend leave of the curvature [1/L], over the scatter [L]."""
-
+# Middles of the priors of both: each is within a factor of ten with a probability of a half.
 _USUAL_STRENGTH, _USUAL_SCATTER = 1.0, 1e-3
-"""Middles of the priors of both: each is within a factor of ten with a probability of a half."""
-
-_QUANTILES = 9
-"""Values of a scatter that is not given, for each strength."""
-
-_FINE = 201
-"""Points of the rod at which the curvature is measured."""
-
-_NODES = 48
-"""Nodes at which slopes of the centreline are interpolated."""
-
-_GROUPS = 10
-"""Groups of neighbouring points, whose means must go one way."""
-
-_THICKEST = 0.05
-"""Largest scatter of the points, as a share of the length."""
-
-_THINNEST = 1e-12
-"""Least scatter that is taken, as a share of the length."""
-
-_MOST_BEYOND = 1.5
-"""Largest length of a rod over that of its points."""
-
-_BACKWARD = 6.0
-"""Standard deviations by which a point may lie behind one before it: noise does so once in 1e5 times."""
-
-_FALSE_ALARM = 1e-6
-"""Probability that points with the scatter that is given are refused."""
-
-_ROUNDING = 1e-12
-"""Scatter over the length that is rounding."""
-
-_BENT = 3
-"""Degree of the polynomial beside which diameters are checked to fall linearly."""
-
+_QUANTILES = 9  # values of a scatter that is not given, for each strength
+_FINE = 201  # points of the rod at which the curvature is measured
+_NODES = 48  # nodes at which slopes of the centreline are interpolated
+_GROUPS = 10  # groups of neighbouring points, whose means must go one way
+_THICKEST = 0.05  # largest scatter of the points, as a share of the length
+_THINNEST = 1e-12  # least scatter that is taken, as a share of the length
+_MOST_BEYOND = 1.5  # largest length of a rod over that of its points
+_BACKWARD = 6.0  # standard deviations by which a point may lie behind one before it: noise does so once in 1e5 times
+_FALSE_ALARM = 1e-6  # probability that points with the scatter that is given are refused
+_ROUNDING = 1e-12  # scatter over the length that is rounding
+_BENT = 3  # degree of the polynomial beside which diameters are checked to fall linearly
 _MOST_STEPS = 50
 
-_WILD = 1e3
-"""Unknowns beyond which a fit diverges."""
-
-_SETTLED = 1e-8
-"""Last step of the fit, in lengths and rad."""
+_WILD = 1e3  # unknowns beyond which a fit diverges
+_SETTLED = 1e-8  # last step of the fit, in lengths and rad
 
 
 @dataclass(frozen=True)
 class TracedRod:
     """Rest curvature of a rod from traced points; see `traced_rod`."""
 
-    length: float
-    """Arc length from the first to the last point, in their unit."""
-    scatter: float
-    """Standard deviation of a coordinate of a point, given or estimated, in their unit."""
-    coefficients: Floats
-    """Chebyshev coefficients of the rest curvature [1/L] on s from 0 to 1."""
-    covariance: Floats
-    """Their covariance."""
-    feet: Floats
-    """Arc lengths of the points from the first one, over the length."""
+    length: float  # arc length from the first to the last point, in their unit
+    scatter: float  # standard deviation of a coordinate of a point, given or estimated, in their unit
+    coefficients: Floats  # Chebyshev coefficients of the rest curvature [1/L] on s from 0 to 1
+    covariance: Floats  # their covariance
+    feet: Floats  # arc lengths of the points from the first one, over the length
 
     def rest_curvature(self, s: ArrayLike) -> Floats:
         """Rest curvature [1/L] at arc lengths s from 0, the base, to 1, the tip."""
@@ -192,8 +152,7 @@ class MeasuredCone(NamedTuple):
 
     diameter: float
     taper: float
-    deviation: float
-    """Standard deviation of the taper."""
+    deviation: float  # standard deviation of the taper
 
 
 def measured_cone(s: Floats, diameters: Floats) -> MeasuredCone:
@@ -254,10 +213,8 @@ class _Start(NamedTuple):
     """A first guess."""
 
     length: float
-    feet: Floats
-    """Arc lengths of the points, over the length."""
-    slopes: Floats
-    """Slopes of the rod at points of equal distance [rad]."""
+    feet: Floats  # arc lengths of the points, over the length
+    slopes: Floats  # slopes of the rod at points of equal distance [rad]
 
 
 def _start_of(points: Floats) -> _Start:
@@ -277,10 +234,8 @@ class _Posterior(NamedTuple):
 
     mean: Floats
     covariance: Floats
-    weights: Floats
-    """Posterior probabilities of strengths, for each number of integrals."""
-    squares: Floats
-    """Sums of squares that each leaves to the scatter."""
+    weights: Floats  # posterior probabilities of strengths, for each number of integrals
+    squares: Floats  # sums of squares that each leaves to the scatter
     freedom: int
 
     @property
@@ -296,8 +251,7 @@ class _Posterior(NamedTuple):
 class _Known(NamedTuple):
     """What is known of the noise for each strength, over the scatter; in the directions that the points distinguish."""
 
-    onto: Floats
-    """Offset, direction and curvature by the noise in these directions."""
+    onto: Floats  # offset, direction and curvature by the noise in these directions
     means: Floats
     variances: Floats
     squares: Floats
