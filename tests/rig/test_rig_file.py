@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.mechanics.rods.rod import Rod
@@ -196,6 +197,19 @@ def test_a_shape_is_found_beside_the_file(tmp_path, monkeypatch):
     assert found == RODS["traced"]
     with pytest.raises((ParameterError, FileNotFoundError), match=r"other\.csv"):
         read(folder / "rig.toml", '[rod]\nshape = "other.csv"\nflexural_rigidity = 1e-5\n')
+
+
+@pytest.mark.parametrize("key", ["rest_curvature = 1.0", "rest_curvature_deviation = 0.1", "taper_deviation = 0.01"])
+def test_what_follows_from_a_shape_is_not_stated_beside_it(tmp_path, key):
+    (tmp_path / "shape.csv").write_text("x,y\n" + "".join(f"{s},{0.2 * s * s}\n" for s in S), encoding="utf-8")
+    with refused(ParameterError, "shape and", key.split()[0]):
+        read(tmp_path / "rig.toml", f'[rod]\nshape = "shape.csv"\nflexural_rigidity = 1e-5\n{key}\n')
+
+
+def test_the_largest_strain_may_be_stated_beside_a_shape(tmp_path):
+    (tmp_path / "shape.csv").write_text("x,y\n" + "".join(f"{s},{0.2 * s * s}\n" for s in S), encoding="utf-8")
+    tables = '[rod]\nshape = "shape.csv"\nflexural_rigidity = 1e-5\nelastic_strain = 0.002\n'
+    assert read(tmp_path / "rig.toml", tables).rod.elastic_strain == 0.002
 
 
 def test_a_shape_may_have_diameters(tmp_path):

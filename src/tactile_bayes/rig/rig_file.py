@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -19,7 +18,7 @@ from tactile_bayes.errors import ParameterError, TactileBayesError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import SEVERAL
 from tactile_bayes.mechanics.rods.along import text_along
-from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod, round_rigidity
 from tactile_bayes.record.points import read_points
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED
@@ -67,6 +66,7 @@ TABLES = {
     "calibration": ("parameters", "correlation", "error", "source", "stated"),
 }
 _ONE_OF_BOTH = "[rod] states youngs_modulus: give the diameter beside it, and leave out flexural_rigidity"
+_OF_SHAPE = ("rest_curvature", "rest_curvature_deviation", "rest_shape_modes", "taper_deviation")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 _LARGEST = 1 << 20  # largest number of characters of a file
@@ -191,7 +191,7 @@ def _rod(said: Mapping[str, Any], folder: Path) -> Rod:
     if modulus is not None:
         if "flexural_rigidity" in numbers or "diameter" not in numbers:
             raise ParameterError(_ONE_OF_BOTH)
-        numbers["flexural_rigidity"] = _rigidity(modulus, numbers["diameter"])
+        numbers["flexural_rigidity"] = round_rigidity(numbers["diameter"], modulus)
     if ("length" in numbers) != ("flexural_rigidity" in numbers):
         raise ParameterError(
             "[rod] needs length and flexural_rigidity (or youngs_modulus and diameter) together; without them the rig "
@@ -207,6 +207,9 @@ def _traced(said: Mapping[str, Any], numbers: dict[str, Any], folder: Path) -> R
     if (modulus is None) == (rigidity is None):
         both = "" if modulus is None else f"; {_ONE_OF_BOTH}"
         raise ParameterError(f"[rod] states a shape: give flexural_rigidity, or youngs_modulus and diameter, too{both}")
+    for name in _OF_SHAPE:
+        if name in numbers:
+            raise ParameterError(f"[rod] states shape and {name}: leave out {name}, which follows from the shape")
     path = folder / said["shape"]
     pieces = read_points(path, beside="diameter").in_unit("m", str(path))
     if len(pieces) > 1:
@@ -216,12 +219,11 @@ def _traced(said: Mapping[str, Any], numbers: dict[str, Any], folder: Path) -> R
         numbers["diameter"] = diameters[0]
     elif modulus is not None and "diameter" not in numbers:
         raise ParameterError(_ONE_OF_BOTH)
+    strain = numbers.pop("elastic_strain", None)
     rod = Rod.from_shape(x, y, 1.0 if rigidity is None else rigidity, **numbers)
-    return rod if modulus is None else replace(rod, flexural_rigidity=_rigidity(modulus, rod.diameter))
-
-
-def _rigidity(modulus: float, diameter: float) -> float:
-    return modulus * math.pi * diameter**4 / 64.0
+    if modulus is not None:
+        rod = replace(rod, flexural_rigidity=round_rigidity(rod.diameter, modulus))
+    return replace(rod, elastic_strain=strain)
 
 
 def keys_of(table: str, said: Iterable[str]) -> list[str]:

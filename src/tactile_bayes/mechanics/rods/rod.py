@@ -18,7 +18,7 @@ from tactile_bayes.mechanics.rods.profile import MOST_MODES, STEEPEST_TAPER, Pro
 from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["LARGEST_STRAIN", "Rod"]
+__all__ = ["LARGEST_STRAIN", "Rod", "round_rigidity"]
 
 _THICKEST = 1e70  # diameter whose fourth power overflows [m]
 # Turn between base and tip [rad] up to which every point of an arc is farther from the base than those before it.
@@ -203,8 +203,8 @@ class Rod:
         """
         for name, value in (("diameter", diameter), ("youngs_modulus", youngs_modulus)):
             check_positive(f"the rod's {name}", value)
-        fourth = float(diameter) ** 4 if diameter < _THICKEST else math.inf
-        return cls(length, youngs_modulus * math.pi * fourth / 64, diameter, elastic_strain, rest_curvature, taper)
+        rigidity = round_rigidity(diameter, youngs_modulus)
+        return cls(length, rigidity, diameter, elastic_strain, rest_curvature, taper)
 
     @classmethod
     def from_shape(
@@ -455,3 +455,9 @@ class Rod:
     def load_units(self) -> Floats:
         """Units of the loads (holding_moment, force_x, force_y): EI/L [N m] and twice EI/L² [N]."""
         return np.array([self.moment_unit, self.force_unit, self.force_unit])
+
+
+def round_rigidity(diameter: float, youngs_modulus: float) -> float:
+    """Return E π d⁴ / 64, the flexural rigidity of a round rod."""
+    fourth = float(diameter) ** 4 if diameter < _THICKEST else math.inf
+    return youngs_modulus * math.pi * fourth / 64.0
