@@ -483,6 +483,12 @@ def test_the_right_posterior_passes():
     assert found.attrs["calibrated"] == 1, found.attrs["verdict"]
 
 
+def test_what_is_at_an_end_of_its_prior_has_no_rank():
+    found = quickly(replicates=2, rig=AS_STATED.with_unknown(friction="default"), truth=AS_STATED)
+    assert "friction" not in found["quantity"].values
+    assert "log_likelihood" in found["quantity"].values
+
+
 @pytest.mark.slow
 def test_noise_larger_than_told_is_found():
     """Of 10 %, where it is sure to 1 %: posteriors lie some nine times that too low; power is above 99.9 %."""

@@ -102,7 +102,7 @@ def calibrate(
         Over "replicate", "quantity" (parameters, log-likelihood, angles of snap-off) and "claim":
 
         ranks (replicate, quantity)
-            Rank of the truth among 99 draws; −1 if it is unknown.
+            Rank of the truth among 99 draws; −1 if it is unknown, or at an end of its prior.
         rank_p_value (quantity)
             Probability that uniform ranks are as far from uniform, by simultaneous bands of their distribution
             (Säilynoja et al. 2022, doi 10.1007/s11222-022-10090-6).

@@ -170,15 +170,17 @@ def _ranks(
     """Rank the true parameters and their log-likelihood among the draws.
 
     The draws are picked at random, since neighbours in a walker's history are correlated. A contour outside the
-    family has no true parameters, and what has no true value has no rank.
+    family has no true parameters. What has no true value has no rank, nor has one at an end of its prior, beyond which
+    there are no draws.
     """
     draws = samples.reshape(-1, samples.shape[-1])
     picked = draws[rng.choice(len(draws), min(DRAWS, len(draws)), replace=False)]
-    ranked = model.names if is_of_family else model.names[len(model.family.parameters) :]
-    ranks = {name: _rank(picked[:, model.names.index(name)], truth[name], rng) for name in ranked if name in truth}
-    if len(ranks) < len(model.names):
+    first = 0 if is_of_family else len(model.family.parameters)
+    point = np.array([truth.get(name, np.nan) for name in model.names])
+    inside = np.flatnonzero((point > model.ends.low) & (point < model.ends.high))
+    ranks = {model.names[i]: _rank(picked[:, i], float(point[i]), rng) for i in inside[inside >= first]}
+    if first or np.isnan(point).any():
         return ranks
-    point = np.array([truth[name] for name in model.names])
     values = model.log_likelihood(np.vstack([point, picked]))
     return ranks | {LOG_LIKELIHOOD: _rank(values[1:], values[0], rng)}
 
