@@ -483,6 +483,7 @@ def test_the_right_posterior_passes():
     assert found.attrs["calibrated"] == 1, found.attrs["verdict"]
 
 
+@pytest.mark.slow
 def test_what_is_at_an_end_of_its_prior_has_no_rank():
     found = quickly(replicates=2, rig=AS_STATED.with_unknown(friction="default"), truth=AS_STATED)
     assert "friction" not in found["quantity"].values
