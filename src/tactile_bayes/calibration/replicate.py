@@ -177,7 +177,8 @@ def _ranks(
     picked = draws[rng.choice(len(draws), min(DRAWS, len(draws)), replace=False)]
     first = 0 if is_of_family else len(model.family.parameters)
     point = np.array([truth.get(name, np.nan) for name in model.names])
-    inside = np.flatnonzero((point > model.ends.low) & (point < model.ends.high))
+    ends = model.ends
+    inside = np.flatnonzero((point > ends.low) & (point < ends.high))
     ranks = {model.names[i]: _rank(picked[:, i], float(point[i]), rng) for i in inside[inside >= first]}
     if first or np.isnan(point).any():
         return ranks

@@ -229,12 +229,15 @@ def in_mode(here: Here, changes: bool) -> tuple[bool, Here]:
         scene, at = sliding_on(scene, begin.at)
     begin = balance(scene, at)[0]
     onward = times(math.copysign(1.0, begin.rates.travel), begin.tangent)
-    along, sense = leg_from(scene, begin, onward, 1.0).along, math.copysign(1.0, scene.rig.friction_angle)
     there = Here(scene, line, begin, before, onward, longest)
-    if not was_sliding:
-        return sense * slip(scene, begin.at, along) <= _UNCLEAR, there
-    # Where the slip has vanished, the force moves from the edge of the cone to second order.
-    return changes or sense * along.q <= NOT_SLIPPING, there
+    if (
+        was_sliding and changes
+    ):  # where the slip has vanished, the force moves from the edge of the cone to second order
+        return True, there
+    along, sense = leg_from(scene, begin, onward, 1.0).along, math.copysign(1.0, scene.rig.friction_angle)
+    if was_sliding:
+        return sense * along.q <= NOT_SLIPPING, there
+    return sense * slip(scene, begin.at, along) <= _UNCLEAR, there
 
 
 @compiled
