@@ -24,6 +24,7 @@ RODS = {
     "SI, all": Rod(0.2, 3.1e-4, diameter=1e-3, elastic_strain=0.02, rest_curvature=1.2, taper=0.4, stem=0.003),
     "curved along": Rod(0.2, 3.1e-4, rest_curvature=lambda s: 3.0 * s - 0.1, rigidity_profile=lambda s: 1.0 - 0.3 * s),
     "traced": Rod.from_shape(0.1 * S, 0.02 * S**2, 1e-5),
+    "numbers of NumPy": Rod(0.1, 1e-5, taper=np.float64(0.5), stem=np.float64(0.01)),
     "measured": Rod(0.2, 3.1e-4, diameter=1e-3, taper=0.4, taper_deviation=0.02),
 }
 CELLS = {

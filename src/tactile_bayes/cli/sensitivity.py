@@ -147,6 +147,7 @@ def _refuse_without_study(
 def _material(rig: Rig) -> Material:
     """Return the material of a rig's rod, of Young's modulus EI / (π d⁴ / 64)."""
     from tactile_bayes.errors import ParameterError
+    from tactile_bayes.mechanics.rods.rod import round_rigidity
     from tactile_bayes.runs.sensitivity import Material
 
     rod = rig.rod
@@ -157,7 +158,7 @@ def _material(rig: Rig) -> Material:
         )
     if rig.load_cell is None or not rig.load_cell.has_variances:
         raise ParameterError("--best-rod is for a known load cell: state its noise under [load_cell] of rig.toml")
-    return Material(rod.flexural_rigidity / (math.pi * rod.diameter**4 / 64.0), rod.elastic_strain)
+    return Material(rod.flexural_rigidity / round_rigidity(rod.diameter, 1.0), rod.elastic_strain)
 
 
 def _answer(run: SensitivityRun) -> Answer:

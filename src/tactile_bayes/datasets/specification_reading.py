@@ -31,7 +31,7 @@ from tactile_bayes.datasets.variations import Variation, variation_of
 from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER
-from tactile_bayes.mechanics.rods.rod import Rod
+from tactile_bayes.mechanics.rods.rod import Rod, round_rigidity
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.spelling import look_alikes, refuse_unknown_keys
 from tactile_bayes.rig import Rig
@@ -297,7 +297,7 @@ def _rod(rod: Mapping[str, Any], is_si: bool) -> dict[str, Variation]:
     try:
         numbers = _at_share(distributions, 0.5)
         if "youngs_modulus" in numbers:
-            numbers["flexural_rigidity"] = numbers.pop("youngs_modulus") * math.pi * numbers["diameter"] ** 4 / 64.0
+            numbers["flexural_rigidity"] = round_rigidity(numbers["diameter"], numbers.pop("youngs_modulus"))
         Rod(**numbers)
     except ParameterError as error:
         raise SpecificationError(f"rod: {error}") from error

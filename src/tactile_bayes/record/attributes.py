@@ -52,12 +52,7 @@ def rod_attributes(rod: Rod) -> dict[str, Any]:
 def rod_shape_attributes(rod: Rod) -> dict[str, Any]:
     """Return the properties by which a rod differs from a straight, uniform one: numbers, or polynomials as text."""
     values = {f"rod_{name}": getattr(rod, name) for name in _SHAPE}
-    unlike = {
-        name: value
-        for name, value in values.items()
-        if (bool(value) if isinstance(value, tuple) else value not in (0.0, None))
-    }
-    return {name: text_along(value) for name, value in unlike.items()}
+    return {name: text_along(value) for name, value in values.items() if value not in (0.0, None, ())}
 
 
 def without_rod(attrs: Mapping[str, Any]) -> dict[str, Any]:

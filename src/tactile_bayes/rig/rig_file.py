@@ -221,9 +221,8 @@ def _traced(said: Mapping[str, Any], numbers: dict[str, Any], folder: Path) -> R
         raise ParameterError(_ONE_OF_BOTH)
     strain = numbers.pop("elastic_strain", None)
     rod = Rod.from_shape(x, y, 1.0 if rigidity is None else rigidity, **numbers)
-    if modulus is not None:
-        rod = replace(rod, flexural_rigidity=round_rigidity(rod.diameter, modulus))
-    return replace(rod, elastic_strain=strain)
+    rigidity = rod.flexural_rigidity if modulus is None else round_rigidity(rod.diameter, modulus)
+    return replace(rod, elastic_strain=strain, flexural_rigidity=rigidity)
 
 
 def keys_of(table: str, said: Iterable[str]) -> list[str]:

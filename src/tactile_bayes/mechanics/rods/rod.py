@@ -130,6 +130,8 @@ class Rod:
         check_number("the rod's rest_curvature_deviation", self.rest_curvature_deviation, correction, least=0.0)
         correction = f"give a length [m] from 0, for none, to that of the rod, {self.length:g}"
         check_number("the rod's stem", self.stem, correction, least=0.0, most=self.length)
+        for name in ("taper", "taper_deviation", "stem", "rest_curvature_deviation"):
+            object.__setattr__(self, name, float(getattr(self, name)))  # a number of NumPy's compares as an array
         self._refuse_curl()
         square = float(self.length) * float(self.length)
         if not (square > 0.0 and 0.0 < float(self.flexural_rigidity) / square < math.inf):
