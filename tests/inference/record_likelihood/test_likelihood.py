@@ -18,6 +18,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood, events_of
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.branches.readings import STATE_COLUMNS
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLE
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
@@ -210,8 +211,27 @@ def test_carried_rods_that_rub_in_either_sense_are_as_without_a_table():
         np.testing.assert_array_equal(usable, usable_exactly)
         assert np.count_nonzero(usable) > 20
         np.testing.assert_allclose(loads[usable], exact[usable], atol=2e-4 * np.abs(exact).max())
-        senses += np.sign(likelihood.paths(Circle(*places), rig).events[usable, 0, -1]).tolist()
+        angles = likelihood.paths(Circle(*places), rig).events[usable, 0, STATE_COLUMNS.index("friction_angle")]
+        senses += np.sign(angles).tolist()
     assert set(senses) == {-1.0, 1.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_rods_that_stick_are_as_without_a_table(sign):
+    """A tip that first slides outward sticks before it slides back: with the table of its rod in tip contact."""
+    rod = Rod(rest_curvature=lambda s: sign * (0.9 + 0.8 * s))
+    rng, count = np.random.default_rng(5), 40
+    rig = RigValues(friction=rng.uniform(0.0, 0.5, count))
+    measured = swept(Parabola(2.0, 0.8), rod=rod, step=np.radians(2.0))
+    contours = Parabola(*(rng.normal(size=(3, count)) * [[0.1], [0.02], [0.02]] + [[2.0], [0.8], [0.0]]))
+    loads, usable = RecordLikelihood(measured, CELL, rubs=True).predict(contours, rig)
+    exactly = RecordLikelihood(measured, CELL, rubs=True, exact=True)
+    exact, usable_exactly = exactly.predict(contours, rig)
+    np.testing.assert_array_equal(usable, usable_exactly)
+    assert np.count_nonzero(usable) > 30
+    np.testing.assert_allclose(loads[usable], exact[usable], atol=2e-4 * np.abs(exact).max())
+    assert sum(any(mode.sticks for mode in modes) for modes in exactly.paths(contours, rig).modes()) > 10
 
 
 def test_rods_curved_toward_a_flat_object_touch_it_twice_with_a_table_too():

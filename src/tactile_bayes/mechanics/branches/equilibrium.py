@@ -45,8 +45,8 @@ from tactile_bayes.mechanics.branches.scene import (
     times,
 )
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.poses.beam import beam_pose, is_far_from_table, whole_pose
-from tactile_bayes.mechanics.poses.pose import Pose
+from tactile_bayes.mechanics.poses.beam import beam_pose, is_far_from_table, tip_pose, whole_pose
+from tactile_bayes.mechanics.poses.pose import Pose, scaled
 
 __all__ = [
     "SETTLED",
@@ -165,11 +165,11 @@ def _posed(scene: Scene, contact: Contact, force: float, by_p: Move) -> tuple[Po
     if slides(scene.phase):
         here, by_q, by_force = beam_pose(scene.beam, psi1, arclength, force, tip_touches(scene.phase))
         return here, _NONE, by_q, by_force
-    whole = whole_pose(scene.beam, psi1, arclength, force)
-    turned, longer = whole.by_psi1, whole.by_arclength
-    a, b = by_p.psi1, by_p.arclength
-    first = Pose(a * turned.u + b * longer.u, a * turned.v + b * longer.v, a * turned.turn + b * longer.turn)
-    return whole.here, first, Pose(-turned.u, -turned.v, -turned.turn), whole.by_force
+    if tip_touches(scene.phase):
+        here, turned, by_force = tip_pose(scene.beam, psi1, force)
+        return here, turned, scaled(-1.0, turned), by_force
+    here, turned, longer, by_force = whole_pose(scene.beam, psi1, arclength, force)
+    return here, scaled(by_p.arclength, longer), scaled(-1.0, turned), by_force
 
 
 @compiled

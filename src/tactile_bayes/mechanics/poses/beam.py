@@ -67,6 +67,7 @@ __all__ = [
     "rest_curvature",
     "rest_point",
     "rubbed_otherwise",
+    "tip_pose",
     "varied",
     "varied_of",
     "whole_pose",
@@ -88,6 +89,7 @@ class Varied(NamedTuple):
     sign: float
     other_sheet: NDArray[void]
     other_slenderness: float  # coefficients and slenderness for friction that acts in the other sense
+    remainder: float  # size of the last terms of its series, as in `series`
 
 
 class Beam(NamedTuple):
@@ -121,14 +123,14 @@ def by_kind(
     return made
 
 
-def varied_of(profile: Profile | None) -> Varied | None:
+def varied_of(profile: Profile | None, remainder: float = EXACT) -> Varied | None:
     """Profile with a workspace, if there is one."""
-    return None if profile is None else varied(profile)
+    return None if profile is None else varied(profile)._replace(remainder=remainder)
 
 
 def varied(profile: Profile) -> Varied:
     """Profile with a workspace, and without coefficients of a table."""
-    return Varied(profile, workspace(), sheet(), 0.0, 1.0, sheet(), 0.0)
+    return Varied(profile, workspace(), sheet(), 0.0, 1.0, sheet(), 0.0, EXACT)
 
 
 @compiled
@@ -162,10 +164,10 @@ def mirrored_beam(varied: Varied | None, beam: Beam) -> Beam:
 @compiled
 def with_sign(varied: Varied, sign: float) -> Varied:
     """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
-    profile, work, own, slenderness, own_sign, other, other_slenderness = varied
+    profile, work, own, slenderness, own_sign, other, other_slenderness, remainder = varied
     edges, curvature, rigidity, taper, bend, _, modes, shape = profile
     turned = Profile(edges, curvature, rigidity, taper, bend, sign, modes, shape)
-    return Varied(turned, work, own, slenderness, own_sign, other, other_slenderness)
+    return Varied(turned, work, own, slenderness, own_sign, other, other_slenderness, remainder)
 
 
 @by_kind
@@ -173,8 +175,8 @@ def rubbed_otherwise(varied: Varied | None, beam: Beam) -> Beam:
     """Rod with the coefficients for friction that acts in the other sense: they hold for one angle of friction."""
     if varied is None:
         return beam
-    profile, work, own, slenderness, sign, other, other_slenderness = varied
-    rubbed = Varied(profile, work, other, other_slenderness, sign, own, slenderness)
+    profile, work, own, slenderness, sign, other, other_slenderness, remainder = varied
+    rubbed = Varied(profile, work, other, other_slenderness, sign, own, slenderness, remainder)
     return Beam(beam.curvature, beam.reach, beam.most_curvature, rubbed, beam.stem, beam.own_reach)
 
 
@@ -184,14 +186,35 @@ def beam_pose(
 ) -> tuple[Pose, Pose, Pose]:
     """Pose, and its derivatives by ψ1 in tip contact or by the arc length in tangential contact, and by the force."""
     here, by_q, by_force = _pose(varied, beam.curvature, psi1, arclength, force, tip)
-    if beam.stem == 0.0:
+    return _on_stem(beam.stem, psi1, tip, here, by_q, by_force)
+
+
+@by_kind
+def tip_pose(varied: Varied | None, beam: Beam, psi1: float, force: float) -> tuple[Pose, Pose, Pose]:
+    """Pose in tip contact without a table, and its derivatives by ψ1 and the force.
+
+    A rod whose tip sticks hardly yields along itself: errors of a table would be a large share of that.
+    """
+    if varied is None:
+        here, by_psi1, by_force = pose_and_slopes(psi1, 1.0, force, beam.curvature, bool(1))
+    else:
+        here, by_psi1, by_force = pose_along_in_phase(
+            varied.profile, psi1, 1.0, force, bool(1), varied.work, varied.remainder
+        )
+    return _on_stem(beam.stem, psi1, bool(1), here, by_psi1, by_force)
+
+
+@inlined
+def _on_stem(stem: float, psi1: float, tip: bool, here: Pose, by_q: Pose, by_force: Pose) -> tuple[Pose, Pose, Pose]:
+    """Pose and derivatives as seen from the pivot, from those as seen from where the rod begins."""
+    if stem == 0.0:
         return here, by_q, by_force
-    psi0, h = psi1 + here.turn, beam.stem
+    psi0 = psi1 + here.turn
     by_psi0 = by_q.turn + 1.0 if tip else by_q.turn
     return (
-        _with_stem(h, psi0, here),
-        _moved_by_stem(h, psi0, by_q, by_psi0),
-        _moved_by_stem(h, psi0, by_force, by_force.turn),
+        _with_stem(stem, psi0, here),
+        _moved_by_stem(stem, psi0, by_q, by_psi0),
+        _moved_by_stem(stem, psi0, by_force, by_force.turn),
     )
 
 
@@ -208,7 +231,7 @@ def _pose(
         )
         if inside:
             return here, by_q, by_force
-    return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work)
+    return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work, varied.remainder)
 
 
 class WholePose(NamedTuple):
@@ -227,7 +250,9 @@ def whole_pose(varied: Varied | None, beam: Beam, psi1: float, arclength: float,
         here, by_psi1, by_force = pose_and_slopes(psi1, arclength, force, beam.curvature, True)
         longer = by_arclength(psi1, force, beam.curvature, here)
     else:
-        here, by_psi1, longer, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
+        here, by_psi1, longer, by_force = pose_along_and_slopes(
+            varied.profile, psi1, arclength, force, varied.work, varied.remainder
+        )
     if beam.stem == 0.0:
         return WholePose(here, by_psi1, longer, by_force)
     psi0, h = psi1 + here.turn, beam.stem

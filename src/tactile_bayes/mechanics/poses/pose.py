@@ -28,7 +28,7 @@ from typing import NamedTuple
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.jacobi import Jacobi, jacobi, jacobi_and_slopes
 
-__all__ = ["ACROSS", "Chord", "Pose", "by_arclength", "pose", "pose_and_slopes"]
+__all__ = ["ACROSS", "Chord", "Pose", "by_arclength", "pose", "pose_and_slopes", "scaled"]
 
 ACROSS = 1e-6  # cosine of the angle of a chord to the rod that counts as zero: the rod goes no farther from the pivot
 
@@ -39,6 +39,12 @@ class Pose(NamedTuple):
     u: float  # component of the vector from pivot to contact across the contact force
     v: float  # its component against the force
     turn: float  # slope of the rod at the pivot less the slope at the contact [rad]
+
+
+@compiled
+def scaled(factor: float, pose: Pose) -> Pose:
+    """A derivative by a variable of another scale."""
+    return Pose(factor * pose.u, factor * pose.v, factor * pose.turn)
 
 
 class Chord(NamedTuple):

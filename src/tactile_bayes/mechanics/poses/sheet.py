@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.poses.pose import ACROSS, Chord, Pose
+from tactile_bayes.mechanics.poses.pose import ACROSS, Chord, Pose, scaled
 from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
 __all__ = [
@@ -89,26 +89,26 @@ def pose_in(
     """True if there is a pose; the pose, and its derivatives by ψ1 or the arc length, and by the force."""
     length, rate = length_of(slenderness, taper, arclength)
     own = sheet[0]
-    scaled, span = force * length * length, own.span
-    z, by_scaled = 2.0 / span * math.log1p(scaled / SCALE) - 1.0, 2.0 / (span * (SCALE + scaled))
+    loading, span = force * length * length, own.span
+    z, by_loading = 2.0 / span * math.log1p(loading / SCALE) - 1.0, 2.0 / (span * (SCALE + loading))
     phase, begin, by_x, at = 1, 0.0, 2.0, arclength
     if tip:
         phase, begin, at = 0, own.least_psi1, psi1
         by_x = 2.0 / (own.most_psi1 - begin)
     elif arclength > 1.0:
         phase, begin, by_x = 2, 1.0, 2.0 / (BEYOND * (1.0 - taper))
-    x, by_force = (at - begin) * by_x - 1.0, by_scaled * length * length
+    x, by_force = (at - begin) * by_x - 1.0, by_loading * length * length
     inside = -1.0 <= x <= 1.0 and z <= 1.0
     here, in_x, in_z = _sums(own.phases[phase], own.rows[phase], x, z, own.sums)
     if tip:
-        return inside, here, _times(by_x, in_x), _times(by_force, in_z)
-    by_s = 2.0 * by_scaled * force * length * rate
+        return inside, here, scaled(by_x, in_x), scaled(by_force, in_z)
+    by_s = 2.0 * by_loading * force * length * rate
     in_s = Pose(by_x * in_x.u + by_s * in_z.u, by_x * in_x.v + by_s * in_z.v, by_x * in_x.turn + by_s * in_z.turn)
     return (
         inside,
         _stretched(arclength, here),
         Pose(here.u + arclength * in_s.u, here.v + arclength * in_s.v, in_s.turn),
-        _times(by_force, _stretched(arclength, in_z)),
+        scaled(by_force, _stretched(arclength, in_z)),
     )
 
 
@@ -117,11 +117,6 @@ def is_far(slenderness: float, taper: float, arclength: float, force: float) -> 
     """True if f Λ² is more than twice the largest one of any table."""
     length, _ = length_of(slenderness, taper, arclength)
     return force * length * length > 2.0 * MOST_FORCE
-
-
-@compiled
-def _times(factor: float, pose: Pose) -> Pose:
-    return Pose(factor * pose.u, factor * pose.v, factor * pose.turn)
 
 
 @compiled
