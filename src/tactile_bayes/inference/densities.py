@@ -182,21 +182,25 @@ class Mixture(_Density):
     parts: tuple[Proposal, ...]
 
     @classmethod
-    def fitted(cls, points: Floats, bent: Sequence[int], parts: int, ends: Ends = ANYTHING) -> Mixture:
+    def fitted(
+        cls, points: Floats, bent: Sequence[int], parts: int, ends: Ends = ANYTHING, weights: Floats | None = None
+    ) -> Mixture:
         """Fit a mixture to points, (n, parameters), along a bent ridge, by expectation and maximisation.
 
         Its parts are normal in the columns `bent`; given these, the others are the same normal distribution everywhere,
-        with a mean that is linear in them.
+        with a mean that is linear in them. The weights have the sum one.
         """
-        deviation = points.std(axis=0)
+        weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
+        mean = weights @ points
+        deviation = np.sqrt(weights @ (points - mean) ** 2)
         _refuse_constant(deviation, np.abs(points).max(axis=0))
-        mean, standard = points.mean(axis=0), (points - points.mean(axis=0)) / deviation
-        slopes = np.linalg.lstsq(standard[:, bent], standard, rcond=None)[0]  # of the columns `bent`, themselves
+        standard, root = (points - mean) / deviation, np.sqrt(weights)[:, None]
+        slopes = np.linalg.lstsq(root * standard[:, bent], root * standard, rcond=None)[0]  # of `bent`, themselves
         rest = standard - standard[:, bent] @ slopes
-        left = rest.T @ rest / len(points)
+        left = (weights[:, None] * rest).T @ rest
         left[bent] = left[:, bent] = 0.0
         found = []
-        for size, middle, covariance in zip(*_pieces(standard[:, bent], parts), strict=True):
+        for size, middle, covariance in zip(*_pieces(standard[:, bent], parts, weights), strict=True):
             root = WIDENING * deviation[:, None] * np.linalg.cholesky(slopes.T @ covariance @ slopes + left)
             found.append(Proposal(mean + deviation * (middle @ slopes), root, log_mass=float(np.log(size)), ends=ends))
         return cls(tuple(found))
@@ -249,16 +253,19 @@ def _untruncated(above: float, variance: float) -> tuple[float, float]:
     return float(-above - cut * scale), float(variance * (scale**2 - 1.0))
 
 
-def _pieces(points: Floats, count: int) -> tuple[Floats, Floats, Floats]:
+def _pieces(points: Floats, count: int, weights: Floats) -> tuple[Floats, Floats, Floats]:
     """Return shares, (count,), means, (count, k), and covariances of a mixture of normal distributions of points."""
-    whole = np.cov(points.T).reshape(2 * points.shape[1:])
-    along = points @ np.linalg.eigh(whole)[1][:, -1]
-    shares = np.eye(count)[np.argsort(np.argsort(along, kind="stable"), kind="stable") * count // len(points)].T
+    whole, numbers = np.cov(points.T, aweights=weights).reshape(2 * points.shape[1:]), len(points) * weights
+    order = np.argsort(points @ np.linalg.eigh(whole)[1][:, -1], kind="stable")
+    shares = np.empty((count, len(points)))
+    below = np.cumsum(weights[order]) - 0.5 * weights[order]
+    shares[:, order] = np.eye(count)[np.minimum(count * below, count - 1).astype(int)].T
     for _ in range(_ROUNDS):
-        sizes = shares.sum(axis=1) + 1e-9
-        means = shares @ points / sizes[:, None]
+        counted = shares * numbers
+        sizes = counted.sum(axis=1) + 1e-9
+        means = counted @ points / sizes[:, None]
         off = points - means[:, None]
-        covariances = (shares[:, None] * off.swapaxes(1, 2)) @ off
+        covariances = (counted[:, None] * off.swapaxes(1, 2)) @ off
         covariances += _PRIOR_POINTS * _PRIOR_WIDTH**2 * whole
         covariances /= (sizes + _PRIOR_POINTS)[:, None, None]
         roots = np.linalg.cholesky(covariances)

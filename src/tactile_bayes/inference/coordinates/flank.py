@@ -1,8 +1,8 @@
-"""Coordinates of power laws and ellipses, or such flanks of joined contours, with contacts on one flank only."""
+"""Coordinates of contours, or of a flank of joined ones, with contacts on one flank only."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,9 +22,28 @@ _MAX_SHARE, _NEAR = 0.01, 0.1
 _STEP = 1e-6  # of central differences in the base's coordinates
 
 
-# A flank is two functions of arrays (n,). The first takes the family's two sizes and the horizontal distance u of the
-# vertex, and returns log t, the logarithm of the shape, log(t/t′), and the height above the vertex. The second takes
-# the former three, and returns the two sizes in the base's coordinates, u, that height, and the log-Jacobian.
+# A flank is two functions of arrays (n,). The first takes the family's sizes and the horizontal distance u of the
+# vertex, and returns log t, for two sizes the logarithm of the shape, log(t/t′), and the height above the vertex. The
+# second takes the former, and returns the sizes in the base's coordinates, u, that height, and the log-Jacobian.
+
+
+def _parabola_at(a: Floats, u: Floats) -> tuple[Floats, ...]:
+    return np.log(2.0 * a * u), np.log(u), a * u**2
+
+
+def _parabola_of(log_slope: Floats, log_ratio: Floats) -> tuple[Floats, ...]:
+    u = np.exp(log_ratio)
+    return log_slope - log_ratio - np.log(2.0), u, 0.5 * np.exp(log_slope) * u, log_ratio
+
+
+def _circle_at(r: Floats, u: Floats) -> tuple[Floats, ...]:
+    log_slope, _, log_ratio, rise = _ellipse_at(r, r, u)
+    return log_slope, log_ratio, rise
+
+
+def _circle_of(log_slope: Floats, log_ratio: Floats) -> tuple[Floats, ...]:
+    log_r, _, *rest = _ellipse_of(log_slope, log_slope, log_ratio)
+    return log_r, *rest
 
 
 def _power_law_at(w: Floats, n: Floats, u: Floats) -> tuple[Floats, ...]:
@@ -55,24 +74,30 @@ def _ellipse_of(log_slope: Floats, log_shape: Floats, log_ratio: Floats) -> tupl
     return log_a, log_b, np.exp(log_ratio) * sec**2, rise, log_ratio
 
 
-_FLANKS = {"power-law": (_power_law_at, _power_law_of), "ellipse": (_ellipse_at, _ellipse_of)}
+_FLANKS: dict[str, tuple[Callable[..., tuple[Floats, ...]], Callable[..., tuple[Floats, ...]]]] = {
+    "parabola": (_parabola_at, _parabola_of),
+    "circle": (_circle_at, _circle_of),
+    "power-law": (_power_law_at, _power_law_of),
+    "ellipse": (_ellipse_at, _ellipse_of),
+}
 
 
 @dataclass(frozen=True, eq=False)
 class FlankCoordinates(Coordinates):
-    """Slope, shape, height and slope ratio of a contour at one x, instead of its two sizes, q and x_c.
+    """Slope, shape, height and slope ratio of a contour at one x, instead of its sizes, q and x_c.
 
     A record of one flank hardly determines the vertex: sizes and vertex then lie along a bent ridge. With the slope t,
-    the coordinates are log t, the logarithm of a shape, the height y and log(t/t′). With u = |x − x_c|, for a power law
-    t = n (u/w)^(n − 1), the shape is n − 1, y = q + t u/n and t/t′ = u/(n − 1); for an ellipse with u = a sin τ, t =
-    (b/a) tan τ, the shape is tan τ, y = q + b (1 − cos τ) and t/t′ = u cos² τ.
+    the coordinates are log t, for two sizes the logarithm of a shape, the height y and log(t/t′). With u = |x − x_c|,
+    for a power law t = n (u/w)^(n − 1), the shape is n − 1, y = q + t u/n and t/t′ = u/(n − 1); for an ellipse with u =
+    a sin τ, t = (b/a) tan τ, the shape is tan τ, y = q + b (1 − cos τ) and t/t′ = u cos² τ. A parabola is a power law
+    of n = 2, and a circle an ellipse of b = a, without a shape.
     """
 
-    flank: str  # "power-law" or "ellipse"
+    flank: str  # of `FLANKS`
     base: Logarithms
     x: float  # at which the coordinates are taken [length]
     side: float  # 1 if the vertex lies at smaller x, −1 if it lies at larger x
-    columns: tuple[int, ...] = (0, 1, 2, 3)  # of the flank's two sizes, q and x_c among the parameters
+    columns: tuple[int, ...]  # of the flank's sizes, q and x_c among the parameters
     proposal: Mixture | None = None
 
     @staticmethod
@@ -94,21 +119,21 @@ class FlankCoordinates(Coordinates):
         return cls(sides[prefix], base, x, side, tuple(map(names.index, own)))
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
-        log_slope, log_shape, height, log_ratio = coordinates[:, self.columns].T
+        *logs, height, log_ratio = coordinates[:, self.columns].T
         based = coordinates.copy()
         with np.errstate(over="ignore", invalid="ignore"):  # infinite parameters are impossible
-            first, second, u, rise, own = _FLANKS[self.flank][1](log_slope, log_shape, log_ratio)
-            based[:, self.columns] = np.stack([first, second, height - rise, self.x - self.side * u], axis=1)
+            *sizes, u, rise, own = _FLANKS[self.flank][1](*logs, log_ratio)
+            based[:, self.columns] = np.stack([*sizes, height - rise, self.x - self.side * u], axis=1)
         points, log_jacobian = self.base.parameters(based)
         return points, log_jacobian + own
 
     def of(self, points: Floats) -> Floats:
         """Return coordinates of points, shape (..., parameters); NaN if the vertex is on the other side."""
         coordinates = self.base.of(points)
-        first, second, q, x_c = np.moveaxis(points[..., self.columns], -1, 0)
+        *sizes, q, x_c = np.moveaxis(points[..., self.columns], -1, 0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            log_slope, log_shape, log_ratio, rise = _FLANKS[self.flank][0](first, second, self.side * (self.x - x_c))
-        coordinates[..., self.columns] = np.stack([log_slope, log_shape, q + rise, log_ratio], axis=-1)
+            *logs, log_ratio, rise = _FLANKS[self.flank][0](*sizes, self.side * (self.x - x_c))
+        coordinates[..., self.columns] = np.stack([*logs, q + rise, log_ratio], axis=-1)
         return coordinates
 
     def covariance(self, point: Floats, covariance: Floats) -> Floats:

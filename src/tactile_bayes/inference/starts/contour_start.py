@@ -17,6 +17,7 @@ from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import Mixture
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
+from tactile_bayes.inference.importance import refined
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.shape_free_posterior.observer import Observer
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
@@ -137,10 +138,13 @@ class _Start(NamedTuple):
         if any(mode.coordinates is not modes[0].coordinates for mode in modes):
             modes = [mode.usual or mode for mode in modes]
         common = modes[0].coordinates
-        proposal = Mixture(tuple(mode.proposal for mode in modes))
+        target = in_coordinates(model.log_probability, common)
+        shares = Mixture(tuple(mode.proposal for mode in modes)).shares
+        refined_ones = (refined(target, mode.proposal, rng, deadline) for mode in modes)
+        proposal = Mixture(tuple(part for each in refined_ones for part in each.parts))
 
         def draw(rng: np.random.Generator, count: int) -> Floats:
-            counts = rng.multinomial(count, proposal.shares)
+            counts = rng.multinomial(count, shares)
             points = [mode.cloud.draw(rng, int(each)) for mode, each in zip(modes, counts, strict=True)]
             return common.parameters(np.concatenate(points)[rng.permutation(count)])[0]
 
@@ -158,7 +162,7 @@ class _Start(NamedTuple):
             best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
             raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
         coordinates = common.with_proposal(proposal)
-        log_evidence = float(logsumexp([mode.proposal.log_mass for mode in modes]))
+        log_evidence = float(logsumexp([part.log_mass for part in proposal.parts]))
         return Walk(coordinates.of(start), coordinates, log_evidence, modes[0].optimum.beyond)
 
 
