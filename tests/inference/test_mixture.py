@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tactile_bayes.inference.densities import ANYTHING, Ends, Mixture, Proposal
+from tactile_bayes.inference.densities import ANYTHING, Ends, Mixture, Proposal, effective_number, normalised
+from tactile_bayes.inference.importance import approximate, refined
 
 MEAN = np.array([1.0, -2.0, 0.5])
 ROOT = np.array([[0.01, 0.0, 0.0], [3.0, 2.0, 0.0], [10.0, -20.0, 50.0]])  # units that differ, and correlations
@@ -64,6 +65,30 @@ def test_pieces_follow_a_bent_ridge():
     assert single < 0.2
     assert accepted(pieces, rng) > 2.0 * single
     assert accepted(pieces, rng) > accepted(Mixture.fitted(points, [0, 1], 8, ANYTHING), rng)
+
+
+def test_a_bent_ridge_is_covered_by_pieces_that_find_it():
+    """By draws of their own; the integral of the density, of which the tails are hardly seen, in closed form."""
+    rng, ends = np.random.default_rng(1), Ends(np.array([-np.inf, -np.inf, -np.inf, 0.0]), np.full(4, np.inf))
+    single = approximate(log_density_of_ridge, UNITS * np.ones(4), np.diag(UNITS**2), rng, ends=ends)
+    pieces = refined(log_density_of_ridge, single, rng)
+
+    def efficiency(proposal):
+        points, density = proposal.draw(rng, 20_000)
+        return effective_number(normalised(log_density_of_ridge(points) - density)) / len(points)
+
+    assert efficiency(single) < 0.02
+    assert efficiency(pieces) > 0.1
+    mass = np.logaddexp.reduce([part.log_mass for part in pieces.parts])
+    constant = pieces.parts[0].constant  # which log-densities of proposals lack
+    expected = 2.0 * np.log(2.0 * np.pi) + np.log(0.1 * 0.5) + np.log(UNITS).sum()
+    assert mass - constant == pytest.approx(expected, abs=0.25)
+
+
+def test_pieces_are_left_out_where_one_suffices():
+    rng = np.random.default_rng(1)
+    single = approximate(lambda points: -0.5 * np.sum(points**2, axis=1), np.zeros(3), np.eye(3), rng)
+    assert refined(lambda points: pytest.fail("no draw is needed"), single, rng).parts == (single,)
 
 
 def test_one_piece_has_the_moments_of_its_points():
