@@ -5,9 +5,9 @@ it and three times as much; see `tactile_bayes.calibrate`. Results are kept in r
 was stopped goes on; a number stands for that of replicates. With the argument "published", the tables are those of the
 replicates in data/calibration.
 
-By name, and at the usual noise only, there are also drives on which a rod may stick: "stage" and "stage-both", an
-upright whisker that is carried past one way and both, with a known coefficient of friction in truth, as in "stage-0.3",
-and "turned", a rotation that turns back in contact.
+By name, all five as "sticking", and at the usual noise only, there are also drives on which a rod may stick:
+"stage-0.3" and the like, an upright whisker that is carried past one way, or both, with this coefficient of friction
+in truth and the default prior in inference, and "turned", a rotation that turns back in contact.
 """
 
 from __future__ import annotations
@@ -77,15 +77,25 @@ def load_cell(noise: str) -> tb.LoadCell:
     return tb.LoadCell(force_noise=NOISES[noise].force, moment_noise=NOISES[noise].moment)
 
 
-def published(noise: str) -> dict[str, xr.Dataset]:
+def conditions(family: str, noise: str) -> dict[str, Any]:
+    """Arguments of `calibrate` and `experiment_of`."""
+    one, found = EVERY[family], {"rig": tb.Rig(load_cell=load_cell(noise)), "rng": SEED, "family": family}
+    if one.drive is not None:
+        found |= {"family": "parabola", "drive": one.drive}
+    if one.friction is not None:
+        found["truth"] = tb.Rig(unknown={"friction": one.friction})
+    return found
+
+
+def published(families: Iterable[str], noise: str) -> dict[str, xr.Dataset]:
     """Return the calibrations whose replicates are published, by family."""
     found = {}
-    for family in FAMILIES:
+    for family in families:
         path = PUBLISHED / folder_of(family, noise) / "replicates.json"
         if path.exists():
             rows = json.loads(path.read_text(encoding="utf-8"))["replicates"]
             outcomes = {row["number"]: REPLICATES.decode(row) for row in rows}
-            found[family] = summary(experiment_of(family, tb.Rig(load_cell=load_cell(noise)), rng=SEED), outcomes)
+            found[family] = summary(experiment_of(**conditions(family, noise)), outcomes)
     return found
 
 
@@ -123,25 +133,21 @@ def _share(claim: xr.Dataset) -> str:
 
 
 def calibrated(family: str, noise: str, replicates: int | None) -> xr.Dataset:
-    one = EVERY[family]
-    replicates = replicates or one.replicates // (1 if noise == "usual" else 2)
-    rig, out = tb.Rig(load_cell=load_cell(noise)), OUT / folder_of(family, noise)
-    known: dict[str, Any] = {} if one.drive is None else {"drive": one.drive}
-    if one.friction is not None:
-        known["truth"] = tb.Rig(unknown={"friction": one.friction})
-    found = tb.calibrate("parabola" if one.drive else family, rig, replicates=replicates, rng=SEED, out=out, **known)
+    replicates = replicates or EVERY[family].replicates // (1 if noise == "usual" else 2)
+    found = tb.calibrate(**conditions(family, noise), replicates=replicates, out=OUT / folder_of(family, noise))
     print(f"{family}, {noise} noise: {found.attrs['verdict']}", flush=True)
     return found
 
 
 def main(*chosen: str) -> None:
     count = next((int(word) for word in chosen if word.isdigit()), None)
-    families = [name for name in EVERY if name in chosen] or list(FAMILIES)
+    families = list(STICKING) if "sticking" in chosen else [name for name in EVERY if name in chosen] or list(FAMILIES)
     noises = ["usual"] if set(families) & set(STICKING) else [name for name in NOISES if name in chosen] or list(NOISES)
     for noise in noises:
-        made = (
-            published(noise) if "published" in chosen else {name: calibrated(name, noise, count) for name in families}
-        )
+        if "published" in chosen:
+            made = published(families, noise)
+        else:
+            made = {name: calibrated(name, noise, count) for name in families}
         print(f"\n{table(noise, made)}\n", flush=True)
 
 
