@@ -5,9 +5,9 @@ it and three times as much; see `tactile_bayes.calibrate`. Results are kept in r
 was stopped goes on; a number stands for that of replicates. With the argument "published", the tables are those of the
 replicates in data/calibration.
 
-By name, all five as "sticking", and at the usual noise only, there are also drives on which a rod may stick:
-"stage-0.3" and the like, an upright whisker that is carried past one way, or both, with this coefficient of friction
-in truth and the default prior in inference, and "turned", a rotation that turns back in contact.
+By name, all as "sticking", and at the usual noise only, there are also drives on which a rod may stick: "stage" and
+"stage-both", an upright whisker that is carried past one way, or both, and "turned", a rotation that turns back in
+contact. In "stage-0.3" and the like the true coefficient of friction is this one, and inference has its default prior.
 """
 
 from __future__ import annotations
@@ -55,8 +55,10 @@ FORTH = tb.Translation((0.75, 0.0), np.pi, 0.5 * np.pi, 1.5)
 BACK = tb.Translation((-0.75, 0.0), 0.0, 0.5 * np.pi, 1.5)
 # Parabolas, past which the drive goes in another way.
 STICKING = {
+    "stage": Family("upright, one way", 200, (FORTH,)),
     "stage-0": Family("upright, one way, no friction", 200, (FORTH,), 0.0),
     "stage-0.3": Family("upright, one way, μ = 0.3", 200, (FORTH,), 0.3),
+    "stage-both": Family("upright, both ways", 200, (FORTH, BACK)),
     "stage-both-0": Family("upright, both ways, no friction", 200, (FORTH, BACK), 0.0),
     "stage-both-0.3": Family("upright, both ways, μ = 0.3", 200, (FORTH, BACK), 0.3),
     "turned": Family("rotations that turn back", 200, (tb.Motion(0.0, 0.0, np.radians([-30.0, 100.0, 60.0, 210.0])),)),

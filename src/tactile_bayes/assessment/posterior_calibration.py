@@ -26,10 +26,10 @@ from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem
 from tactile_bayes.inference.coordinates.base import in_coordinates
-from tactile_bayes.inference.densities import Mixture, Proposal, flattened
+from tactile_bayes.inference.densities import Proposal, flattened
 from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
 from tactile_bayes.inference.experiment import Experiment
-from tactile_bayes.inference.importance import approximate
+from tactile_bayes.inference.importance import approximate, refined
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.contour_start import Walk
 from tactile_bayes.inference.stored_experiment import points_of, predicted_points
@@ -235,7 +235,7 @@ def _walk(joint: JointModel, experiment: PosteriorExperiment, seed: np.random.Se
         seed=seed,
         settings=experiment.settings,
     )
-    return Walk(start, coordinates.with_proposal(Mixture((proposal,))))
+    return Walk(start, coordinates.with_proposal(refined(target, proposal, rng)))
 
 
 def _ratios(tree: xr.DataTree, simulation: Simulation, probability: float) -> dict[str, float]:
