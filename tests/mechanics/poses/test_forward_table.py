@@ -27,11 +27,7 @@ def _poses(varied, table, delta, psi1, arclength, force, tip, out):
     profile = varied.profile
     slenderness = table.slenderness if _prepare(table, profile, delta, varied.sheet) else 0.0
     rod = _beam_of(
-        0.0,
-        _Varied(
-            profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0, varied.remainder
-        ),
-        0.0,
+        0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0), 0.0
     )
     for i in range(psi1.size):
         for k, pose in enumerate(_beam_pose(rod, psi1[i], arclength[i], force[i], tip)):
@@ -44,11 +40,7 @@ def _chords(varied, table, stem, mirrored, distances, out):
     profile = varied.profile
     slenderness = table.slenderness if _prepare(table, profile, 0.0, varied.sheet) else 0.0
     rod = _beam_of(
-        0.0,
-        _Varied(
-            profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0, varied.remainder
-        ),
-        stem,
+        0.0, _Varied(profile, varied.work, varied.sheet, slenderness, profile.sign, varied.other_sheet, 0.0), stem
     )
     if mirrored:
         rod = _mirrored_beam(rod)

@@ -29,7 +29,7 @@ from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_of, varied_of
 from tactile_bayes.mechanics.poses.forward_table import NO_TABLES, Tables, prepare
-from tactile_bayes.mechanics.poses.taylor import COARSE, EXACT, write_shape
+from tactile_bayes.mechanics.poses.taylor import write_shape
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 from tactile_bayes.tasks import in_parts
@@ -249,9 +249,7 @@ def _beam(
             if may_slip_back and angle > 0.0 and prepare(table, room, -angle - half_angle, other):
                 otherwise = table.slenderness
             break
-    return beam_of(
-        0.0, Varied(room, varied.work, own, slenderness, sign, other, otherwise, varied.remainder), sweep.stem
-    )
+    return beam_of(0.0, Varied(room, varied.work, own, slenderness, sign, other, otherwise), sweep.stem)
 
 
 def _carried(lines: Floats | None) -> tuple[Floats | None, Floats | None, Line | None]:
@@ -351,10 +349,9 @@ def solve_sweeps(
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     else:
         accuracy, order = _FAST._replace(tolerance=tolerance), _FAST_ORDER
-        if segments.lines is not None and np.any(sweeps.friction_angle):
+        may_stick = segments.lines is not None or profile is not None or bool(np.any(sweeps.rest_curvature))
+        if may_stick and np.any(sweeps.friction_angle):
             accuracy = accuracy._replace(last_step=_LAST_STEP_STUCK)
-    is_coarse = known is not NO_TABLES and segments.lines is None  # carried rods that stick are solved for to rounding
-    remainder = COARSE if is_coarse else EXACT
     count, rows = shape
     sweep = _as_sweeps(sweeps)
     loads, all_states = np.zeros((count, rows, 3)), np.zeros((count, rows if states else 0), dtype=STATE)
@@ -366,8 +363,7 @@ def solve_sweeps(
     def solve(part: slice) -> None:
         _solve(
             shapes,
-            # With arrays of its own.
-            varied_of(None if profile is None else profile.shaped(np.zeros(MOST_MODES)), remainder),
+            varied_of(None if profile is None else profile.shaped(np.zeros(MOST_MODES))),  # with arrays of its own
             known,
             sweep[part],
             segments,

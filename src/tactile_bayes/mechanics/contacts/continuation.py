@@ -80,7 +80,7 @@ def _between(varied: Varied | None, beam: Beam, begin: float, way: float, room: 
         room.rigidity[i, 0] += 1.0 - rigid_share
     bend = bent_share * bend + left * sign * begin
     profile = Profile(edges, room.curvature, room.rigidity, rigid_share * taper, bend, sign, modes, shape)
-    varied = Varied(profile, varied.work, varied.sheet, 0.0, 1.0, varied.other_sheet, 0.0, varied.remainder)
+    varied = Varied(profile, varied.work, varied.sheet, 0.0, 1.0, varied.other_sheet, 0.0)
     return Beam(0.0, 1.0, math.inf, varied, 0.0, 1.0)
 
 

@@ -89,7 +89,6 @@ class Varied(NamedTuple):
     sign: float
     other_sheet: NDArray[void]
     other_slenderness: float  # coefficients and slenderness for friction that acts in the other sense
-    remainder: float  # size of the last terms of its series, as in `series`
 
 
 class Beam(NamedTuple):
@@ -123,14 +122,14 @@ def by_kind(
     return made
 
 
-def varied_of(profile: Profile | None, remainder: float = EXACT) -> Varied | None:
+def varied_of(profile: Profile | None) -> Varied | None:
     """Profile with a workspace, if there is one."""
-    return None if profile is None else varied(profile)._replace(remainder=remainder)
+    return None if profile is None else varied(profile)
 
 
 def varied(profile: Profile) -> Varied:
     """Profile with a workspace, and without coefficients of a table."""
-    return Varied(profile, workspace(), sheet(), 0.0, 1.0, sheet(), 0.0, EXACT)
+    return Varied(profile, workspace(), sheet(), 0.0, 1.0, sheet(), 0.0)
 
 
 @compiled
@@ -164,10 +163,10 @@ def mirrored_beam(varied: Varied | None, beam: Beam) -> Beam:
 @compiled
 def with_sign(varied: Varied, sign: float) -> Varied:
     """Rod of a sweep: 1 for a forward one, −1 for the mirrored rod of a backward one."""
-    profile, work, own, slenderness, own_sign, other, other_slenderness, remainder = varied
+    profile, work, own, slenderness, own_sign, other, other_slenderness = varied
     edges, curvature, rigidity, taper, bend, _, modes, shape = profile
     turned = Profile(edges, curvature, rigidity, taper, bend, sign, modes, shape)
-    return Varied(turned, work, own, slenderness, own_sign, other, other_slenderness, remainder)
+    return Varied(turned, work, own, slenderness, own_sign, other, other_slenderness)
 
 
 @by_kind
@@ -175,8 +174,8 @@ def rubbed_otherwise(varied: Varied | None, beam: Beam) -> Beam:
     """Rod with the coefficients for friction that acts in the other sense: they hold for one angle of friction."""
     if varied is None:
         return beam
-    profile, work, own, slenderness, sign, other, other_slenderness, remainder = varied
-    rubbed = Varied(profile, work, other, other_slenderness, sign, own, slenderness, remainder)
+    profile, work, own, slenderness, sign, other, other_slenderness = varied
+    rubbed = Varied(profile, work, other, other_slenderness, sign, own, slenderness)
     return Beam(beam.curvature, beam.reach, beam.most_curvature, rubbed, beam.stem, beam.own_reach)
 
 
@@ -198,9 +197,7 @@ def tip_pose(varied: Varied | None, beam: Beam, psi1: float, force: float) -> tu
     if varied is None:
         here, by_psi1, by_force = pose_and_slopes(psi1, 1.0, force, beam.curvature, bool(1))
     else:
-        here, by_psi1, by_force = pose_along_in_phase(
-            varied.profile, psi1, 1.0, force, bool(1), varied.work, varied.remainder
-        )
+        here, by_psi1, by_force = pose_along_in_phase(varied.profile, psi1, 1.0, force, bool(1), varied.work)
     return _on_stem(beam.stem, psi1, bool(1), here, by_psi1, by_force)
 
 
@@ -231,7 +228,7 @@ def _pose(
         )
         if inside:
             return here, by_q, by_force
-    return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work, varied.remainder)
+    return pose_along_in_phase(varied.profile, psi1, arclength, force, tip, varied.work)
 
 
 class WholePose(NamedTuple):
@@ -250,9 +247,7 @@ def whole_pose(varied: Varied | None, beam: Beam, psi1: float, arclength: float,
         here, by_psi1, by_force = pose_and_slopes(psi1, arclength, force, beam.curvature, True)
         longer = by_arclength(psi1, force, beam.curvature, here)
     else:
-        here, by_psi1, longer, by_force = pose_along_and_slopes(
-            varied.profile, psi1, arclength, force, varied.work, varied.remainder
-        )
+        here, by_psi1, longer, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
     if beam.stem == 0.0:
         return WholePose(here, by_psi1, longer, by_force)
     psi0, h = psi1 + here.turn, beam.stem

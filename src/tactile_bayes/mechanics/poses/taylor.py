@@ -38,7 +38,6 @@ from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 
 __all__ = [
     "BACKWARD",
-    "COARSE",
     "EXACT",
     "FARTHEST",
     "FORWARD",
@@ -64,9 +63,8 @@ __all__ = [
 ]
 
 _TERMS = 24  # terms of the series
-# Size of the last terms of a slope [rad]; that beside tables, whose errors are larger, for 0.6 times as many steps; and
-# that with which a rod is followed roughly, to a part in a thousand.
-EXACT, COARSE, ROUGH = 1e-15, 1e-10, 1e-6
+# Size of the last terms of a slope [rad], and that with which a rod is followed roughly, to a part in a thousand.
+EXACT, ROUGH = 1e-15, 1e-6
 FORWARD, BACKWARD = 1.0, -1.0  # directions: from the pivot, and from the contact
 FARTHEST = 4.0  # arc length up to which a rod is continued beyond its tip, as it is at its tip [L]
 # Steps inside cells after which a march ends with NaN: the load is beyond all reason, as in some searches for
