@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import pytest
 import typer
-from benchmarks.calibration import published, table
+from benchmarks.calibration import FAMILIES, STICKING, Family, published, table
 
 import tactile_bayes as tb
 from helpers.commands import call
@@ -137,15 +137,18 @@ def test_commands_and_options_that_are_shown_exist(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("noise", "page"),
+    ("families", "noise", "page"),
     [
-        ("usual", ROOT / "README.md"),
-        pytest.param("tenth", DOCS / "trust.md", marks=pytest.mark.slow),
-        ("threefold", DOCS / "trust.md"),
+        (FAMILIES, "usual", ROOT / "README.md"),
+        pytest.param(FAMILIES, "tenth", DOCS / "trust.md", marks=pytest.mark.slow),
+        (FAMILIES, "threefold", DOCS / "trust.md"),
+        (STICKING, "usual", DOCS / "trust.md"),
     ],
 )
-def test_a_table_of_calibrations_is_that_of_the_published_replicates(noise: str, page: Path) -> None:
-    assert table(noise, published(noise)) in TEXTS[page]
+def test_a_table_of_calibrations_is_that_of_the_published_replicates(
+    families: dict[str, Family], noise: str, page: Path
+) -> None:
+    assert table(noise, published(families, noise)) in TEXTS[page]
 
 
 def test_every_notebook_is_named() -> None:

@@ -3,12 +3,17 @@
 import numpy as np
 import pytest
 
+from helpers.contour_posteriors import CELL, swept
 from tactile_bayes.calibration.calibrate import calibration_replicate, experiment_of
 from tactile_bayes.calibration.simulation import simulate
+from tactile_bayes.contours import Circle
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.inference.coordinates.base import Logarithms
 from tactile_bayes.inference.coordinates.flank import FlankCoordinates
+from tactile_bayes.inference.experiment import Experiment
+from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.starts.modes import flank_at_contacts
+from tactile_bayes.rig import Rig
 
 PLACE = 0.1
 # The parameters that are sizes, of those of the family and one of the rig.
@@ -113,6 +118,14 @@ def test_of_joined_contours_the_flank_that_was_touched_counts(contour, flank, ow
     found = flank_at_contacts(model, np.append(point, model.prior_medians(model.names[point.size :])))
     assert (found.flank, found.side) == (flank, 1.0)
     assert [model.names[k] for k in found.columns] == [*own, "q", "x_c"]
+
+
+@pytest.mark.parametrize("known", [{"x_c": 0.0}, {"q": 0.5}, {"r": 0.3}, {}])
+def test_a_size_or_vertex_that_is_known_leaves_no_ridge(known):
+    record = CELL.measure(swept(Circle(0.3, 0.5), step=0.1), rng=1)
+    model = Experiment(record, Rig(load_cell=CELL), Family("circle", **known)).model
+    point = [{"r": 0.3, "q": 0.5, "x_c": 0.05}.get(name, 0.0) for name in model.names]
+    assert (flank_at_contacts(model, np.array(point)) is None) == bool(known)
 
 
 @pytest.mark.slow

@@ -102,20 +102,20 @@ class FlankCoordinates(Coordinates):
 
     @staticmethod
     def describe(family: str) -> bool:
-        """Return True for a family with such a flank."""
-        return not set(sides_of(family).values()).isdisjoint(_FLANKS)
+        """Return True for a family of flanks."""
+        return set(sides_of(family).values()) <= set(_FLANKS)
 
     @classmethod
     def at(
         cls, family: str, names: Sequence[str], base: Logarithms, point: Floats, x: float
     ) -> FlankCoordinates | None:
-        """Return coordinates at x around a point, (parameters,); None at the vertex and on other kinds of flanks."""
-        sides = sides_of(family)
-        side = float(np.sign(x - point[names.index("x_c")]))
+        """Return coordinates at x around a point, (parameters,); None at the vertex, or if a size or it is known."""
+        sides, values = sides_of(family), dict(zip(names, point, strict=True))
+        side = float(np.sign(x - values.get("x_c", x)))
         prefix = "" if len(sides) == 1 else "right_" if side > 0.0 else "left_"
-        if abs(side) != 1.0 or sides[prefix] not in _FLANKS:
-            return None
         own = [*(f"{prefix}{name}" for name in FLANKS[sides[prefix]].table), *VERTEX]
+        if abs(side) != 1.0 or not values.keys() >= set(own):
+            return None
         return cls(sides[prefix], base, x, side, tuple(map(names.index, own)))
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
