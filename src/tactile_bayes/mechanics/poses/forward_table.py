@@ -127,7 +127,8 @@ def forward_table(profile: Profile, box: Box, grade: int = 0) -> ForwardTable:
     taper, bend, friction_angle = ((0.5 * (low + high),) * 2 for low, high in box[:3])
     middle = Box(taper, bend, friction_angle)
     table = NO_TABLE
-    for each in dict.fromkeys((middle, box)):  # a single rod tells soon where terms are too few for all
+    # One rod, or one angle of friction, tell soon where terms are too few for all.
+    for each in dict.fromkeys((middle, middle._replace(shape=box.shape), box)):
         table = _tabulated(profile, each, grade)
         if _errors(profile, table).max() > _WORST:
             return NO_TABLE
