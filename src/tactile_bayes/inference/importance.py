@@ -33,6 +33,7 @@ _MIN_EFFECTIVE = 5  # effective draws per parameter for a covariance; weights ar
 # Four pieces have the efficiency of eight: 5 to 57 % for seven posteriors along bent ridges that a single one covers to
 # 1 to 10 %. After fewer rounds an efficiency that is enough is luck; after more, little is gained.
 _PIECES, _FEWEST, _MOST, _ENOUGH = 4, 4, 16, 0.5
+_POOR = 0.35  # efficiency from which a single proposal is enough: ensembles then converge in some hundred steps
 _DRAWS_OF_PIECES = 120  # per parameter in each of these rounds
 
 
@@ -103,7 +104,7 @@ def refined(
     size = proposal.mean.size
     best, rounds = Mixture((proposal,)), list[tuple[Mixture, float]]()
     points, values = np.empty((0, size)), np.empty(0)
-    while proposal.efficiency < _ENOUGH and len(rounds) < _MOST and not deadline.has_passed:
+    while proposal.efficiency < _POOR and len(rounds) < _MOST and not deadline.has_passed:
         drawn, density = best.draw(rng, _DRAWS_OF_PIECES * size)
         found = log_probability(drawn)
         if len(rounds) >= _FEWEST and effective_number(normalised(found - density)) >= _ENOUGH * len(drawn):
