@@ -22,7 +22,7 @@ from tactile_bayes.inference.densities import (
     normalised,
 )
 
-__all__ = ["LARGEST_K", "approximate", "pareto_smoothed", "refined", "weighed"]
+__all__ = ["EFFICIENT", "LARGEST_K", "approximate", "pareto_smoothed", "refined", "weighed"]
 
 LARGEST_K = 0.7  # Pareto k̂ above which weights are not reliable (Vehtari et al. 2024, JMLR 25(72))
 _ROUNDS = 8  # of adaptation, at most
@@ -33,7 +33,9 @@ _MIN_EFFECTIVE = 5  # effective draws per parameter for a covariance; weights ar
 # Four pieces have the efficiency of eight: 5 to 57 % for seven posteriors along bent ridges that a single one covers to
 # 1 to 10 %. After fewer rounds an efficiency that is enough is luck; after more, little is gained.
 _PIECES, _FEWEST, _MOST, _ENOUGH = 4, 4, 16, 0.5
-_POOR = 0.35  # efficiency from which a single proposal is enough: ensembles then converge in some hundred steps
+# Efficiency of a proposal above which the posterior is nearly normal around it: ensembles then converge in some hundred
+# steps.
+EFFICIENT = 0.35
 _DRAWS_OF_PIECES = 120  # per parameter in each of these rounds
 
 
@@ -104,7 +106,7 @@ def refined(
     size = proposal.mean.size
     best, rounds = Mixture((proposal,)), list[tuple[Mixture, float]]()
     points, values = np.empty((0, size)), np.empty(0)
-    while proposal.efficiency < _POOR and len(rounds) < _MOST and not deadline.has_passed:
+    while proposal.efficiency < EFFICIENT and len(rounds) < _MOST and not deadline.has_passed:
         drawn, density = best.draw(rng, _DRAWS_OF_PIECES * size)
         found = log_probability(drawn)
         if len(rounds) >= _FEWEST and effective_number(normalised(found - density)) >= _ENOUGH * len(drawn):

@@ -13,7 +13,7 @@ from tactile_bayes.inference.coordinates.base import Coordinates, in_coordinates
 from tactile_bayes.inference.coordinates.flank import FlankCoordinates
 from tactile_bayes.inference.deadline import Deadline
 from tactile_bayes.inference.densities import ANYTHING, Ends, Proposal
-from tactile_bayes.inference.importance import approximate
+from tactile_bayes.inference.importance import EFFICIENT, approximate
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.cloud import Cloud, gather
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, optima_of
@@ -25,7 +25,6 @@ _MAX_SEARCHES = 9  # after which no other begins, unless none of them explains a
 # Searches that end in known modes, after which no other mode is expected: for a record of many loaded samples, and for
 # any record if the posterior is nearly normal around the last mode found.
 _REPEATS, _REPEATS_FEW_SAMPLES = 2, 4
-_EFFICIENT = 0.35  # efficiency of a proposal above which the posterior is nearly normal around it
 # Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred: a
 # ridge that bends beyond the draws of the importance sampling looks straight.
 _FLANK_EFFICIENCY = 0.4
@@ -84,7 +83,7 @@ class Modes:
 
     def _are_all(self, repeats: int, tried: int, many_samples: bool) -> bool:
         """Return True if no further search is worth while, after so many, of which so many ended in known modes."""
-        normal = bool(self.found) and self.found[-1].proposal.efficiency > _EFFICIENT
+        normal = bool(self.found) and self.found[-1].proposal.efficiency > EFFICIENT
         if many_samples and (normal or repeats == _REPEATS):
             return True
         if normal and repeats == _REPEATS_FEW_SAMPLES:
@@ -101,7 +100,7 @@ class Modes:
         """Approximate a mode in the coordinates in which it is nearer to normal; modes on a flank share them."""
         model, point = self.model, optimum.point
         usual = self._in(self._own, optimum, optimum.covariance, model.walked_ends)
-        if usual.proposal.efficiency > _EFFICIENT or self.deadline.has_passed:
+        if usual.proposal.efficiency > EFFICIENT or self.deadline.has_passed:
             return usual
         flanks = dict.fromkeys([*(mode.coordinates for mode in self.found), flank_at_contacts(model, point)])
         for flank in flanks:  # each once, since modes share them
