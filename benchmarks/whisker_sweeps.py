@@ -150,7 +150,7 @@ def calibrated(folder: Path, rod: tb.Rod) -> tuple[tb.Rig, xr.DataTree]:
         unit = rod.moment_unit
         unknown = {
             **NOTHING,
-            **dict.fromkeys(("drive_angle_offset", "friction", "rest_curvature"), "default"),
+            **dict.fromkeys(("drive_angle_offset", "friction", "rest_shape"), "default"),
             "moment_gain": stats.lognorm(s=0.5),
             "moment_curve_quadratic": stats.norm(0.0, 0.2 / unit),
             "moment_curve_cubic": stats.norm(0.0, 0.1 / unit**2),

@@ -252,8 +252,20 @@ def test_weighted_bands():
     rng = np.random.default_rng(1)
     draws = rng.normal(0.0, 2.0, (200_000, 1))
     weights = np.exp(stats.norm.logpdf(draws[:, 0]) - stats.norm.logpdf(draws[:, 0], scale=2.0))
-    width = _band_widths(draws, weights / weights.sum(), 0.9)
-    assert width[0] == pytest.approx(2.0 * stats.norm.ppf(0.95), abs=0.03)
+    # Contours of which a half, and none, have a height at a second and a third place.
+    half, none = np.where(rng.random(draws.shape) < 0.5, draws, np.nan), np.full_like(draws, np.nan)
+    widths = _band_widths(np.hstack([draws, half, none]), weights / weights.sum(), 0.9)
+    assert widths[:2] == pytest.approx(2.0 * stats.norm.ppf(0.95), abs=0.03)
+    assert np.isnan(widths[2])
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_circles_that_have_no_height_at_some_places(nested):
+    """At the default prior, of radii of which some are smaller than the span."""
+    found = design("circle", AS_STATED, drives=pivots((0.0, 0.0), (0.2, 0.0)), draws=4, rng=1, nested=nested)
+    assert np.isfinite(found.present_width)
+    assert (found.width < found.present_width).all()
+    assert np.isfinite(found.nested_width).all() == nested
 
 
 @pytest.mark.parametrize(

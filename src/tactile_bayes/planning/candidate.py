@@ -18,7 +18,7 @@ from tactile_bayes.inference.importance import weighed
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.numerics.random_numbers import Seed, words
-from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
+from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, mean_of_known
 from tactile_bayes.planning.knowledge import COARSE, STEP, Base, Knowledge
 from tactile_bayes.planning.record_information import COARSE_STEP, parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
@@ -134,7 +134,7 @@ def expected_of(task: tuple[Question, int]) -> Expected:
             except ReachError:
                 gained = np.zeros_like(known.precision)
         precision = known.precision + gained
-        rows["width"].append(wide * float(deviation_of_heights(slopes, precision).mean()))
+        rows["width"].append(wide * float(mean_of_known(deviation_of_heights(slopes, precision))))
         rows["information"].append(0.5 * (_logdet(precision) - _logdet(known.precision)))
         if question.nested and usable[k]:
             found = _nested(of_draw, model, point, precision, rng)
@@ -190,7 +190,7 @@ def _nested(
     likely = weights > 0.0
     contours = model.family.build(*points[likely, : len(model.family.parameters)].T)
     heights = np.asarray(contours.take(np.arange(contours.shape[0])[:, None]).height(question.x))
-    width = float(_band_widths(heights, weights[likely], question.probability).mean())
+    width = float(mean_of_known(_band_widths(heights, weights[likely], question.probability)))
     own = float(densities(point[None]).sum())
     return width, own - float(evidence), float(effective_number(weights))
 
@@ -209,10 +209,17 @@ def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) ->
 
 
 def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats:
-    """Return widths of central intervals at each grid point, from weighted draws, shape (grid points,)."""
+    """Return widths of central intervals at each grid point, from weighted draws, shape (grid points,).
+
+    They are those of the draws that have a height there; NaN where none has.
+    """
     levels = central_levels(probability)
-    lower, _, upper = np.quantile(heights, levels, axis=0, weights=weights, method="inverted_cdf")
-    return np.asarray(upper - lower)
+    widths, known = np.full(heights.shape[1], np.nan), ~np.isnan(heights)
+    for k in np.flatnonzero(known.any(axis=0)):
+        one, its_weights = heights[known[:, k], k], weights[known[:, k]]
+        lower, _, upper = np.quantile(one, levels, weights=its_weights, method="inverted_cdf")
+        widths[k] = upper - lower
+    return widths
 
 
 def _gaps(known: Knowledge, candidate: Candidate, usable: Flags) -> Floats:
@@ -240,7 +247,8 @@ def _coarse(drive: Drive) -> Drive:
 
 
 def _mean(values: Floats) -> tuple[float, float]:
-    """Return the mean and its standard error; NaN if unknown."""
+    """Return the mean and its standard error, of what is known; NaN if unknown."""
+    values = values[~np.isnan(values)]
     if not values.size:
         return np.nan, np.nan
     error = float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else np.nan

@@ -27,7 +27,7 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, words
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
 from tactile_bayes.planning.criterion import Criterion, CriterionName, criterion_of
-from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
+from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, mean_of_known
 from tactile_bayes.planning.knowledge import Knowledge, known_from_posterior, known_from_prior
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.rig import Rig, rig_of
@@ -96,9 +96,9 @@ def design(
         chosen:
 
         width, width_error
-            Expected mean width of the band over the span [length], and its standard error over draws. For objects that
-            the rod does not reach it is the present width, and few of them dominate the mean: more draws, and
-            `reached`, show whether there are any.
+            Expected mean width of the band over the span, as far as an object has heights there [length], and its
+            standard error over draws. For objects that the rod does not reach it is the present width, and few of them
+            dominate the mean: more draws, and `reached`, show whether there are any.
         gap, gap_error
             Width of the arcs that no sweep touches, those so far included, between the outermost contacts [length].
         information, information_error
@@ -267,7 +267,8 @@ def _present_width(question: Question) -> float:
     known = question.known
     wide = band_factor(question.probability)
     slopes = [height_slopes(known.experiment.model, point, question.x) for point in known.points]
-    return wide * float(np.mean([deviation_of_heights(of, known.precision).mean() for of in slopes]))
+    widths = [mean_of_known(deviation_of_heights(of, known.precision)) for of in slopes]
+    return wide * float(mean_of_known(np.array(widths)))
 
 
 def _identity(question: Question) -> dict[str, str]:

@@ -14,7 +14,7 @@ from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.record_information import STEP
 from tactile_bayes.sweep import Scan
 
-__all__ = ["Stretch", "band_factor", "deviation_of_heights", "height_slopes", "stretches"]
+__all__ = ["Stretch", "band_factor", "deviation_of_heights", "height_slopes", "mean_of_known", "stretches"]
 
 _GRID_POINTS = 25  # number of grid points in every stretch
 
@@ -67,12 +67,19 @@ def height_slopes(model: ContourModel, point: Floats, x: Floats) -> Floats:
 
 
 def deviation_of_heights(slopes: Floats, precision: Floats) -> Floats:
-    """Return the standard deviation of each height [length], shape (x,)."""
+    """Return the standard deviation of each height [length], shape (x,); NaN where the contour has none."""
     scale = np.sqrt(np.maximum(np.diag(precision), 1e-300))
     scaled = precision / np.outer(scale, scale)
     try:
         root = np.linalg.cholesky(scaled)
     except np.linalg.LinAlgError:
         return np.full(len(slopes), np.inf)
-    half = solve_triangular(root, (slopes / scale).T, lower=True)
+    half = solve_triangular(root, (slopes / scale).T, lower=True, check_finite=False)
     return np.asarray(np.sqrt(np.sum(half**2, axis=0)))
+
+
+def mean_of_known(widths: Floats, axis: int | None = None) -> Floats:
+    """Return the mean of the widths that are known: a circle has no height beyond its sides. NaN where none is."""
+    known = ~np.isnan(widths)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.sum(widths, axis=axis, where=known) / np.sum(known, axis=axis))
