@@ -12,8 +12,6 @@ import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import least_squares, root
 
-__all__ = ["contact_by_integration", "misfit_by_least_squares", "sweep_by_collocation", "sweep_by_shooting"]
-
 State = tuple[float, float, float, float]  # drive angle, holding moment, force, arc length of the contact
 
 

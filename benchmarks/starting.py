@@ -7,8 +7,6 @@ import sys
 
 from benchmarks.table import Row, best_time
 
-__all__ = ["starting"]
-
 
 def starting() -> list[Row]:
     """Time starts in new processes, the interpreter's start included."""

@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
-__all__ = ["Row", "best_time", "print_growth", "print_ratios"]
-
 
 class Row(NamedTuple):
     """Times of the same result by other code and by this package."""

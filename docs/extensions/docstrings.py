@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-__all__ = ["as_restructured_text", "setup", "with_listed_attributes", "with_whole_terms"]
-
 _CODE = re.compile(r"``.+?``|`[^`]+`")
 _ATTRIBUTE = re.compile(r":(?P<part>ivar|vartype) (?P<names>[^:]+): ?(?P<text>.*)")
 """What napoleon makes of attributes: fields, in which every word is a link to whatever is called like it."""

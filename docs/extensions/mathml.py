@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
     from sphinx.writers.html5 import HTML5Translator
 
-__all__ = ["setup"]
-
 _FUNCTION = r"<mi>(?:arcsin|arctan|atan2|cos|cot|log|sin|tan)</mi>"
 _BEFORE = re.compile(rf"(</m(?:i|n|sub|sup|sqrt|frac)>)(?=(?:<msup>)?{_FUNCTION})")
 _AFTER = re.compile(rf"({_FUNCTION}|<msup>{_FUNCTION}<mn>\d</mn></msup>)(?=<m(?:i|n|sub|sup|sqrt|frac))")

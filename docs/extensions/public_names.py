@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from docutils.nodes import Node
     from sphinx.application import Sphinx
 
-__all__ = ["PublicNames", "setup"]
-
 
 class PublicNames(SphinxDirective):
     """The names of a module that stand in the directive, or, where none does, all in the module's `__all__`."""

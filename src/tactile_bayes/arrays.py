@@ -7,8 +7,6 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Draws", "Flags", "Floats", "Index"]
-
 Flags: TypeAlias = NDArray[np.bool_]
 """Truth values of any shape."""
 

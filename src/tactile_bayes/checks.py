@@ -15,31 +15,6 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 
-__all__ = [
-    "TINY",
-    "as_number",
-    "as_numbers",
-    "check_array",
-    "check_arrays",
-    "check_choice",
-    "check_function",
-    "check_kind",
-    "check_mapping",
-    "check_names",
-    "check_number",
-    "check_numbers",
-    "check_optional",
-    "check_path",
-    "check_pivots",
-    "check_positive",
-    "check_probability",
-    "check_switch",
-    "check_whole_number",
-    "refused",
-    "shown",
-    "unmasked",
-]
-
 TINY = math.ulp(0.0)
 """Least positive number."""
 

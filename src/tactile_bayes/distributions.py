@@ -21,26 +21,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import ParameterError
 
-__all__ = [
-    "KINDS",
-    "UNWRITTEN",
-    "Distribution",
-    "Kind",
-    "all_in_words",
-    "check_distribution",
-    "distribution_of_table",
-    "frozen",
-    "in_words",
-    "log_density_of",
-    "numbers_of",
-    "open_share",
-    "refuse_unknown_names",
-    "stated_text",
-    "support_of",
-    "table_of_distribution",
-    "text_or_unwritten",
-]
-
 _TRIED = 16
 """Number of draws with which a distribution is tried."""
 

@@ -10,8 +10,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-__all__ = ["ignore_user_settings"]
-
 
 def ignore_user_settings() -> None:
     """Have Matplotlib, when this process imports it, read its own defaults in place of the user's settings."""

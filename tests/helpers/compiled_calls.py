@@ -5,8 +5,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["by_number"]
-
 
 def by_number(function: Callable[..., Any], outputs: int) -> Callable[..., Any]:
     """From arrays of shape (n,) to what the function makes of each entry, flat, shape (n, outputs).

@@ -5,8 +5,6 @@ import hashlib
 
 from tactile_bayes.rig import NOTHING
 
-__all__ = ["PLAIN", "RICH", "changed", "hashes"]
-
 # One family, dimensionless.
 PLAIN = {
     "name": "parabolas",

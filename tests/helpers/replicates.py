@@ -4,8 +4,6 @@ import pytest
 
 from tactile_bayes.calibration import replicate as module
 
-__all__ = ["STAGES", "failing"]
-
 # Functions that fail in replicates 0, 1 and 2, and what their errors say.
 STAGES = {"simulate": "of the simulation", "sampled": "of inference", "_snap_offs": "of what comes after"}
 _REPLICATE = module.replicate

@@ -6,18 +6,6 @@ import time
 from multiprocessing import Pipe
 from pathlib import Path
 
-__all__ = [
-    "alive",
-    "die",
-    "die_once",
-    "double",
-    "fail",
-    "fail_strangely",
-    "note_and_sleep",
-    "through_a_pipe",
-    "wait_until",
-]
-
 
 def double(number):
     return 2 * number

@@ -28,8 +28,6 @@ from tactile_bayes.rig.unknown import DEFAULT
 from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 
-__all__ = ["Alternative", "alternatives_of", "band_by_assumption"]
-
 # Unknowns of the rig, or groups of them, each of which is added or fixed.
 _UNKNOWNS = (*STANDARD, "base", "drift", "gain", "suspension_compliance", "rest_curvature", "taper", "stem", "length")
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)

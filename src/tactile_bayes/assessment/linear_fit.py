@@ -14,8 +14,6 @@ from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.planning.error_covariance import Whitening, whitening
 from tactile_bayes.planning.record_information import prior_precision, scaled_cell
 
-__all__ = ["Disagreement", "LinearFit", "Linearisation"]
-
 # Number of Gauss-Newton steps before the last; starts are draws of the posterior, or truths of predicted records.
 _STEPS = 1
 _DIFFERENCE = 0.1  # step of differences, in posterior standard deviations

@@ -39,8 +39,6 @@ from tactile_bayes.record import CHANNELS
 from tactile_bayes.tasks import Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band
 
-__all__ = ["JointModel", "PosteriorExperiment", "posterior_calibration"]
-
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
 _FEWEST_WALKERS, _MORE_WALKERS = 20, 2  # as in `calibrate`, with more steps: shape-free posteriors take some thousand
 _STARTS = 400  # number of posterior draws of which the start of a joint posterior is made

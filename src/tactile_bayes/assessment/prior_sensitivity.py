@@ -14,8 +14,6 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.stored_experiment import points_of
 from tactile_bayes.uncertainty.band import contour_heights
 
-__all__ = ["prior_sensitivity"]
-
 # Components that are scaled: the prior of the contour, that of rig and noise, and the likelihood.
 _COMPONENTS = ("contour", "rig", "likelihood")
 _SENSITIVE = 0.05  # Sensitivity from which a component matters (Kallioinen et al. 2024).

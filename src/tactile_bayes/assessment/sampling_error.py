@@ -14,8 +14,6 @@ from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.uncertainty.band import contour_heights, grid_points, length_unit
 from tactile_bayes.uncertainty.quantiles import central_levels
 
-__all__ = ["WANTED_SHARE", "sampling_error"]
-
 WANTED_SHARE = 0.1  # Monte-Carlo error of an end over the width of the band, above which more draws are advised
 
 

@@ -17,8 +17,6 @@ from tactile_bayes.inference.stored_experiment import points_of, predicted_point
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["FALSE_ALARM", "parts_of", "split_prediction"]
-
 FALSE_ALARM = 0.01  # probability of an alarm if the model holds
 _RECORDS = 199  # number of predicted records with which the real one is compared
 _FEWEST_RECORDS = 99  # least number of predicted records: with fewer an alarm would be impossible

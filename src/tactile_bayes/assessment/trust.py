@@ -34,8 +34,6 @@ from tactile_bayes.tasks import TaskProgress, Workers, workers_of
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.summary import gap_if_any, reach
 
-__all__ = ["draws_digest", "trust"]
-
 _USUAL = 0.95  # probability of the band if a posterior does not state one
 # Number of grid points of each region, the gap and both sides of it, at which the effect of the prior is computed.
 _GRID_POINTS = 9

@@ -9,8 +9,6 @@ import xarray as xr
 
 from tactile_bayes.assessment.sampling_error import WANTED_SHARE
 
-__all__ = ["NOT", "UNCONVERGED", "conclusion", "sentences"]
-
 _HOLDS = "holds"
 _PRIOR = "holds, but the prior sets the gap"
 NOT = "do not rely on it"

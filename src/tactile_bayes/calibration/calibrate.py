@@ -31,8 +31,6 @@ from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive, Rotation, drives_of, record_template
 from tactile_bayes.tasks import ResultsStore, Workers, keep_outcomes, open_results_store
 
-__all__ = ["calibrate", "calibration_replicate", "experiment_of"]
-
 # Default drive angles [degrees], from before first contact to after snap-off in either direction.
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)

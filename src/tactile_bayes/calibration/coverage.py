@@ -9,8 +9,6 @@ from scipy.special import betaincinv, rel_entr
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["coverage_p_value", "noticed_coverage"]
-
 _MARGIN = 0.01  # error in probability that is allowed for quantiles of some hundred draws
 
 

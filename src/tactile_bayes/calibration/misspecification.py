@@ -13,8 +13,6 @@ from tactile_bayes.inference.family import Family, family_of
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.rig.rig import Rig
 
-__all__ = ["Misspecification"]
-
 _SPOT = 0.1  # standard deviation of a flat spot in slope angle [rad]
 # Largest slope angle [rad], and number of knots, of a contour with a flat spot, which is a spline.
 _ENDS, _KNOTS = 1.5, 121

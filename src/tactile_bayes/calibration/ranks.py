@@ -13,8 +13,6 @@ from scipy.special import bdtr, gammaln, log_ndtr, xlogy
 
 from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["NoticedRanks", "expected_shares", "noticed_ranks", "simultaneous_band", "uniformity_p_value"]
-
 _SIMULATIONS = 20_000  # number of simulated sets of uniform ranks, the null distribution of the test
 _BLOCK_SIZE = 2000  # number of sets that are simulated at a time
 _FARTHEST = 10.0  # largest shift, and largest factor of the standard deviation, in the search for detected errors

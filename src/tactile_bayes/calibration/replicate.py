@@ -24,18 +24,6 @@ from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
 
-__all__ = [
-    "DRAWS",
-    "LOG_LIKELIHOOD",
-    "Outcome",
-    "Replicate",
-    "compared",
-    "contact_coverage",
-    "grid_points_of",
-    "make_replicate",
-    "replicate",
-]
-
 DRAWS = 99  # number of draws among which the truth has a rank, from 0 to this number
 LOG_LIKELIHOOD = "log_likelihood"  # name of the log-likelihood among the ranked quantities
 _GRID_POINTS = 9  # number of grid points of x at which a band is judged, in the gap and on each side of it

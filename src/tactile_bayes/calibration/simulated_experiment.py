@@ -22,8 +22,6 @@ from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record import bases_of, rod_of
 from tactile_bayes.sweep import Drive
 
-__all__ = ["SimulatedExperiment"]
-
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee", "arviz-stats")
 
 

@@ -18,8 +18,6 @@ from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell.corruption import corrupted_angles
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["Simulation", "simulate"]
-
 _TRIALS = 200  # largest number of truths that are drawn until the simulated rig reaches one
 
 

@@ -9,8 +9,6 @@ from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.errors import CalibrationError
 from tactile_bayes.tasks import Kind
 
-__all__ = ["REPLICATES"]
-
 
 def _encode(outcome: Outcome) -> dict[str, Any]:
     row = {"ranks": dict(outcome.ranks), "numbers": outcome.numbers, "message": outcome.message}

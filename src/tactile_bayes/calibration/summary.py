@@ -14,8 +14,6 @@ from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks, uniform
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
 from tactile_bayes.calibration.verdict import FEWEST, POWER, Tally, conclusion, lost_message, power_message, statement
 
-__all__ = ["CLAIMS", "FALSE_ALARM", "summary"]
-
 FALSE_ALARM = 0.01  # largest probability that the verdict finds a fault in right posteriors
 # Statements that must hold with the stated probability: names and descriptions.
 CLAIMS = {

@@ -13,8 +13,6 @@ from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import GROUPS, parameter_named
 from tactile_bayes.rig.rig import rod_with
 
-__all__ = ["true_values"]
-
 _NOISES = ("force_noise", "moment_noise", "relative_noise")
 
 

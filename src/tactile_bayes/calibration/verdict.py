@@ -10,8 +10,6 @@ import numpy as np
 
 from tactile_bayes.calibration.ranks import NoticedRanks
 
-__all__ = ["FEWEST", "POWER", "Conclusion", "Tally", "conclusion", "lost_message", "power_message", "statement"]
-
 Conclusion = Literal["calibrated", "not calibrated", "undecided", "too few"]
 
 FEWEST = 20  # least number of replicates for which uniformity and coverage are tested

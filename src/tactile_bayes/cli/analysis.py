@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.contour import ContourRun
 
-__all__ = ["Family", "answer_of", "decimals", "demo", "infer", "quantities"]
-
 Family = Annotated[
     str,
     typer.Option(

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-__all__ = ["Answer", "columns_of", "print_answer", "print_object", "table_of", "text_of"]
-
 
 @dataclass(frozen=True)
 class Answer:

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.cli.answer import Answer
 
-__all__ = ["app", "main"]
-
 
 class _Commands(TyperGroup):
     """Commands whose errors are a line on stderr and an exit code: 2 if refused, 130 if interrupted, else 1."""

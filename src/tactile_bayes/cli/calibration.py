@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.calibration.replicate import Replicate
 
-__all__ = ["calibrate"]
-
 
 def calibrate(
     *,

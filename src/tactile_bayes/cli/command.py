@@ -22,8 +22,6 @@ from tactile_bayes.cli.answer import Answer, print_answer
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-__all__ = ["Out", "Output", "Reads", "Seed", "Writes", "as_command"]
-
 Out = Annotated[Path, typer.Option(help="Folder for results; created if missing.", file_okay=False)]
 Seed = Annotated[int, typer.Option(help="Seed of random numbers; the same seed gives the same numbers.", min=0)]
 

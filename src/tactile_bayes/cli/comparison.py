@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.inference.ensembles import Progress
 
-__all__ = ["compare"]
-
 _POOR_K = 0.7  # Pareto k̂ above which a leave-one-out density cannot be trusted
 
 

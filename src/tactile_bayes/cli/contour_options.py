@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from tactile_bayes.contours import Contour
     from tactile_bayes.mechanics.rods.rod import Rod
 
-__all__ = ["ContourOptions", "GaugeOptions"]
-
 
 @dataclass(frozen=True)
 class ContourOptions:

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from tactile_bayes.datasets.manifest import Manifest
     from tactile_bayes.tasks import TaskProgress
 
-__all__ = ["dataset"]
-
 dataset = typer.Typer(
     help="Synthetic data sets, made from a specification.",
     no_args_is_help=True,

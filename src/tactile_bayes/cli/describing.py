@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from tactile_bayes.rig import Rig
     from tactile_bayes.rig.parameters import Parameter
 
-__all__ = ["rig"]
-
 
 def rig(
     *,

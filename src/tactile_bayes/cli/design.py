@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from tactile_bayes.runs.folder import Run
     from tactile_bayes.sweep import Carried, Drive
 
-__all__ = ["design"]
-
 Criterion = Literal["band", "gap", "information"]
 
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.sweep import Carried, Drive
 
-__all__ = ["CarryOptions", "DriveOptions", "Pivots", "pivots_in"]
-
 _STEPS = (0.001, 28.0)  # smallest and largest step of rotations [degrees]
 Directions = Literal["both", "forward", "backward"]
 

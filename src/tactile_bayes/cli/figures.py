@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.sweep import Carried
 
-__all__ = ["figures"]
-
 
 @dataclass(frozen=True)
 class _DriveOptions(DriveOptions):

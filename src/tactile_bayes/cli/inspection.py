@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from tactile_bayes.diagnostics.inspection import Inspection
     from tactile_bayes.rig import Rig
 
-__all__ = ["inspect"]
-
 _SOURCES = {
     "given": "as rig.toml and options say",
     "data sheet": "as the file states",

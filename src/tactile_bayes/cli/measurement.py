@@ -17,8 +17,6 @@ from tactile_bayes.cli.task_bar import step_bar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["measure"]
-
 
 def measure(
     *,

@@ -8,9 +8,6 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
 
-__all__ = ["as_typed", "assigned", "numbers_asked"]
-
-
 def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
     """Parse a given number of numbers, with commas between them."""
     from tactile_bayes.errors import ParameterError

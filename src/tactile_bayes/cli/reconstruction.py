@@ -16,8 +16,6 @@ from tactile_bayes.runs.names import RECONSTRUCTION
 if TYPE_CHECKING:
     from tactile_bayes.runs.reconstruction import ReconstructionRun
 
-__all__ = ["reconstruct"]
-
 _SOURCES = {
     "data sheet": "The noise is that of the load cell as the file states it.",
     "unloaded samples": "No noise is stated: bias and noise are taken from the unloaded samples.",

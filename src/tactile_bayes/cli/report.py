@@ -11,8 +11,6 @@ from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Output, Reads, Writes
 from tactile_bayes.cli.task_bar import step_bar
 
-__all__ = ["report"]
-
 
 def report(
     *,

@@ -18,8 +18,6 @@ from tactile_bayes.runs.names import RIG
 if TYPE_CHECKING:
     from tactile_bayes.runs.rig import RigRun
 
-__all__ = ["calibrate_rig"]
-
 
 def calibrate_rig(
     *,

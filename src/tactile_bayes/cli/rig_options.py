@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.rig import Rig
 
-__all__ = ["NoiseOptions", "Record", "RigFile", "RigOptions", "report_units"]
-
 Record = Annotated[Path, typer.Argument(help="Record, .csv or .nc, or a bag of ROS.")]
 
 

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.inference.ensembles import Progress
 
-__all__ = ["remaining_seconds", "sampling_bar"]
-
 _GOAL = 1000.0  # effective sample size at which sampling stops, as in `SamplerSettings`
 _MAX_R_HAT = 1.01  # R̂ below which sampling stops, as in `SamplerSettings`
 

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from tactile_bayes.mechanics.rods.rod import Rod
     from tactile_bayes.sweep import Event, Scan
 
-__all__ = ["RecordFile", "refuse_other_suffix", "scan"]
-
 RecordFile = Annotated[
     Path,
     typer.Option(help="File for the record, .csv or .nc; its folder is created if missing.", dir_okay=False),

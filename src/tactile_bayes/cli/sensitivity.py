@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from tactile_bayes.rig import Rig
     from tactile_bayes.runs.sensitivity import Material, SensitivityRun
 
-__all__ = ["sensitivity"]
-
 
 def sensitivity(
     *,

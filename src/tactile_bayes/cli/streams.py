@@ -7,8 +7,6 @@ import io
 import sys
 import unicodedata
 
-__all__ = ["accept_every_text"]
-
 _HANDLER = "tactile_bayes.stand_in"
 
 # Name of ASCII for streams, under which Typer does not take it for a mistake and write UTF-8.

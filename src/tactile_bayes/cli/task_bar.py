@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from rich.progress import ProgressColumn, Task
     from rich.text import Text
 
-__all__ = ["counted", "moving_bar", "resumable_bar", "step_bar", "task_bar"]
-
 
 @contextmanager
 def resumable_bar(

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.tasks import TaskProgress
 
-__all__ = ["trust"]
-
 
 def trust(
     *,

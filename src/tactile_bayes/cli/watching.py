@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from tactile_bayes.rig import GrowingRecord, Growth
     from tactile_bayes.runs.watch import Watch, WatchUpdate
 
-__all__ = ["watch"]
-
 _STOPPING = "stopping; the last answer is checked, plotted and written now (Ctrl-C again leaves that out)"
 
 _PAGE = "watch.html"

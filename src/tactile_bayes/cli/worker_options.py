@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.tasks import TaskProgress, Workers
 
-__all__ = ["WorkerOptions"]
-
 
 @dataclass(frozen=True)
 class WorkerOptions:

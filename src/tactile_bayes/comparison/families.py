@@ -37,8 +37,6 @@ from tactile_bayes.record import record_hash, rod_of
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.uncertainty.rod_reach import reach_attributes
 
-__all__ = ["GIVEN_UP", "SHAPES", "checked_families", "compare_families", "matched", "with_known"]
-
 # Families that are compared by default; the last but one has flanks of two shapes.
 SHAPES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
 _USUAL = WIDTHS.index(1.0)

@@ -20,18 +20,6 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.densities import effective_number
 from tactile_bayes.inference.importance import LARGEST_K, pareto_smoothed, weighed
 
-__all__ = [
-    "Difference",
-    "FromWider",
-    "LeftOut",
-    "difference",
-    "largest_k",
-    "left_out",
-    "left_out_from_wider",
-    "reweighted",
-    "stacking_weights",
-]
-
 _LEAST_DRAWS = 25  # smallest number of draws; a fifth of them, the tail, suffices to fit two parameters
 _LEAST_EFFECTIVE = 10.0  # number of effective draws below which their scatter does not estimate the error of their mean
 _SAME = 1e-12  # difference of logarithms below which weights are equal

@@ -15,8 +15,6 @@ from tactile_bayes.inference.ensembles import Draws, SamplerSettings, sample
 from tactile_bayes.inference.starts.contour_start import walk_of
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 
-__all__ = ["PredictedSamples", "predicted_samples"]
-
 _DRAWS = 2000  # largest number of draws under which densities are computed
 
 

@@ -28,8 +28,6 @@ from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.uncertainty.averaged_contours import averaged_heights
 
-__all__ = ["StreamComparison"]
-
 _KIND = "streams of families of tactile-bayes"
 
 _DRAWS = 4000  # number of contours from which averaged heights are computed

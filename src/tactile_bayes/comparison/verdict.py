@@ -8,8 +8,6 @@ import xarray as xr
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["NONE_FITS", "verdict_on"]
-
 # Beginning of the verdict if no family passes the check.
 NONE_FITS = "None fits: with the rig as assumed, the record does not look like one of any of these shapes"
 _LIKELY = 0.05  # smallest probability with which a family is named

@@ -15,21 +15,6 @@ from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
 from tactile_bayes.numerics.roots import bound_ends, falling_root
 
-__all__ = [
-    "Contour",
-    "Graph",
-    "Locus",
-    "Parameter",
-    "Single",
-    "Vertexed",
-    "alike",
-    "as_parameter",
-    "check_single",
-    "common_shape",
-    "finite",
-    "refuse_unless",
-]
-
 Parameter = float | Floats
 
 

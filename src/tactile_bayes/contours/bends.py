@@ -12,8 +12,6 @@ from scipy.special import stdtrit
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ContourError
 
-__all__ = ["FALSE_ALARM", "STRAIGHT", "Bends", "refuse_two_bands", "refuse_unless_convex"]
-
 STRAIGHT = "; a contour must be curved: measure a longer stretch or more points, of the lower boundary only"
 
 FALSE_ALARM = 1e-3  # probability that the points of a convex contour are refused

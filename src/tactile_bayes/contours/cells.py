@@ -9,8 +9,6 @@ from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.halves import CELLS, Half, Halves
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["in_cells"]
-
 _ORDER = 16
 
 _MISS = 4e-15  # largest size of the last coefficients of a series, as a share of the size of a coordinate, or in rad

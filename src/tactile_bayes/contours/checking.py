@@ -14,8 +14,6 @@ from tactile_bayes.contours.base import Contour, Graph, Locus
 from tactile_bayes.contours.rates import Rate, mismatch, probes
 from tactile_bayes.errors import ContourError
 
-__all__ = ["check"]
-
 BatchIndex = tuple[int, ...]
 
 # Number of points at which rates are checked, and the stride of the points at which searches are checked.

@@ -27,8 +27,6 @@ from tactile_bayes.contours.power_law import PowerLaw
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["FAMILIES", "FLANKS", "Flank", "FlankFamily", "family_named", "sides_of"]
-
 _FAR = 1e3  # widths from the vertex beyond which the height of a power law is constant, to avoid overflow
 Values = Mapping[str, Any]
 

@@ -13,8 +13,6 @@ from scipy.optimize import least_squares
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Contour
 
-__all__ = ["ContourFamily", "DefaultPrior", "FamilyParameter", "log_normal", "parabola_through", "robust_least_squares"]
-
 _MOST_STEPS = 100
 
 # Change of parameters, in rod lengths and relative to their size, at which least squares have converged.

@@ -17,8 +17,6 @@ from tactile_bayes.contours.joined import SAME_SLOPE
 from tactile_bayes.contours.rates import mismatch, probes
 from tactile_bayes.errors import ContourError, ParameterError
 
-__all__ = ["FunctionContour", "from_function"]
-
 Function = Callable[[Floats], ArrayLike]
 
 _MAX_DEGREE = 1024

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["CELLS", "OVAL", "PARABOLA", "POWER_LAW", "SLOPES", "Half", "Halves"]
-
 PARABOLA, OVAL, POWER_LAW, SLOPES, CELLS = 0, 1, 2, 3, 4
 
 

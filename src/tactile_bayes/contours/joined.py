@@ -14,8 +14,6 @@ from tactile_bayes.contours.base import Contour, Locus, Parameter, as_parameter,
 from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
 
-__all__ = ["SAME_SLOPE", "Joined"]
-
 SAME_SLOPE = 1e-9  # difference below which slope angles are equal [rad]
 
 

@@ -13,8 +13,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Locus, Parameter, Vertexed, alike
 from tactile_bayes.contours.halves import OVAL, Half, Halves
 
-__all__ = ["Circle", "Ellipse"]
-
 
 class _Oval(Vertexed):
     """Lower half of an oval; its parameter is the eccentric angle from the lowest point."""

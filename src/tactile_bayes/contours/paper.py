@@ -11,8 +11,6 @@ from tactile_bayes.contours.parabola import Parabola
 from tactile_bayes.contours.power_law import PowerLaw
 from tactile_bayes.errors import ContourError
 
-__all__ = ["paper_profile"]
-
 
 def paper_profile(name: Literal["I", "II", "III", "IV"], q: float) -> Contour:
     """Return one of the paper's profiles.

@@ -12,8 +12,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Locus, Parameter, Vertexed, alike
 from tactile_bayes.contours.halves import PARABOLA, Half, Halves
 
-__all__ = ["Parabola"]
-
 
 @dataclass(frozen=True, eq=False)
 class Parabola(Vertexed):

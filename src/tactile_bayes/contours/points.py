@@ -19,8 +19,6 @@ from tactile_bayes.contours.base import Graph, Parameter, Single, as_parameter
 from tactile_bayes.contours.bends import STRAIGHT, Bends, refuse_two_bands, refuse_unless_convex
 from tactile_bayes.errors import ContourError
 
-__all__ = ["MeasuredContour", "from_points"]
-
 _FEWEST = 6  # least number of different x: four for a cubic, and two for the scatter
 _MOST_PIECES = 100
 

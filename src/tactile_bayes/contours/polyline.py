@@ -13,8 +13,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_arrays, check_numbers
 from tactile_bayes.errors import ContourError
 
-__all__ = ["Polyline"]
-
 _JOINED = 1e-6  # distance below which two ends are one point, as a share of the extent
 _BEYOND = 1e-9  # share of a segment by which a foot beyond it may be rounding
 

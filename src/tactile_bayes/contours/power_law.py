@@ -12,8 +12,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Locus, Parameter, Vertexed, alike, as_parameter, common_shape, refuse_unless
 from tactile_bayes.contours.halves import POWER_LAW, Half, Halves
 
-__all__ = ["PowerLaw"]
-
 _LEAST_EXPONENT, _GREATEST_EXPONENT = 1.1, 50.0
 
 _STEEPEST = 1e300  # greatest factor a that follows from a width, to avoid overflow

@@ -12,8 +12,6 @@ from scipy.interpolate import CubicSpline
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.smooth import Smooth
 
-__all__ = ["Directions", "RandomRadius"]
-
 _PLACES = 200  # number of slope angles at which the expansion is computed
 _LARGEST = 25.0  # bound on the logarithm of radii, far beyond any prior
 _LENGTHS = 64  # number of length scales at which the expansion is computed; it is interpolated between them

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["Mismatch", "Rate", "mismatch", "probes"]
-
 Rate = Callable[[Floats], Floats]
 
 _MISS = 1e-6  # tolerated error of an integral, as a share of the largest change between neighbouring stops

@@ -15,8 +15,6 @@ from tactile_bayes.contours.tabled import Tabled
 from tactile_bayes.errors import ContourError
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["ShapeFree"]
-
 _LARGEST = 100.0  # bound on the logarithm of a radius, beyond which a spline has overshot
 _ORDER = 32  # Chebyshev nodes between two knots; the error is rounding even if radii change twentyfold there
 

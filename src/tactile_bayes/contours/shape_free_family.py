@@ -26,8 +26,6 @@ from tactile_bayes.contours.smooth import Smooth
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.numerics.selection import evenly_spread
 
-__all__ = ["SHAPE_FREE", "ShapeFreeFamily"]
-
 # Priors of the standard deviation of log ρ, and of the length over which it changes [rad].
 _AMPLITUDE, _LENGTH = log_normal(0.6, 0.7), log_normal(0.4, 0.7)
 # First guess of the scatter of points to be fitted [L], and the threshold of the soft-L1 loss in units of it.

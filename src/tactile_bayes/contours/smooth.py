@@ -18,8 +18,6 @@ from tactile_bayes.errors import ContourError
 from tactile_bayes.numerics import chebyshev
 from tactile_bayes.numerics.roots import falling_root
 
-__all__ = ["Smooth"]
-
 _UPRIGHT = 0.5 * np.pi
 _LARGEST = 100.0  # bound on the logarithm of a radius
 _MOST_NODES = 10_000  # largest number of nodes that is given

@@ -9,8 +9,6 @@ import numpy as np
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.base import Contour, Locus, Parameter
 
-__all__ = ["SweepFrame"]
-
 _FAR = 1e3  # rod lengths beyond which an end of a contour does not matter
 
 

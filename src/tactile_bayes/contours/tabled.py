@@ -11,8 +11,6 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Contour, as_parameter, common_shape, finite, refuse_unless
 
-__all__ = ["Tabled"]
-
 
 class Tabled(Contour):
     """Contours with tables of a row for each; `_row` is its index, so that `take` need not copy the tables."""

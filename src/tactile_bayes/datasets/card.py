@@ -8,8 +8,6 @@ from tactile_bayes.datasets.manifest import Manifest
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN
 
-__all__ = ["CARD", "card"]
-
 CARD = "README.md"
 
 

@@ -25,8 +25,6 @@ from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record.netcdf import read_netcdf, reading, refuse_unless
 from tactile_bayes.record.netcdf_content import refuse_unsafe_variable
 
-__all__ = ["open_dataset", "opened", "read_shard"]
-
 
 def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a data set as one xarray Dataset with dimensions record, sweep and sample; values are read when used.

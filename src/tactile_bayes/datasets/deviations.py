@@ -25,15 +25,6 @@ from tactile_bayes.sweep import ManyUnits
 if TYPE_CHECKING:
     from tactile_bayes.datasets.specification import Specification
 
-__all__ = [
-    "as_built",
-    "deviations_of_table",
-    "drawn_deviations",
-    "drifts_of",
-    "is_around_the_stated",
-    "pivot_keys",
-]
-
 _DISCRETE = ("constant", "choice", "each")
 
 # Parameters that add to entries of the load cell's data sheet.

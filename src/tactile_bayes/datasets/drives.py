@@ -11,8 +11,6 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.mechanics.branches.line import lines_through
 
-__all__ = ["Drives", "drives_of"]
-
 _ROUNDING = 1e-15
 
 

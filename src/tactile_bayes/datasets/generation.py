@@ -30,8 +30,6 @@ from tactile_bayes.mechanics.rods.profile import profile_of
 from tactile_bayes.mechanics.rods.rod import LARGEST_STRAIN
 from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
-__all__ = ["Records", "directions_of", "generate_records"]
-
 _MOST_DRAWS = 1000  # largest number of draws of one record
 # Number of draws that are tested together for the last records: superfluous draws cost less than another call.
 _AT_ONCE = 500

@@ -20,8 +20,6 @@ from tactile_bayes.errors import SpecificationError
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["MANIFEST", "Manifest", "read_manifest", "versions_here", "write_manifest"]
-
 MANIFEST = "manifest.json"
 
 _FORMAT = 2  # version of the format; version 1 had other random numbers for the same seed

@@ -18,8 +18,6 @@ from tactile_bayes.load_cell.blocks import elapsed
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
 from tactile_bayes.record import CHANNELS, turned
 
-__all__ = ["measure"]
-
 # Entries of a data sheet whose validity does not depend on the others: field, and position in it.
 _HARMLESS: dict[str, tuple[str, int | None]] = {
     **{

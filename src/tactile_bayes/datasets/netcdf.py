@@ -11,8 +11,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-__all__ = ["netcdf_of"]
-
 _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable.{:10d}"
 
 

@@ -30,8 +30,6 @@ from tactile_bayes.tasks import (
     write_atomically,
 )
 
-__all__ = ["generate"]
-
 # Share of the time that is spent on the manifest: shards that it does not list when the run is killed are repeated.
 _WRITING_SHARE = 0.05
 

@@ -28,8 +28,6 @@ from tactile_bayes.rig.parameters import parameter_named
 from tactile_bayes.rig.rig_file import ROD_UNITS
 from tactile_bayes.tasks import write_atomically
 
-__all__ = ["Written", "file_in", "records_as_dataset", "shard_file", "write_shard"]
-
 _LONGEST = 9  # largest number of phases in a sweep
 PHASE_SEQUENCES = tuple(
     "-".join("AB"[(start + k) % 2] for k in range(length)) for length in range(1, _LONGEST + 1) for start in (0, 1)

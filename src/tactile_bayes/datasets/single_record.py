@@ -24,8 +24,6 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, COLUMNS, column_of
 from tactile_bayes.rig import Rig, make_record
 
-__all__ = ["contour_of", "record"]
-
 
 def record(
     source: str | os.PathLike[str] | Mapping[str, Any] | Specification, index: int, *, truth: bool = True

@@ -18,8 +18,6 @@ from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record import Frame
 from tactile_bayes.rig.rig_prior import RigPrior
 
-__all__ = ["Drive", "Group", "Specification"]
-
 _AT_HAND = 2**14  # number of samples in a block: a column of them takes 128 kB
 
 

@@ -39,8 +39,6 @@ from tactile_bayes.rig.rig_file import ROD_UNITS, calibration_of, entries_of_cel
 from tactile_bayes.rig.rig_file import TABLES as OF_RIG
 from tactile_bayes.tasks.documents import LARGEST, read_toml
 
-__all__ = ["read_specification", "read_text", "rule_of"]
-
 _MOST_SHARDS = 1_000_000
 _LARGEST_SEED = 2**63 - 1
 

@@ -11,8 +11,6 @@ from tactile_bayes.contours.family import ContourFamily
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
-__all__ = ["DEFAULTS", "SCAN", "UNNAMED", "differences", "left_out", "meaning", "toml_of", "without"]
-
 UNNAMED = "unnamed"
 
 SCAN = {"bases": [[0.0, 0.0]], "directions": ["forward", "backward"], "samples": 180, "margin": 0.1}

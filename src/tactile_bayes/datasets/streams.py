@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["CONTOUR", "NOISE", "Together", "streams"]
-
 Words = NDArray[np.uint32]
 
 CONTOUR, NOISE = 0, 1  # purposes of streams: the distributions of a specification, and the load cell

@@ -14,9 +14,6 @@ from tactile_bayes.checks import as_number, shown
 from tactile_bayes.distributions import KINDS, Distribution, distribution_of_table, in_words, open_share, support_of
 from tactile_bayes.errors import SpecificationError
 
-__all__ = ["Variation", "variation_of"]
-
-
 _WORDS = {"default": "the default of the rig", "calibrated": "as the calibration of the rig has found"}
 
 

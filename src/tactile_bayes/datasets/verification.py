@@ -21,8 +21,6 @@ from tactile_bayes.datasets.specification_reading import read_text
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.numerics.selection import evenly_spread
 
-__all__ = ["Verification", "verify"]
-
 
 class Verification(NamedTuple):
     """Progress of a verification."""

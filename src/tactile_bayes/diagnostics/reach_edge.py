@@ -11,8 +11,6 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.stored_experiment import experiment_of, points_of
 from tactile_bayes.numerics.selection import evenly_spread
 
-__all__ = ["cut_off_parameters"]
-
 _FEW, _DRAWS = 40, 200  # number of draws that are displaced, and if one of them is then out of reach
 _STEP = 0.5  # displacement, in standard deviations of the parameter
 # Share of draws of which the displaced one is out of reach, from which a parameter counts as cut off: a normal density

@@ -19,8 +19,6 @@ from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
 from tactile_bayes.record.rig_entry import rig_entry
 from tactile_bayes.rig.parameters import GROUPS
 
-__all__ = ["DISCREPANCIES", "LOST_BELOW", "Residuals", "check_record", "residuals_of"]
-
 # Ways in which a record can differ from those that the posterior predicts.
 DISCREPANCIES = ("runs", "neighbours", "largest", "loaded", "zero")
 _FEWEST_SAMPLES = 5  # number of loaded, or of unloaded, samples in a channel below which they are not judged

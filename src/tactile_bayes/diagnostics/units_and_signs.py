@@ -11,8 +11,6 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned, validate
 
-__all__ = ["CHECK_UNITS", "check_units_and_signs"]
-
 # Force in EI/L² above which units are doubted: a tangential contact with more is within 0.37 L of the pivot.
 _STRONGEST = 100.0
 _WEAKEST = 0.02  # largest force in EI/L² below which units are doubted: a rod that lets go has been bent by more

@@ -27,8 +27,6 @@ from tactile_bayes.record.rig_entry import rig_entries, rig_entry
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["CONTRADICTION", "NOISE_FACTOR", "OFF_ZERO", "doubtful_sides", "verdicts"]
-
 _HOLDS, _NOT = "holds", "do not rely on it"  # conclusions of `trust`; another one is a reservation
 _NOISES = ("noise_scale", "moment_noise", "force_noise", *GROUPS["discrepancy"])
 

@@ -31,8 +31,6 @@ from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.unknown import expanded
 
-__all__ = ["Sampled", "calibrate_rig", "contours_of", "infer_contour", "sampled"]
-
 _PRIOR_SECONDS = 3.0  # time limit for draws from the prior [s] if time is limited, since a rod may reach few contours
 
 

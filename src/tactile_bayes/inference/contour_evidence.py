@@ -14,8 +14,6 @@ from tactile_bayes.inference.evidence import bridge_evidence
 from tactile_bayes.inference.importance import weighed
 from tactile_bayes.inference.parameters.priors import widened
 
-__all__ = ["WIDTHS", "ContourEvidence", "contour_evidence"]
-
 WIDTHS = (0.5, 1.0, 2.0)  # factors on the widths of the priors of sizes, exponents, amplitude and length scale
 _POSTERIOR_DRAWS = 8000  # that are used, evenly spread, since neighbours add little
 _PRIOR_DRAWS, _OTHER_DRAWS = 4000, 1000  # for the share within reach, with the prior and with one of another width

@@ -22,8 +22,6 @@ from tactile_bayes.record import CHANNELS, COLUMNS, present_channels
 from tactile_bayes.record.origin import with_origin
 from tactile_bayes.rig.parameters import parameter_named
 
-__all__ = ["FEWEST_PREDICTIONS", "drawn_groups", "predicted_groups", "prior_draws", "unit_of"]
-
 _KEPT_DRAWS = 250  # largest number of draws of each chain for which predictions and events are stored
 # Largest number of values in predictions and log-likelihoods, 128 MB; with four chains, fewer draws are stored from
 # 4,000 samples on.

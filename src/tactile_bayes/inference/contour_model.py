@@ -29,8 +29,6 @@ from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig.parameters import MAY_VANISH
 
-__all__ = ["ContourModel"]
-
 _FALSE_ALARM = 1e-7  # probability that noise alone makes an unloaded sample look loaded
 _FEWEST_UNLOADED = 12  # least number of unloaded samples from which zero and noise of a channel are estimated
 _MOST_TRIALS = 50  # largest number of draws from the prior for each requested draw within reach

@@ -26,9 +26,6 @@ from tactile_bayes.reconstruction import (
     with_sides,
 )
 
-__all__ = ["ContourProblem", "contour_problem", "identity_of"]
-
-
 _MOST_DOUBTFUL = 2  # sweeps of which both sides are tried, the most doubtful first: each doubles the problems
 _BELIEVED = float(np.log(10.0))  # log prior odds that the direction of a doubtful sweep states its side of contact
 

@@ -12,8 +12,6 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["NEVER", "Deadline"]
-
 
 class _PassedError(Exception):
     """Exception that ends a search."""

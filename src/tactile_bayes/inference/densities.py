@@ -13,19 +13,6 @@ from scipy.special import gammaln, ndtr
 
 from tactile_bayes.arrays import Flags, Floats
 
-__all__ = [
-    "ANYTHING",
-    "WIDENING",
-    "Ends",
-    "LogProbability",
-    "Mixture",
-    "Proposal",
-    "Random",
-    "effective_number",
-    "flattened",
-    "normalised",
-]
-
 LogProbability = Callable[[Floats], Floats]
 Random = np.random.Generator | np.random.RandomState  # emcee's moves have legacy generators
 WIDENING = 1.1  # scale over that of the fitted points: too wide a proposal costs less than too narrow a one

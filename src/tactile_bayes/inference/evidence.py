@@ -14,8 +14,6 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.densities import Proposal, effective_number, normalised
 
-__all__ = ["Evidence", "bridge_evidence"]
-
 _KNOTS = np.linspace(-2.0, 2.0, 7)  # of normal scores: more would follow noise, fewer would not resolve hard bounds
 _PROPOSALS = 4000  # for a standard error of 0.01 to 0.04
 _MOST_DRAWS = 50_000  # that are used, evenly spaced: more than ten times the proposals add little

@@ -26,8 +26,6 @@ from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_r
 from tactile_bayes.record.attributes import rod_attributes
 from tactile_bayes.rig import Rig
 
-__all__ = ["Experiment", "usual_load_cell"]
-
 _WHOLE = "whole_sha256"  # attribute of a shortened record: the hash of the whole one
 
 

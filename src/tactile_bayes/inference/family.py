@@ -35,8 +35,6 @@ from tactile_bayes.inference.misfit import GAUGE
 from tactile_bayes.inference.result import refuse_no_contour
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["Family", "Gauge", "PartlyKnown", "family_of"]
-
 
 class Family:
     """A family of contours, with what is said of its parameters: a number is known, a distribution is unknown.

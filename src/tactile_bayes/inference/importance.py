@@ -22,8 +22,6 @@ from tactile_bayes.inference.densities import (
     normalised,
 )
 
-__all__ = ["EFFICIENT", "LARGEST_K", "approximate", "pareto_smoothed", "refined", "weighed"]
-
 LARGEST_K = 0.7  # Pareto k̂ above which weights are not reliable (Vehtari et al. 2024, JMLR 25(72))
 _ROUNDS = 8  # of adaptation, at most
 _DRAWS = 60  # per parameter in each round

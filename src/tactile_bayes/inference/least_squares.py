@@ -11,8 +11,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.numerics.differences import central_slopes
 
-__all__ = ["Optimum", "descend", "optima"]
-
 Residuals = Callable[[Floats], Floats]
 _HUBER_THRESHOLD = 2.0  # residual, in standard deviations, beyond which the loss of the final search grows linearly
 _THRESHOLD_FACTOR = 0.2  # from one search to the next; the first threshold is the root mean square of residuals

@@ -6,8 +6,6 @@ from collections.abc import Collection
 
 from tactile_bayes.inference.parameters.unknowns import belongs
 
-__all__ = ["CHECK_RIG", "GAUGE", "NO_LOAD", "is_inferred", "what_to_try"]
-
 # Advice if loads contradict one another for any contour: the cause is the rig.
 CHECK_RIG = (
     "check the rod (length, flexural rigidity, rest curvature, taper, stem), unit, sign and axes of each load, the "

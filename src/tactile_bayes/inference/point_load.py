@@ -33,8 +33,6 @@ from tactile_bayes.inference.starts.cloud import gather
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, spawn
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["default_priors", "infer_point_load", "predictive_p_value"]
-
 _UNITS = {"clamp_axial": "mm", "clamp_lateral": "mm", "clamp_angle": "rad", "compliance": "mm"}
 _VAGUE = 100.0  # prior sd of a sensor coefficient, in full scales of the reading per power of 3/reach
 _SETTINGS = SamplerSettings(walkers=64)  # most of an evaluation does not depend on their number

@@ -19,8 +19,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.distributions import support_of
 from tactile_bayes.mechanics.clamped_rod import base_curvature
 
-__all__ = ["POWERS", "PointLoadModel", "normal_approximation"]
-
 _GEOMETRY = ("clamp_axial", "clamp_lateral", "clamp_angle", "compliance")
 POWERS = 4  # of the curvature in the sensor curve
 _GUESSES = 400  # number of draws of the prior among which the search for a start begins

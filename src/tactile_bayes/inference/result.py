@@ -22,23 +22,6 @@ from tactile_bayes.numerics.random_numbers import Seed, seed_words
 from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = [
-    "STREAMED",
-    "contact_draws",
-    "contour_draws",
-    "contour_events",
-    "is_streamed",
-    "posterior_draws",
-    "provenance",
-    "read_result",
-    "record_of",
-    "refuse_no_contour",
-    "refuse_not_finite",
-    "sample_stats",
-    "to_arviz",
-    "write_result",
-]
-
 STREAMED = "sequential Monte Carlo"  # sampler of a stream, as the attribute of its posterior states it
 # Libraries by which a posterior is computed and stored, besides Python.
 _SOFTWARE = ("tactile-bayes", "numpy", "scipy", "emcee", "numba", "xarray", "arviz-stats", "h5netcdf")

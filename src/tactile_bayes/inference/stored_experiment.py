@@ -24,16 +24,6 @@ from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = [
-    "contact_points",
-    "experiment_of",
-    "found_rig",
-    "likelihood_of",
-    "points_of",
-    "predicted_points",
-    "segments_of",
-]
-
 
 def experiment_of(posterior: xr.DataTree, family: Family | None = None, rig: Rig | None = None) -> Experiment:
     """Return the experiment of which a tree is the posterior."""

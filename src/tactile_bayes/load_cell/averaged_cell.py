@@ -11,8 +11,6 @@ from tactile_bayes.load_cell.cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.mechanics.rods.rod import Rod
 
-__all__ = ["AveragedCell"]
-
 
 @dataclass(frozen=True)
 class AveragedCell(LoadCell):

@@ -12,17 +12,6 @@ from tactile_bayes.load_cell.contact_bounds import ContactBounds
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
 
-__all__ = [
-    "AFTER_CONTACT",
-    "BEFORE_ONSET",
-    "IN_CONTACT",
-    "Blocks",
-    "are_blocks",
-    "bounds_in_blocks",
-    "elapsed",
-    "elapsed_in",
-]
-
 BEFORE_ONSET, IN_CONTACT, AFTER_CONTACT = 1, 2, 3  # parts of a sweep, as far as they are certain; 0 is none of them
 _LOG_2PI = float(np.log(2.0 * np.pi))
 

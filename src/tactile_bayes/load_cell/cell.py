@@ -24,8 +24,6 @@ from tactile_bayes.load_cell.zero_load import found_cell
 from tactile_bayes.numerics.random_numbers import Rng, generator
 from tactile_bayes.record import CHANNELS, frame_of, validate
 
-__all__ = ["LoadCell"]
-
 
 @dataclass(frozen=True)
 class LoadCell(DataSheet):

@@ -11,8 +11,6 @@ from scipy.special import betainc, betaln, fdtrc, fdtri, stdtrit
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
-__all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
-
 FEWEST = 3  # least number of samples for an estimate of bias and noise
 # Range of a smooth course of the readings, in standard deviations of the noise between neighbours, from which it is a
 # load whatever the zero: less may be a drift.

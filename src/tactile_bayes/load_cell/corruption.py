@@ -11,8 +11,6 @@ from tactile_bayes.arrays import Draws, Floats
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 
-__all__ = ["corrupted_angles", "corrupted_loads"]
-
 
 def corrupted_loads(
     sheet: DataSheet,

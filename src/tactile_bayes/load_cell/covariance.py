@@ -10,8 +10,6 @@ from scipy.special import ndtri, stdtr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell.data_sheet import DataSheet
 
-__all__ = ["covariance", "squared_mahalanobis_distance", "wandering_deviation"]
-
 _BEYOND_ALL = 1e100  # bound on deviations in standard deviations, whose products do not overflow
 
 

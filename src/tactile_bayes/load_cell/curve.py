@@ -12,8 +12,6 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["curved", "slope_of", "straightened", "unsaturated"]
-
 _LEAST_SLOPE = 1e-3  # slope that counts as the least, so that a saturated reading has an error, though a large one
 _BISECTIONS, _POLISHED = 40, 3
 

@@ -29,8 +29,6 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.attribute_names import no_entry
 
-__all__ = ["CERTAIN", "SEVERAL", "DataSheet"]
-
 Triple = tuple[float, float, float]
 
 # Deterministic entries: known errors, for which a record can be corrected.

@@ -12,8 +12,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["Drift", "OrnsteinUhlenbeck", "RandomWalk", "Zero"]
-
 
 @dataclass(frozen=True)
 class _DriftProcess:

@@ -18,8 +18,6 @@ from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.drift import Zero
 from tactile_bayes.mechanics.compiler import cached, compiled
 
-__all__ = ["given_before", "given_others", "innovations"]
-
 _STATES = 4  # the process, its derivative over its rate, drift, and bias
 
 

@@ -17,17 +17,6 @@ from tactile_bayes.load_cell.discrepancy import Discrepancy
 from tactile_bayes.load_cell.drift import Zero
 from tactile_bayes.record import CHANNELS
 
-__all__ = [
-    "approximations",
-    "checked_noise_scale",
-    "correlated_density",
-    "log_density_left_out",
-    "log_likelihood",
-    "normal_density",
-    "refuse_inexact",
-    "refuse_silent",
-]
-
 _LOG_2PI = math.log(2.0 * math.pi)
 
 _NARROW = 1e-5  # width of a step of the reading, in scales of the noise, below which the density is constant on it

@@ -16,8 +16,6 @@ from tactile_bayes.load_cell.likelihood import (
 )
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["LoneSamples"]
-
 
 class LoneSamples:
     """Readings, each of which is judged by itself.

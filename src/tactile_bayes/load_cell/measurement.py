@@ -17,8 +17,6 @@ from tactile_bayes.load_cell.data_sheet import CERTAIN, DataSheet
 from tactile_bayes.record import CHANNELS, column_of, frame_of, in_frame, present_channels, validate
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 
-__all__ = ["corrected", "measured", "stated_entries"]
-
 _PREFIX = "load_cell_"
 _TAKEN_OUT = tuple(
     f"{_PREFIX}{name}"

@@ -29,8 +29,6 @@ from tactile_bayes.record import (
     validate,
 )
 
-__all__ = ["found_cell", "zero_load"]
-
 # Least number of samples of a sweep that counts as unloaded because no contact was found in it: in a shorter sweep a
 # strong contact may be missed.
 _MIN_SAMPLES = 12

@@ -10,8 +10,6 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.elastica import lever_of_stem
 from tactile_bayes.mechanics.rods.profile import Rods
 
-__all__ = ["rod_shape"]
-
 
 def rod_shape(
     drive_angle: ArrayLike,

@@ -30,8 +30,6 @@ from scipy.interpolate import CubicSpline
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 
-__all__ = ["base_curvature"]
-
 _MAX_TURN = 1.5  # largest angle δ between chord and base [rad] that is modelled
 _MAX_STEPS = 30
 

@@ -13,8 +13,6 @@ from typing import Any, TypeVar
 import numba
 from numba.core import event
 
-__all__ = ["cached", "compiled", "inlined"]
-
 _NOTICE = "tactile-bayes: compiling the forward model; this takes a while the first time, and is kept for later"
 
 Function = TypeVar("Function", bound=Callable[..., object])

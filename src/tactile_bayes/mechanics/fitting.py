@@ -17,8 +17,6 @@ from tactile_bayes.mechanics.contacts.fits import ContactFit, RawFit, Reading, S
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.rods.profile import Rods, rods_of
 
-__all__ = ["fit_contacts", "fit_sheet", "plain", "raw_contacts"]
-
 # Free coordinates on a sheet; None stands for the edge.
 _FREE = {TIP: (FORCE, PSI1), TANGENTIAL: (FORCE, ARCLENGTH), None: (FORCE,)}
 _BLOCK = 4096

@@ -7,8 +7,6 @@ import math
 
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = ["golden", "newton_step"]
-
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 

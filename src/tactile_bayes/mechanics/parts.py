@@ -14,8 +14,6 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.typed_passes import NativeLowering
 
-__all__ = ["PartCompiler"]
-
 
 class _PartLibrary(JITCodeLibrary):
     """LLVM code of a function, which is optimised and turned into machine code only inside its callers."""

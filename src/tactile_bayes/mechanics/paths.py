@@ -23,8 +23,6 @@ from tactile_bayes.mechanics.rods.profile import MOST_MODES
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = ["Mode", "Paths", "States", "trace"]
-
 
 class States(NamedTuple):
     """States on paths."""

@@ -1,7 +1,5 @@
 """Contact phases: codes and names."""
 
-__all__ = ["NONE", "PHASE_NAMES", "TANGENTIAL", "TIP"]
-
 # Codes of the contact phase: no contact, Phase A (the tip touches), Phase B (the rod touches tangentially).
 NONE, TIP, TANGENTIAL = 0, 1, 2
 PHASE_NAMES = ("none", "tip", "tangential")  # names of the contact phases, by code

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["CLEARANCE", "Reachability", "SnapOff"]
-
 # Least distance of pivot and contour at which a path is followed [L]. Nearer, almost the whole path lies within a
 # degree of snap-off, and the nodes would miss it.
 CLEARANCE = 0.02

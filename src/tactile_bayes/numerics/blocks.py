@@ -6,8 +6,6 @@ import numpy as np
 
 from tactile_bayes.arrays import Index
 
-__all__ = ["blocks"]
-
 _MOST = 2_000_000  # largest number of entries in one array of a block: 16 MB, of which a few exist at a time
 
 

@@ -9,8 +9,6 @@ from numpy.polynomial import chebyshev
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["basis", "coefficients", "derivative", "evaluate", "integral", "nodes", "polynomials"]
-
 
 @functools.cache
 def nodes(count: int) -> Floats:

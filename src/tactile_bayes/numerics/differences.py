@@ -8,8 +8,6 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["central_slopes"]
-
 _JUMP = 0.01  # second difference of a value over a step, in its unit, above which it may be a jump
 
 

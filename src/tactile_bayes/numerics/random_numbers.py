@@ -8,8 +8,6 @@ import numpy as np
 
 from tactile_bayes.checks import check_whole_number
 
-__all__ = ["Rng", "Seed", "child", "generator", "seed_sequence", "seed_words", "spawn", "whole_seed", "words"]
-
 Seed = int | np.random.SeedSequence  # gives the same numbers in every call
 # A seed, or a generator that every call draws from, so that the next call has other numbers.
 Rng = Seed | np.random.Generator

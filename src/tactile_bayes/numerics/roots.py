@@ -8,8 +8,6 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["bound_ends", "falling_root"]
-
 _ROUNDING = 1e-14  # step, as a share of the bracket, at the level of rounding, at which the iteration ends
 _FARTHEST = 2.0**60  # distance beyond which no root is sought
 # Maps indices of functions and arguments to values and derivatives, each of shape (k,).

@@ -8,8 +8,6 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["DEVIATION_OVER_MEDIAN", "robust_deviation", "rough_noise"]
-
 DEVIATION_OVER_MEDIAN = 1.4826  # standard deviation of a normal distribution about zero, over the median of the size
 
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["evenly_spread", "resampled"]
-
 
 def evenly_spread(points: int, most: int) -> Index:
     """Return the indices of at most so many of the points, evenly spread from the first to the last."""

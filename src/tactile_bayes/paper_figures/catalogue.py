@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.sweep import Carried
 
-__all__ = ["NUMBERS", "caption", "figure"]
-
 _PROFILES: tuple[Profile, ...] = ("I", "II", "III", "IV")
 _SWEEPS: Mapping[Profile, Direction] = {"I": "forward", "II": "both", "III": "both", "IV": "both"}
 _OBSERVED = (0.3, 0.4, 0.5, 0.6)

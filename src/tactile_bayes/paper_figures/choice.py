@@ -25,8 +25,6 @@ from tactile_bayes.sweep import Carried, Rotation, Scan, scan
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Choice", "Direction", "Limits", "Profile", "choice_of"]
-
 Profile = Literal["I", "II", "III", "IV"]
 Direction = Literal["both", "forward", "backward"]
 Limits = tuple[tuple[float, float], tuple[float, float]]

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_contact_kinds"]
-
 _WAY = {"tip": 0.6, "tangential": 0.45}  # position of the state shown between the first and the last of a phase
 _LIMITS: Limits = (-0.36, 1.02), (-0.24, 0.98)  # limits of both panels in x and y for rotations [L]
 # Limits from the base where it is carried, in x those of a forward contact [L].

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.sweep import Scan
 
-__all__ = ["draw_deformed_rods"]
-
 _LEGEND = (
     [*PHASES.values(), "contour", "pivot", "base path", "base at start"],
     ["first contact", "phase change", "snap-off", *ENDINGS.values()],

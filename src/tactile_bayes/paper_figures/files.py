@@ -18,8 +18,6 @@ from tactile_bayes.tasks import write_atomically
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_all"]
-
 _FORMATS = ("pdf", "svg", "png")
 
 

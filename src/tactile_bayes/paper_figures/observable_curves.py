@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.sweep import Scan, SweepEvents
 
-__all__ = ["draw_observable_curves"]
-
 _LINES = {"forward": "-", "backward": (0, (3.0, 1.2))}
 _WIDTHS = {"tip": 0.8, "tangential": 1.7}
 _BETWEEN = 48  # number of points of a line between two events, beside those of the drive's steps

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.sweep import Scan
 
-__all__ = ["draw_reconstructed_points"]
-
 _COLOURS = {"forward": BASES[3], "backward": BASES[2]}
 _X = (-0.92, 0.92)
 _Y = (-0.06, 1.0)  # limits of every panel of rotations [L]: no rod reaches farther

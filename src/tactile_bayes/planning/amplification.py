@@ -25,8 +25,6 @@ from tactile_bayes.record.frame import to_fixed_axes
 from tactile_bayes.rig.stated import cell_with
 from tactile_bayes.sweep import Rotation
 
-__all__ = ["METHODS", "SOURCES", "Method", "amplification"]
-
 Method = Literal["raw", "constrained"]
 METHODS: tuple[Method, ...] = ("raw", "constrained")
 SOURCES = (*CHANNELS, "drive_angle")

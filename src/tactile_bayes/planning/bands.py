@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from tactile_bayes.checks import check_probability, check_whole_number
 from tactile_bayes.inference.family import Family
 
-__all__ = ["Bands"]
-
 
 @dataclass(frozen=True)
 class Bands:

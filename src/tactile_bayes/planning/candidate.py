@@ -25,8 +25,6 @@ from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Carried, Drive, Rotation
 from tactile_bayes.uncertainty.quantiles import central_levels
 
-__all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
-
 # Degrees of freedom of the t distribution from which nested draws come, and its scale over that of Laplace's
 # approximation.
 _FREEDOM, _WIDENING = 8.0, 1.2

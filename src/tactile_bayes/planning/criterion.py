@@ -7,8 +7,6 @@ from typing import Literal
 
 from tactile_bayes.checks import check_choice, check_numbers, check_probability, refused
 
-__all__ = ["Criterion", "CriterionName", "criterion_of"]
-
 CriterionName = Literal["band", "gap", "information"]
 
 

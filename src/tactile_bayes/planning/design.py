@@ -34,8 +34,6 @@ from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive, Rotation, drives_of, recorded_drives
 from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 
-__all__ = ["design", "usual_drives"]
-
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy")
 
 _GRID_POINTS = 25  # number of grid points of x over the span

@@ -25,8 +25,6 @@ from tactile_bayes.planning.record_information import prior_precision, record_in
 from tactile_bayes.sweep import Rotation
 from tactile_bayes.uncertainty.band import contour_band
 
-__all__ = ["CellOutcome", "MapCell", "MapTask", "error_cell"]
-
 # Settings of posteriors, which only need to yield a band.
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=1000)
 _FEWEST_WALKERS = 24

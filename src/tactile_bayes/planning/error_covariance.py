@@ -12,8 +12,6 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 
-__all__ = ["Whitening", "whitening"]
-
 
 class Whitening(NamedTuple):
     """Linear map of readings to independent ones of unit variance."""

@@ -37,8 +37,6 @@ from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Rotation
 from tactile_bayes.tasks import Kind, Workers, keep_outcomes, open_results_store
 
-__all__ = ["CELLS", "error_map"]
-
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee")
 
 _OF_METHODS = ("rms_along", "rms_across", "first_order_along", "first_order_across", "median_error")

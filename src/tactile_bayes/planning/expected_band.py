@@ -14,8 +14,6 @@ from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.record_information import STEP
 from tactile_bayes.sweep import Scan
 
-__all__ = ["Stretch", "band_factor", "deviation_of_heights", "height_slopes", "mean_of_known", "stretches"]
-
 _GRID_POINTS = 25  # number of grid points in every stretch
 
 

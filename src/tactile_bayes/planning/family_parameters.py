@@ -8,8 +8,6 @@ from tactile_bayes.contours import Contour, Joined
 from tactile_bayes.contours.families import FLANKS, family_named, sides_of
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["enlarged", "family_parameters"]
-
 
 def family_parameters(contour: Contour) -> tuple[str, dict[str, float]]:
     """Return the name of a contour's family, as in `infer_contour`, and its parameters."""

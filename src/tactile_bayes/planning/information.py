@@ -12,8 +12,6 @@ from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, record_information
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["information"]
-
 
 def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
     """Return bounds on the standard deviation of every parameter, and the contributions of channels and samples.

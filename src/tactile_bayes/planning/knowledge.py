@@ -25,8 +25,6 @@ from tactile_bayes.rig.unknown import DEFAULT, NOTHING, Unknown
 from tactile_bayes.sweep import Drive, Rotation, blind_angles, record_template, recorded_drives
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["COARSE", "STEP", "Base", "Knowledge", "known_from_posterior", "known_from_prior", "unmeasured"]
-
 Base = tuple[float, float]
 
 STEP = float(np.radians(2.0))  # step of the drive if a rotation has no grid of its own [rad]

@@ -19,8 +19,6 @@ from tactile_bayes.planning.plan import Plan
 from tactile_bayes.reconstruction import turned_sweeps
 from tactile_bayes.record import carried_sweeps, travels_of
 
-__all__ = ["noise_shares"]
-
 _STATES = 15  # default number of states in each sweep
 _ERRORS = ("along", "across")
 

@@ -32,8 +32,6 @@ from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.rig.stated import stated_values
 from tactile_bayes.sweep import Drive, Rotation, Scan, drives_of, scan
 
-__all__ = ["Plan"]
-
 
 @dataclass(frozen=True, eq=False)
 class Plan:

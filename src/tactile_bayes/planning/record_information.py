@@ -16,17 +16,6 @@ from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.record import CHANNELS
 
-__all__ = [
-    "COARSE_STEP",
-    "STEP",
-    "ReadingSlopes",
-    "RecordInformation",
-    "prior_precision",
-    "reading_slopes",
-    "record_information",
-    "scaled_cell",
-]
-
 # Steps of finite differences, over the scale of each parameter: of exact loads, and of interpolated ones.
 STEP, COARSE_STEP = 1e-5, 1e-3
 

@@ -30,8 +30,6 @@ from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, record_information
 from tactile_bayes.tasks import TaskProgress
 
-__all__ = ["Where", "required_noise", "required_rod"]
-
 Where = Literal["gap", "touched", "everywhere"]
 
 _LEAST_TOUCHED = 0.5  # least share of the grid points of the plan's own rod that another rod must touch

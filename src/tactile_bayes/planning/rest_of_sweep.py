@@ -16,8 +16,6 @@ from tactile_bayes.planning.record_information import COARSE_STEP, reading_slope
 from tactile_bayes.record import carried_sweeps
 from tactile_bayes.sweep import Direction, Rotation, record_template
 
-__all__ = ["rest_of_sweep"]
-
 
 def rest_of_sweep(
     posterior: xr.DataTree,

@@ -26,8 +26,6 @@ from tactile_bayes.planning.sensitivity_summary import sensitivity_summary
 from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.sweep import Drive
 
-__all__ = ["PARTS", "sensitivity"]
-
 PARTS = ("amplification", "information", "noise_shares", "required_noise")
 
 _WIDTHS = (0.0005, 0.001, 0.0025, 0.005, 0.01)  # default widths of bands [rod lengths]

@@ -10,8 +10,6 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.planning.plan import Plan
 
-__all__ = ["sensitivity_summary"]
-
 _NAMES = {"holding_moment": "the moment", "force_x": "force_x", "force_y": "force_y", "drive_angle": "the drive angle"}
 
 

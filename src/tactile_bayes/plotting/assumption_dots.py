@@ -15,8 +15,6 @@ from tactile_bayes.plotting.marks import PALETTE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["assumptions"]
-
 # Label, marker, and distance from the middle of the row.
 _REGIONS = {"in_gap": ("in the gap", "o", -0.12), "beside": ("beside it", "s", 0.12)}
 _TICKS = (0.0, 0.25, 0.5, 0.75, 1.0, 2.0, 5.0, *(10.0**k for k in range(1, 9)))

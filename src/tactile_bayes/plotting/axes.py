@@ -18,19 +18,6 @@ from tactile_bayes.plotting.marks import PALETTE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "AxesArray",
-    "check_dataset",
-    "check_drawing",
-    "check_panels",
-    "checked_samples",
-    "new_panels",
-    "single_axes",
-    "tile_edges",
-    "write_instead",
-    "write_not_measured",
-]
-
 _MOST_SAMPLES = 10**9
 
 AxesArray = NDArray[np.object_]

@@ -17,8 +17,6 @@ from tactile_bayes.plotting.marks import PALETTE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["calibration_ranks", "coverage"]
-
 _MOST_COLUMNS = 4
 _BAND = 0.95
 _ROOM = 1.55  # limits of the panels over the largest value drawn, with room for text above and below

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.contours.base import Contour
 
-__all__ = ["contact_ellipses", "contact_regions", "ellipse_of", "radius_of"]
-
 _DRAWN = 12
 _MIDDLE: dict[str, Any] = {"marker": "+", "markersize": 5.0, "zorder": 3}
 

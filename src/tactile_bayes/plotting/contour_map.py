@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.contours.base import Contour
 
-__all__ = ["band_detail", "contour", "gap"]
-
 _MARGIN = 0.12  # margin beside the gap, as a share of its width
 _ROOM = 0.12  # margin above and below the curves, as a share of their height
 _ENDS: dict[str, Any] = {

@@ -18,8 +18,6 @@ from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["design"]
-
 _HEIGHTS_OF_A_MAP = 3  # smallest number of rows and columns of pivots that is drawn as a map, not as lines
 _ROW_WIDTH = 44  # largest number of characters in a line of a candidate's words
 _HIGHEST, _ROOM = 7.0, 0.1  # largest height of a map's figure, and the margin in it [inches]

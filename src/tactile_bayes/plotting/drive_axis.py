@@ -15,8 +15,6 @@ from tactile_bayes.record import carried_sweeps, travels_of
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
-__all__ = ["DriveAxis", "drive_axis"]
-
 # Widths [degrees] between which an axis of angles has ticks at multiples of 15° or 30°.
 _SHORTEST, _LONGEST = 60.0, 400.0
 

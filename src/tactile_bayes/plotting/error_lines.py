@@ -18,8 +18,6 @@ from tactile_bayes.plotting.planning_groups import check_among, set_log_scale
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["error_map"]
-
 Quantity = Literal["across", "along", "touched", "gap"]
 
 _MARKS: list[dict[str, Any]] = [{"marker": mark, "markersize": 5.0} for mark in "osD^vP*X<>"]

@@ -16,8 +16,6 @@ from tactile_bayes.plotting.marks import PALETTE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["families"]
-
 # Marker, distance from the bar's middle, and label.
 _WIDTHS = {0.5: ("v", -0.26, "priors half as wide"), 2.0: ("^", 0.26, "priors twice as wide")}
 _LITTLE = 4.0  # difference of elpd below which it is inconclusive

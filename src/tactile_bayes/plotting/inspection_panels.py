@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from tactile_bayes.arrays import Index
     from tactile_bayes.diagnostics.inspection import Inspection
 
-__all__ = ["inspection"]
-
 _COLOURS = {"forward": "#0072B2", "backward": "#D55E00"}
 _WRONG: dict[str, tuple[str, dict[str, Any]]] = {
     "outlier": ("stands out", {"marker": "o", "markersize": 9.0, "color": "#CC79A7"}),

@@ -13,8 +13,6 @@ from tactile_bayes.record import COLUMNS
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
-__all__ = ["DRIVE_ANGLE", "LABELS", "number", "percent", "set_unit", "show_numbers", "shown_unit"]
-
 LABELS = {
     "drive_angle": r"drive angle $\varphi_0$",
     "holding_moment": "holding moment $m_0$",

@@ -9,8 +9,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["legend", "legend_above", "legend_entries", "legend_entry", "legend_in_rows"]
-
 
 def legend_entry(ax: Axes, label: str, **style: Any) -> None:
     """Add a legend entry for a style that many lines share."""

@@ -18,20 +18,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.contours.base import Contour
 
-__all__ = [
-    "draw_gap",
-    "draw_object",
-    "draw_path",
-    "draw_pivot",
-    "finish_map",
-    "fit_height",
-    "label_map",
-    "limits_of",
-    "outline",
-    "set_below",
-    "write_on_top",
-]
-
 
 def limits_of(ax: Axes) -> Floats:
     """Return the limits of a map in x and y, shape (4,), after setting equal scales."""

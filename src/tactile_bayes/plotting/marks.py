@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["BASES", "BEST", "CONTACT_MARKERS", "PALETTE", "PHASES", "SWEEP_LINES", "SWEEP_MARKERS", "TRUTH"]
-
 # Colours after Okabe and Ito, distinguishable with any colour vision.
 PALETTE: Mapping[str, str] = {
     "tip": "#0072B2",

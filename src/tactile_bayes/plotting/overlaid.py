@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.uncertainty.overlay import Overlay
 
-__all__ = ["overlaid"]
-
 
 def overlaid(
     bands: Mapping[str, xr.Dataset],

@@ -15,8 +15,6 @@ from tactile_bayes.plotting.labels import show_numbers, shown_unit
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
-__all__ = ["check_among", "group_of", "set_log_scale"]
-
 # Ticks in a decade of a logarithmic axis, by the largest number of decades.
 _TICKS = {0.9: (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0), 2.2: (1.0, 2.0, 5.0), np.inf: (1.0,)}
 

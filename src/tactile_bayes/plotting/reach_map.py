@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.contours.base import Contour
 
-__all__ = ["posterior_contours", "prior_contours"]
-
 _ROOM = 0.06  # margin of the map beside the rod's reach [rod lengths]
 _BELOW = 0.2  # smallest extent of the map below the pivot [rod lengths]
 _DRAWS = 400  # number of draws for the posterior's median

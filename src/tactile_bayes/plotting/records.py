@@ -22,8 +22,6 @@ from tactile_bayes.sweep import SweepEvents
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["observables", "predictive"]
-
 # Colours of residuals of two overlapping sweeps, after Okabe and Ito.
 _SWEEPS = {"forward": "#0072B2", "backward": "#B34700"}
 _ENDS = ("lower", "upper")

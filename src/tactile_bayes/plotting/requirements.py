@@ -18,8 +18,6 @@ from tactile_bayes.plotting.planning_groups import group_of, set_log_scale
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["required_noise", "required_rod"]
-
 _WHERE = {"everywhere": "", "touched": " where it is touched", "gap": " in the gap"}
 
 _REFUSED: dict[str, dict[str, Any]] = {

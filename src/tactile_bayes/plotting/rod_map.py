@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.sweep import Event
 
-__all__ = ["rods"]
-
 
 def rods(
     scan: Scan,

@@ -13,8 +13,6 @@ from tactile_bayes.checks import check_choice
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLUMN_WIDTH", "PAGE_WIDTH", "STYLES", "Style", "own_style", "save_figure", "style"]
-
 Style = Literal["print", "screen"]
 
 COLUMN_WIDTH = 3.5  # width of a figure that fills one column of a journal [inches]

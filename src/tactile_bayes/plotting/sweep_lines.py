@@ -17,8 +17,6 @@ from tactile_bayes.sweep import Event, SweepEvents
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ENDINGS", "EVENT_MARKERS", "draw_events", "finish_channels", "phase_runs", "reading_style", "with_events"]
-
 Phases = NDArray[np.object_]
 
 EVENT_MARKERS: Mapping[str, Mapping[str, Any]] = {

@@ -19,8 +19,6 @@ from tactile_bayes.plotting.planning_groups import check_among, group_of, set_lo
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["METHOD_COLOURS", "READING_COLOURS", "amplification", "information", "noise_shares"]
-
 READING_COLOURS: Mapping[str, str] = {
     "holding_moment": BASES[0],
     "force_x": BASES[1],

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from tactile_bayes.contours.base import Contour
 
-__all__ = ["tightening"]
-
 _DETAILS = "abc"
 _ON_MAP = 18
 _ALONG, _ACROSS = "#009E73", "#CC79A7"

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from tactile_bayes.contours.base import Contour
     from tactile_bayes.sweep import SweepEvents
 
-__all__ = ["touched"]
-
 # Distance [L] below which contacts coincide: at a fold, rounding leaves a contact half of its digits.
 _SAME_PLACE = 1e-7
 # Line styles: the first for as many bases as there are colours, the next for as many further bases, and so on.

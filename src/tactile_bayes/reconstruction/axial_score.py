@@ -18,8 +18,6 @@ from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.reconstruction.constrained import principal_steps
 from tactile_bayes.reconstruction.samples import Samples
 
-__all__ = ["AXIAL_ALARM", "axial_score"]
-
 AXIAL_ALARM = 6.0  # size of the axial score above which the force along the rod is reported to disagree with the moment
 
 

@@ -28,8 +28,6 @@ from tactile_bayes.reconstruction.estimate import (
 )
 from tactile_bayes.reconstruction.samples import Samples
 
-__all__ = ["are_weighed", "constrained_estimate", "principal_steps"]
-
 _CLEARANCE = 2.0  # standard deviations from the edge between the phases below which the phase of a contact is uncertain
 _MISFIT = 25.0  # sum of squares of one degree of freedom that noise exceeds in less than one of a million samples
 

@@ -9,27 +9,6 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats
 
-__all__ = [
-    "AMBIGUOUS",
-    "AT_EDGE",
-    "BEYOND_TIP",
-    "CUT_OFF",
-    "EITHER_PHASE",
-    "MOST_BEND",
-    "NONLINEAR",
-    "NO_CONTACT",
-    "NO_FIT",
-    "NO_ZERO",
-    "OK",
-    "RIVAL",
-    "STATUSES",
-    "Estimate",
-    "bends_too_much",
-    "is_weak",
-    "spread_across",
-    "unanswered",
-]
-
 NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE, EITHER_PHASE, NO_FIT, AMBIGUOUS = range(10)
 
 # Statuses of a sample, by code.

@@ -14,8 +14,6 @@ from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.reconstruction.sides import contact_sides
 from tactile_bayes.record import carried_sweeps
 
-__all__ = ["drive_histories", "least_turn", "turned_sweeps"]
-
 _LEAST = 1e-6  # change of the drive angle that is rounding of the record [rad]
 _SCATTER = 10.0  # change of the drive angle, over the noise of its readings, that noise does not make
 

@@ -21,8 +21,6 @@ from tactile_bayes.reconstruction.estimate import (
 )
 from tactile_bayes.reconstruction.samples import Samples
 
-__all__ = ["raw_estimate"]
-
 _ROUNDING = 1e-9
 
 # Distance from which two points are different contacts, in standard deviations, or in L without noise.

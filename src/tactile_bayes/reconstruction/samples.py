@@ -18,8 +18,6 @@ from tactile_bayes.reconstruction.sides import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, turned
 from tactile_bayes.record.frame import to_fixed_axes
 
-__all__ = ["FALSE_ALARM", "Samples", "loaded_samples", "samples_of"]
-
 FALSE_ALARM = 1e-3  # share of unloaded samples that count as loaded because of noise
 _MIRROR = np.array([-1.0, -1.0, 1.0])  # signs of the loads of a backward contact that is mirrored to a forward one
 

@@ -16,8 +16,6 @@ from tactile_bayes.reconstruction.samples import Samples
 from tactile_bayes.record import carried_sweeps
 from tactile_bayes.record.sweep_segments import turning_points
 
-__all__ = ["fits_better", "of_any_sense", "slopes_by_friction", "with_likelier_senses"]
-
 _NO_CONTACT = 25.0  # bound on the misfit of a loaded sample; the value for a sample without a contact
 _OFF = 4.0  # misfit from which a sample does not slide in the sense that is taken
 _TWENTY_TO_ONE = 6.0  # difference of misfits at which one of two sides is twenty times as likely

@@ -17,16 +17,6 @@ from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import CHANNELS, present_channels, rod_of, rows_of_sweeps
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = [
-    "CONTACT_SIDES",
-    "OTHER_SIDE",
-    "contact_sides",
-    "doubtful_sweeps",
-    "side_of",
-    "sides_and_doubts",
-    "with_sides",
-]
-
 # Attribute of a record: a JSON object that maps a sweep to the direction in which a sweep touches the same side.
 CONTACT_SIDES = "contact_sides"
 OTHER_SIDE = {"forward": "backward", "backward": "forward"}

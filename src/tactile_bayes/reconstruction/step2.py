@@ -28,8 +28,6 @@ from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["contacts_of", "reconstruct"]
-
 _METHODS = ("raw", "constrained")
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 _PHYSICAL = ("m", "N", "N m", "1/m")  # units of what is dimensionless in a dimensionless record

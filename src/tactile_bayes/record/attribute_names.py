@@ -11,8 +11,6 @@ from tactile_bayes.record.quantity import unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, LOAD_CELL_UNITS, UNITS
 from tactile_bayes.record.spelling import is_misspelling, nearest, plain
 
-__all__ = ["USED", "misspelt", "no_entry", "stray_attribute", "unused"]
-
 _QUANTITY = re.compile(
     r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?\s*"
     r"(?:(?P<brackets>\[[^\[\]]*\])|(?P<unit>[^\W\d].*|°))?"

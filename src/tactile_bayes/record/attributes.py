@@ -31,17 +31,6 @@ _SHAPE = (
 _POINTS, _SAME = 101, 1e-9
 _SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_lever_", "_curve_", "_offset", "_backlash")
 
-__all__ = [
-    "checked_attributes",
-    "completed_attributes",
-    "rod_attributes",
-    "rod_shape_attributes",
-    "same_rod",
-    "stated_frame",
-    "stated_rod",
-    "without_rod",
-]
-
 
 def rod_attributes(rod: Rod) -> dict[str, Any]:
     """Convert a rod to attributes of a record, with `rod_shape_attributes`; `stated_rod` is the inverse."""

@@ -17,8 +17,6 @@ from tactile_bayes.record.quantity import converted, unit_of
 from tactile_bayes.record.schema import CHANNELS, MEASURED
 from tactile_bayes.record.table import Cells, Source, Table
 
-__all__ = ["is_bag", "read_bag_table"]
-
 _BAGS = (".mcap", ".bag", ".db3")  # suffixes of bags
 # Columns that are interpolated in time: a drive moves smoothly, and its encoder hardly scatters.
 _SMOOTH = ("drive_angle", "base_x", "base_y")

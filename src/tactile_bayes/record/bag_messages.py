@@ -16,8 +16,6 @@ from tactile_bayes.record.table import Source
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
-__all__ = ["Field", "Topic", "example", "messages_of", "opened_bag"]
-
 _LONGEST = 64  # largest number of elements of an array that are columns
 
 

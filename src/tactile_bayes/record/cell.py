@@ -8,8 +8,6 @@ from typing import Any
 
 from tactile_bayes.record.spelling import plain_number
 
-__all__ = ["integer_in", "is_integer_text", "number_in"]
-
 
 def number_in(cell: Any) -> float | None:
     """Parse the number in a cell: NaN for an empty cell, None for other content."""

@@ -18,8 +18,6 @@ from tactile_bayes.record.schema import Frame
 from tactile_bayes.record.table import Cells, Source, Table
 from tactile_bayes.record.validation import checked_record
 
-__all__ = ["completed_record", "table_of_columns"]
-
 _FRAME = "the DataFrame"  # name of a table of pandas in messages
 
 

@@ -13,8 +13,6 @@ from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.csv_header import Header, cells_in
 
-__all__ = ["without_cut_row"]
-
 _TAIL = 1 << 16  # bytes of the end of a file in which rows are compared with the last one
 # Largest number of rows that are compared; smallest numbers for a comparison of values, and of notations.
 _COMPARED, _FEWEST, _ENOUGH = 50, 3, 10

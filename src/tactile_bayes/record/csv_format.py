@@ -34,8 +34,6 @@ from tactile_bayes.record.schema import MEASURED, Kind
 from tactile_bayes.record.table import Source, Table
 from tactile_bayes.tasks import write_atomically
 
-__all__ = ["read_csv", "read_csv_content", "write_csv"]
-
 _ROWS = 20_000  # number of samples that are written at once
 _BRACKETS = re.compile(r"\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)")
 

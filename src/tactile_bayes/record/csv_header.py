@@ -20,18 +20,6 @@ from tactile_bayes.record.spelling import visible
 from tactile_bayes.record.table import Source
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = [
-    "FORMAT",
-    "KINDS",
-    "Header",
-    "cells_in",
-    "column_described",
-    "column_line",
-    "header_line",
-    "lines_below",
-    "read_header",
-]
-
 FORMAT = 1
 KINDS = {"i": "integer", "f": "number", "U": "text", "O": "text"}
 _DELIMITERS = ",;\t"

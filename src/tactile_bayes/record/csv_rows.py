@@ -21,8 +21,6 @@ from tactile_bayes.record.spelling import look_alikes, plain_number
 from tactile_bayes.record.storable import LONGEST_CELL
 from tactile_bayes.record.table import Source
 
-__all__ = ["Layout", "read_rows"]
-
 # Bytes that are read at once: first a small chunk, from which the kinds of columns are inferred.
 _FIRST, _CHUNK = 1 << 16, 1 << 21
 # Last cell of each line for the fast reader, which shows whether cells are in the right columns.

@@ -11,8 +11,6 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["curves_in"]
-
 _CURVES = "LINE LWPOLYLINE POLYLINE ARC CIRCLE ELLIPSE SPLINE"
 
 # Size of a unit of the drawing, by its number in $INSUNITS; 0 is none.

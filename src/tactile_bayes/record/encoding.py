@@ -9,8 +9,6 @@ from typing import BinaryIO
 
 from tactile_bayes.record.table import Source
 
-__all__ = ["CUT_BY_NUL", "WITH_NUL", "in_utf8", "not_utf8", "refuse_other_kinds"]
-
 CUT_BY_NUL = (
     "from here on there are NUL characters (0x00) alone, as a power failure leaves them: remove them, and the row that "
     "they cut short"

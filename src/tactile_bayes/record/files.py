@@ -17,8 +17,6 @@ from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
 from tactile_bayes.record.table import Table
 from tactile_bayes.record.validation import validate
 
-__all__ = ["read_table", "refuse_no_file", "write_record"]
-
 _READERS = {".csv": read_csv, ".nc": read_netcdf_table}
 _WRITERS = {".csv": write_csv, ".nc": write_netcdf_record}
 

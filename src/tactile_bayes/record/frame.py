@@ -16,8 +16,6 @@ from tactile_bayes.record.schema import ATTRIBUTE_UNITS, CHANNELS, FRAMES, LOAD_
 from tactile_bayes.record.table import Source
 from tactile_bayes.record.validation import validate
 
-__all__ = ["frame_of", "in_frame", "to_fixed_axes", "turned"]
-
 # Entries of a load cell's data sheet that are valid only along its own axes; with errors of the encoder the angle
 # between the frames is not known.
 _BOUND = {name for name in LOAD_CELL_UNITS if "force" in name or name.startswith("drive_angle")} - {"force_noise"} | {

@@ -13,8 +13,6 @@ from tactile_bayes.record.schema import COLUMNS, MEASURED
 from tactile_bayes.record.units import rod_of
 from tactile_bayes.record.validation import validate
 
-__all__ = ["record_hash"]
-
 
 def record_hash(record: xr.Dataset) -> str:
     """SHA-256 of the measured values: names, values and units of the columns of `MEASURED`, their frame, and the rod.

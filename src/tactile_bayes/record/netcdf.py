@@ -20,8 +20,6 @@ from tactile_bayes.record.netcdf_process import content_elsewhere
 from tactile_bayes.record.table import Source, Table, table_of
 from tactile_bayes.tasks import write_atomically
 
-__all__ = ["read_netcdf", "read_netcdf_table", "reading", "write_netcdf", "write_netcdf_record"]
-
 Content = TypeVar("Content", xr.Dataset, xr.DataTree)
 
 _SEAL = b"\ntactile_bayes: SHA-256 of all bytes before this line "

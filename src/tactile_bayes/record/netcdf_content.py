@@ -20,18 +20,6 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "Group",
-    "UnsafeError",
-    "content_of",
-    "largest_content",
-    "received",
-    "refuse_unsafe",
-    "refuse_unsafe_variable",
-    "send",
-    "time_limit",
-]
-
 _DEPTH, _OBJECTS = 32, 10_000  # largest depth of groups, and number of groups and variables
 _LARGEST, _RATIO = 1 << 28, 8  # content [bytes] that any file may have, and that of a larger one in its own sizes
 _FILTERS = (1, 2, 3, 4, 5, 6, 32000)  # filters that come with HDF5 and h5py; others are in plugins, which are programs

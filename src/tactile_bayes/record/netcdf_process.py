@@ -11,8 +11,6 @@ from signal import Signals
 from tactile_bayes.record import netcdf_content
 from tactile_bayes.record.netcdf_content import Group, UnsafeError, is_cut_short, received, time_limit
 
-__all__ = ["content_elsewhere"]
-
 
 def content_elsewhere(content: bytes, with_groups: bool) -> dict[str, Group]:
     """Return what `content_of` returns, or raise what it raises, from a process with limits of time and memory.

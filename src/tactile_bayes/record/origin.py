@@ -21,19 +21,6 @@ from tactile_bayes.record.spelling import look_alikes, nearest, plain
 from tactile_bayes.record.storable import storable
 from tactile_bayes.record.table import Cells, Source, Table
 
-__all__ = [
-    "ORIGIN",
-    "Origin",
-    "any_meant",
-    "column_entry",
-    "found_column",
-    "meant_kinds",
-    "origins_of",
-    "renamed",
-    "stem_and_unit",
-    "with_origin",
-]
-
 # Name of the origin of a column as text: an attribute of tables and results, and an encoding of a record, which is not
 # written with it.
 ORIGIN = "origin_in_file"

@@ -13,8 +13,6 @@ from tactile_bayes.record.schema import Kind, column_of
 from tactile_bayes.record.storable import LONGEST_CELL, not_storable
 from tactile_bayes.record.table import Source
 
-__all__ = ["FREE", "parsed_column", "text_array"]
-
 FREE = 1 << 26  # bytes that a column of text may always take
 
 

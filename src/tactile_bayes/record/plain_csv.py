@@ -12,8 +12,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.cell import number_in
 
-__all__ = ["columns_in"]
-
 
 def columns_in(path: Path, names: Sequence[str], what: str) -> list[Floats]:
     """Return columns of numbers of a CSV file, a line for each of what they are, or refuse it."""

@@ -19,8 +19,6 @@ from tactile_bayes.record.encoding import not_utf8
 from tactile_bayes.record.origin import stem_and_unit
 from tactile_bayes.record.quantity import accepted_units, unit_of
 
-__all__ = ["Points", "read_points"]
-
 _CALLED = {"m": "a unit of length", "1": "rod lengths"}
 
 

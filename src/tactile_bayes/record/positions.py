@@ -6,8 +6,6 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["end_of_rest", "means_of_positions", "positions_of"]
-
 _APART = 1.5  # least ratio of the smallest step between positions to the largest difference of readings at one position
 _FEWEST_STEPS = 3
 

@@ -14,8 +14,6 @@ import numpy as np
 
 from tactile_bayes.record.spelling import plain
 
-__all__ = ["OTHER_UNITS", "Unit", "accepted_units", "converted", "unit_of", "units_disagree"]
-
 Dimension = tuple[int, int, int, int]  # powers of length, force, time and angle
 _PREFIXES = {
     "": Fraction(1),

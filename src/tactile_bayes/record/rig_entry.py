@@ -7,8 +7,6 @@ from typing import Any
 
 from tactile_bayes.tasks.documents import toml_key, toml_value
 
-__all__ = ["file_entry", "rig_entries", "rig_entry"]
-
 
 def rig_entry(name: str, value: Any, table: str = "file") -> str:
     """Return an entry of rig.toml, with its place."""

@@ -16,27 +16,6 @@ import xarray as xr
 
 from tactile_bayes.record.spelling import plain
 
-__all__ = [
-    "ATTRIBUTE_UNITS",
-    "CHANNELS",
-    "COLUMNS",
-    "DIRECTIONS",
-    "FRAMES",
-    "LARGEST_DRIVE_ANGLE",
-    "LOAD_CELL_UNITS",
-    "MEASURED",
-    "REQUIRED",
-    "UNITS",
-    "Column",
-    "Frame",
-    "Kind",
-    "Scale",
-    "column_attributes",
-    "column_of",
-    "present_channels",
-    "same_unit",
-]
-
 Frame = Literal["fixed", "turning"]
 Kind = Literal["integer", "number", "text"]
 Scale = Literal["length_unit", "moment_unit", "force_unit"]

@@ -9,8 +9,6 @@ from difflib import SequenceMatcher
 
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["is_misspelling", "look_alikes", "nearest", "plain", "plain_number", "refuse_unknown_keys", "visible"]
-
 # What characters stand for; beside them are those of full width, and digits of any script.
 _STAND_FOR = {
     **dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2015\u2212\ufe63\uff0d", "-"),

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from typing import Any
 
-__all__ = ["LONGEST_CELL", "is_storable", "is_storable_attribute", "not_storable", "storable"]
-
 LONGEST_CELL = 131_072  # largest number of characters in a cell, that of Python's CSV reader
 _LONGEST_NAME = 200  # largest number of bytes of a name; NetCDF limits it, and names derived from it, to 256
 # Attributes that NetCDF and HDF5 reserve.

@@ -17,8 +17,6 @@ from tactile_bayes.record.rig_entry import file_entry
 from tactile_bayes.record.schema import DIRECTIONS, LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source
 
-__all__ = ["base_of_sample", "bases_of", "carried_sweeps", "refuse_impossible_sweeps", "rows_of_sweeps", "travels_of"]
-
 
 def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
     """Refuse sweeps with several directions or two pivots, or with a drive angle in degrees or against the direction.

@@ -14,8 +14,6 @@ from tactile_bayes.record.positions import end_of_rest
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source, Table
 
-__all__ = ["split_at_turns", "turning_points"]
-
 _ROUNDING = 1e-9  # share of the motion that must be across the rod for a side of it to lead
 _WIDEST = 0.5  # largest distance of neighbouring samples of a sweep [rad]
 _MOST = 0.5  # share of the steps beyond which a base that moves is carried, and not one of several pivots

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Index
 from tactile_bayes.errors import RecordError
 
-__all__ = ["Cells", "Source", "Table", "table_of"]
-
 Cells = tuple[NDArray[Any], Mapping[str, Any]]  # values of a column, shape (n_samples,), and its attributes
 _LONGEST = 1500  # largest number of characters of a message
 

@@ -21,8 +21,6 @@ from tactile_bayes.record.schema import COLUMNS, LOAD_CELL_UNITS, MEASURED, UNIT
 from tactile_bayes.record.table import Cells, Source, Table
 from tactile_bayes.record.validation import validate
 
-__all__ = ["assumed_units", "in_units_of_record", "rod_of", "to_dimensionless", "to_si", "with_rod"]
-
 
 def rod_of(record: xr.Dataset) -> Rod:
     """Return the rod of a record; for a dimensionless record `Rod()`, with a diameter in rod lengths."""

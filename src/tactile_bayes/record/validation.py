@@ -20,8 +20,6 @@ from tactile_bayes.record.storable import is_storable, is_storable_attribute, no
 from tactile_bayes.record.sweep import refuse_impossible_sweeps
 from tactile_bayes.record.table import Cells, Source, Table, table_of
 
-__all__ = ["checked_record", "validate"]
-
 
 def validate(record: xr.Dataset) -> xr.Dataset:
     """Validate and complete a record, or raise an error that says what is wrong, where, and what to do.

@@ -13,8 +13,6 @@ from tactile_bayes.report.meanings import is_direction, meaning_of
 from tactile_bayes.report.wording import Shown, Table, fixed, percent, shown_as
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["background_of"]
-
 
 def background_of(findings: Findings) -> dict[str, Table | None]:
     """Return the background tables by their names in the template."""

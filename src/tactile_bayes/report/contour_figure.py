@@ -18,8 +18,6 @@ from tactile_bayes.report.overlay import put_overlay, put_overlay_band
 from tactile_bayes.report.wording import Shown, percent, shown_as, spread
 from tactile_bayes.uncertainty.overlay import Overlay
 
-__all__ = ["ContourFigure", "ContourFindings", "contour_figure", "gap_ends"]
-
 _DETAIL_HEIGHT = 230.0
 
 _TABLED = 21

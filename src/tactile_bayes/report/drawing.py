@@ -14,8 +14,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.plotting.labels import number
 from tactile_bayes.report.wording import Shown
 
-__all__ = ["Plot", "Scale", "dots", "element", "figure", "legend"]
-
 _WIDTH = 640  # width of every drawing, in its own units, in which letters are 13 high
 _LEFT, _RIGHT, _TOP, _BOTTOM = 96, 24, 12, 46  # margins beside a plot's frame
 _TALLEST, _LOWEST = 460.0, 140.0  # largest and smallest height of a map's frame

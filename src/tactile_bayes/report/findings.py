@@ -26,8 +26,6 @@ from tactile_bayes.uncertainty.overlay import read_overlay
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
-__all__ = ["FINDING_STEPS", "Findings", "contour_posterior", "findings_of", "probability_of"]
-
 FINDING_STEPS = 4  # number of steps that `findings_of` reports: posterior, contacts, check, and all the rest
 _GROUPS = ("posterior", "sample_stats", "posterior_predictive", "events", "observed_data", "constant_data", "prior")
 _SAID = ("family", "units", "friction", "nuisances", "priors", "settings", "seed", "message", "data_sha256")

@@ -19,8 +19,6 @@ from tactile_bayes.record import rod_of, rows_of_sweeps
 from tactile_bayes.rig.rig import rod_with
 from tactile_bayes.sweep import ManyUnits, to_lab_frame
 
-__all__ = ["Motion", "motion_of"]
-
 _MOST = 900  # largest number of samples shown; of a longer record every second, or third, and so on
 _POINTS = 33
 

@@ -6,8 +6,6 @@ import re
 
 from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
-__all__ = ["FORMULAS", "is_direction", "meaning_of"]
-
 FORMULAS = {
     "parabola": "y = a (x − x_c)² + q",
     "circle": "a circle of radius r, lowest at (x_c, q)",

@@ -15,17 +15,6 @@ from tactile_bayes.report.wording import Shown, Table, percent, shown_as
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.uncertainty.overlay import Distance, Overlay, overlay_distance
 
-__all__ = [
-    "DISTANCE_HEADS",
-    "Laid",
-    "distance_cells",
-    "draw_overlay",
-    "note_of",
-    "overlay_table",
-    "put_overlay",
-    "put_overlay_band",
-]
-
 # Heads of `distance_cells`, with places for the unit.
 DISTANCE_HEADS = ["rms distance{}", "largest{}", "inside the band"]
 

@@ -20,8 +20,6 @@ from tactile_bayes.report.reproduction import command_of, hindrances, python_lin
 from tactile_bayes.report.trust import check_messages, check_table, contacts_messages, convergence, trust_tables
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as, spread
 
-__all__ = ["page_of", "parameter_cells"]
-
 _WELL = "All is well"  # beginning of the first verdict if nothing is wrong
 
 

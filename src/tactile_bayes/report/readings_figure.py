@@ -28,8 +28,6 @@ from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.frames import Motion
 from tactile_bayes.report.wording import Shown, percent, shown_as
 
-__all__ = ["ReadingsFigure", "channel_names", "readings_figure"]
-
 _WORDS = {"holding_moment": "holding moment", "force_x": "force x", "force_y": "force y"}
 _TURNING = {"force_x": "force along the rod", "force_y": "force across the rod"}
 

@@ -12,8 +12,6 @@ from tactile_bayes.distributions import UNWRITTEN
 from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["command_of", "hindrances", "python_lines"]
-
 
 def command_of(attrs: Mapping[Any, Any]) -> str:
     """Return the shell command that made the run; "" if the posterior does not state it."""

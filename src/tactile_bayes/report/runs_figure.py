@@ -15,8 +15,6 @@ from tactile_bayes.report.overlay import put_overlay
 from tactile_bayes.report.wording import shown_as
 from tactile_bayes.uncertainty.overlay import Overlay
 
-__all__ = ["RunsFigure", "runs_figure"]
-
 _COLOURS = 6  # number of colours; of more runs, each has a panel of its own
 _PARTS = ("lower", "median", "upper")
 _HEIGHT = 260.0

@@ -31,8 +31,6 @@ from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.overlay import Overlay, overlay_distance, read_overlay
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
-__all__ = ["folders_of", "runs_page_of"]
-
 _TABLE = MANY[1]
 
 

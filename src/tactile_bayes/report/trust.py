@@ -16,8 +16,6 @@ from tactile_bayes.report.readings_figure import channel_names
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["check_messages", "check_table", "contacts_messages", "convergence", "trust_tables"]
-
 
 def convergence(findings: Findings) -> list[str]:
     """Return sentences on the end of the run and on its ensembles."""

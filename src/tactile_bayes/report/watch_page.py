@@ -19,8 +19,6 @@ from tactile_bayes.report.writing import rendered
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.uncertainty.summary import gap_if_any
 
-__all__ = ["write_watch_page"]
-
 
 def write_watch_page(
     posterior: xr.DataTree,

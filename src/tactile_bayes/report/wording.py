@@ -10,8 +10,6 @@ import numpy as np
 
 from tactile_bayes.plotting.labels import number, shown_unit
 
-__all__ = ["Shown", "Table", "chance", "fixed", "percent", "sentence", "shown_as", "spread"]
-
 
 class Table(NamedTuple):
     """A table: caption, heads, rows, and the number of leading columns with text instead of numbers."""

@@ -22,8 +22,6 @@ from tactile_bayes.report.runs_page import folders_of, runs_page_of
 from tactile_bayes.runs.names import MANY, OVERLAY
 from tactile_bayes.tasks import refuse_replacing, write_atomically
 
-__all__ = ["Written", "rendered", "report_into", "write_report"]
-
 _ESCAPES = {code: f"\\u{code:04x}" for code in (ord("<"), ord(">"), ord("&"), 0x2028, 0x2029)}
 
 

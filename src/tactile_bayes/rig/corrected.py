@@ -18,8 +18,6 @@ from tactile_bayes.rig.rig import rod_with
 from tactile_bayes.rig.stated import cell_with
 from tactile_bayes.rig.unknown import pivot_shifts
 
-__all__ = ["Corrected", "corrected"]
-
 
 class Corrected(NamedTuple):
     """What Step 2 takes to correct a record for the deviations of its rig."""

@@ -19,8 +19,6 @@ from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.stated import Stated, within_bounds
 from tactile_bayes.rig.unknown import Unknown, of_modes, of_pivots
 
-__all__ = ["calibrated_at", "drawn_numbers", "refuse_undrawn", "unknown_of"]
-
 # Parameters that are not drawn, and what to do.
 _PLACES = {
     **dict.fromkeys(GROUPS["discrepancy"], "a discrepancy is a function and no number: leave it out where you draw"),

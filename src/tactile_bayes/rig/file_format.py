@@ -11,8 +11,6 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.schema import CHANNELS, COLUMNS, MEASURED, column_of
 from tactile_bayes.record.spelling import nearest
 
-__all__ = ["FileFormat"]
-
 
 @dataclass(frozen=True)
 class FileFormat:

@@ -22,8 +22,6 @@ from tactile_bayes.record.sweep import carried_sweeps
 from tactile_bayes.rig.reading import record_in
 from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["GrowingRecord", "Growth"]
-
 _FEWEST = 10  # smallest number of rows that are left out for most of a file to count as unreadable
 # Smallest and largest number of samples of a sweep from which the scatter of its encoder is estimated.
 _ENOUGH, _RECENT = 12, 50

@@ -21,8 +21,6 @@ from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.stated import cell_with
 from tactile_bayes.rig.unknown import pivot_shifts
 
-__all__ = ["measured_by"]
-
 _NOISES = ("force_noise", "moment_noise", "relative_noise")
 
 

@@ -14,18 +14,6 @@ import numpy as np
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, STEEPEST_TAPER
 
-__all__ = [
-    "BASE",
-    "GROUPS",
-    "MAY_VANISH",
-    "NEUTRAL",
-    "PARAMETERS",
-    "STANDARD",
-    "Parameter",
-    "members",
-    "parameter_named",
-]
-
 BASE = re.compile(r"base_(\d+)_([xy])")  # shift of a pivot of the record, counted from 1, along an axis
 _DEGREE = float(np.radians(1.0))
 

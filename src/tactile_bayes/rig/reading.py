@@ -23,8 +23,6 @@ from tactile_bayes.record.table import Table
 from tactile_bayes.record.units import assumed_units, in_units_of_record, with_rod
 from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["make_record", "read_record", "record_in"]
-
 
 def read_record(path: str | os.PathLike[str], rig: Rig | None = None) -> xr.Dataset:
     """Read a record from a CSV or a NetCDF file, or a bag of ROS, with columns of any name, unit, sign and zero.

@@ -27,8 +27,6 @@ from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.rig.unknown import DEFAULT, Unknown, checked_unknown, expanded
 from tactile_bayes.tasks.documents import read_toml
 
-__all__ = ["Rig", "rig_of", "rod_with"]
-
 _SHAPE = ("rest_curvature", "taper", "taper_error", "stem", "length", *GROUPS["rest_shape"])
 
 

@@ -30,23 +30,6 @@ from tactile_bayes.rig.unknown import NOTHING
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.tasks.documents import read_toml, toml_key, toml_value
 
-__all__ = [
-    "ROD_UNITS",
-    "TABLES",
-    "calibration_of",
-    "entries_of_cell",
-    "file_of",
-    "keys_of",
-    "named_in_errors",
-    "number_in",
-    "read_tables",
-    "stated_in",
-    "tables_of",
-    "text_of",
-    "unit_of_unknown",
-    "write_file",
-]
-
 ROD_UNITS = {
     "length": "m",
     "flexural_rigidity": "N m²",

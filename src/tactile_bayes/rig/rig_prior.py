@@ -14,8 +14,6 @@ from scipy import stats
 from tactile_bayes.arrays import Floats
 from tactile_bayes.distributions import Distribution, in_words, numbers_of
 
-__all__ = ["RigPrior"]
-
 _FARTHEST = 30.0  # largest normal score, beyond which densities vanish anyway
 
 

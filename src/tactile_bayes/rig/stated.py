@@ -16,8 +16,6 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, NEUTRAL, parameter_named
 
-__all__ = ["Stated", "cell_with", "stated_values", "unit_of", "within_bounds"]
-
 _LOUDEST = 10.0  # largest noise in the default prior of an unknown one [EI/L, EI/L²]
 
 

@@ -17,8 +17,6 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.rig.parameters import BASE, GROUPS, MAY_VANISH, PARAMETERS, STANDARD, members, parameter_named
 
-__all__ = ["DEFAULT", "NOTHING", "Unknown", "checked_unknown", "expanded", "of_modes", "of_pivots", "pivot_shifts"]
-
 # What is said of a parameter: a number if it is known, a distribution, or "default" for its default distribution.
 Unknown = float | Distribution | Literal["default"]
 DEFAULT: Literal["default"] = "default"

@@ -14,8 +14,6 @@ from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.names import CALIBRATION
 
-__all__ = ["calibrate_into"]
-
 
 def calibrate_into(out: str | os.PathLike[str], **options: Any) -> Run[xr.Dataset]:
     """Calibrate, and write the result to a folder."""

@@ -19,8 +19,6 @@ from tactile_bayes.rig.rig import Rig, rig_of
 from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.names import COMPARISON
 
-__all__ = ["compare_into", "write_comparison"]
-
 _WIDTHS = {0.5: "probability_half_width", 2.0: "probability_twice_width"}
 
 

@@ -39,8 +39,6 @@ from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
-__all__ = ["ContourRun", "RunFolder", "analyse", "complete", "file_of", "origin_of"]
-
 _POSTERIOR = "posterior.nc"
 
 _MOST_PARAMETERS = 5  # largest number of parameters in a figure, unless a contour has more

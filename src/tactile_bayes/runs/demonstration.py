@@ -19,8 +19,6 @@ from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR
 from tactile_bayes.sweep import scan
 from tactile_bayes.tasks import replace_together
 
-__all__ = ["CONTOUR", "LOAD_CELL", "RIG", "ROD", "TRUTH", "measure_demo"]
-
 # Music wire, 200 mm long, 0.7 mm thick: EI = 2.43e-3 N m².
 ROD = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
 CONTOUR = Parabola(a=2.5, q=0.1)  # profile II of the paper at q = 0.5, for a rod of 200 mm [m]

@@ -15,8 +15,6 @@ from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.names import DESIGN
 from tactile_bayes.runs.outermost import outermost
 
-__all__ = ["design_into", "design_messages"]
-
 
 def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, **options: Any) -> Run[xr.Dataset]:
     """Choose the next record, and write the result to a folder."""

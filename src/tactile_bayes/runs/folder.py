@@ -18,8 +18,6 @@ from tactile_bayes.plotting.style import own_style, save_figure
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.tasks import errors_of, replace_together
 
-__all__ = ["Folder", "Run", "panels", "posterior_in"]
-
 Result = TypeVar("Result")
 
 # Other contents of a folder, by a file that shows them.

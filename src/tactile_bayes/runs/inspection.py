@@ -18,8 +18,6 @@ from tactile_bayes.rig.rig_file import file_of
 from tactile_bayes.runs.folder import Folder
 from tactile_bayes.runs.names import INSPECTION
 
-__all__ = ["write_inspection"]
-
 
 def write_inspection(
     inspection: Inspection, out: str | os.PathLike[str], *, text: Sequence[str] = (), rig: Rig | None = None

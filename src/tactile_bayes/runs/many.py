@@ -41,8 +41,6 @@ from tactile_bayes.tasks import (
 from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.tasks.results_store import differences
 
-__all__ = ["ROW", "infer_contours", "records_in"]
-
 ROW = "run.json"  # file with the row of a run in the table of all, written when the run is complete
 _SUFFIXES = (".csv", ".nc", ".mcap", ".bag", ".db3")
 

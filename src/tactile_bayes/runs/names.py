@@ -2,27 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "CALIBRATION",
-    "CHECKPOINT",
-    "COMPARISON",
-    "DATASET",
-    "DESIGN",
-    "FIGURES",
-    "INFERENCE",
-    "INSPECTION",
-    "MANY",
-    "OF_POSTERIOR",
-    "OVERLAY",
-    "RECONSTRUCTION",
-    "RIG",
-    "SENSITIVITY",
-    "STUDY",
-    "TRUST",
-    "WATCH",
-    "WATCH_PAGE",
-]
-
 INFERENCE = (
     "summary.txt",
     "posterior.nc",

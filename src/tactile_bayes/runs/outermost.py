@@ -8,8 +8,6 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["outermost"]
-
 
 def outermost(choices: Iterable[tuple[Floats, float, str, str]]) -> str:
     """Return the extremes at which the best choice lies, as text; "" if it lies inside all ranges."""

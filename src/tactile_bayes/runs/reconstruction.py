@@ -28,8 +28,6 @@ from tactile_bayes.runs.names import RECONSTRUCTION
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_messages"]
-
 
 @dataclass(frozen=True)
 class ReconstructionRun(Run[xr.Dataset]):

@@ -19,8 +19,6 @@ from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.names import RIG
 from tactile_bayes.uncertainty.summary import summary
 
-__all__ = ["RigRun", "calibrate_rig_into"]
-
 
 @dataclass(frozen=True)
 class RigRun(Run[Rig]):

@@ -26,9 +26,6 @@ from tactile_bayes.tasks import TaskProgress
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Material", "SensitivityRun", "rod_message", "sensitivity_into", "steps_of"]
-
-
 _OF_PLAN = tuple(field.name for field in fields(Plan))
 _LENGTHS = np.array([0.7, 0.85, 1.0, 1.2, 1.4])
 # Lengths and diameters of the rods that are tried, over those of the present rod.

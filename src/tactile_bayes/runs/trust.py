@@ -14,8 +14,6 @@ from tactile_bayes.runs.folder import Folder, Run, posterior_in
 from tactile_bayes.runs.names import TRUST
 from tactile_bayes.tasks import refuse_replacing
 
-__all__ = ["REPLICATES_FOLDER", "trust_into"]
-
 REPLICATES_FOLDER = "trust"  # subfolder of the replicates, from which a stopped run resumes
 
 

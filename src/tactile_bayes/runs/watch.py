@@ -28,8 +28,6 @@ from tactile_bayes.tasks import alone_in, refuse_replacing
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.summary import reach, summary
 
-__all__ = ["Watch", "WatchUpdate", "open_watch"]
-
 _STATE = "stream.nc"  # file of the stream in a folder, from which a watch resumes
 _POINTS = 201  # number of grid points of the band
 

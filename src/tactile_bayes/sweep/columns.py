@@ -15,8 +15,6 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 
-__all__ = ["EVENT_COLUMNS", "SAMPLE_COLUMNS", "ManyUnits", "phases_of", "sweep_events", "sweep_samples"]
-
 # Columns of samples; loads are 0 out of contact, the others NaN.
 SAMPLE_COLUMNS = (*CHANNELS, "contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
 EVENT_COLUMNS = ("drive_angle", "slope_angle", "contact_x", "contact_y")

@@ -26,8 +26,6 @@ from tactile_bayes.checks import (
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import carried_sweeps
 
-__all__ = ["Carried", "Drive", "Motion", "Rotation", "Translation", "drives_of", "recorded_drives"]
-
 _ROUNDING = 1e-15
 _TURN = 2.0 * math.pi
 # Least step of a rotation [rad], and of other drives over their travel; finer ones give millions of samples.

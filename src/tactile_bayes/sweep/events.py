@@ -14,8 +14,6 @@ from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Direction, Drive
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 
-__all__ = ["Event", "SweepEvents", "events_of"]
-
 
 @dataclass(frozen=True)
 class Event:

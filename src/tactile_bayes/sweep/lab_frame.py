@@ -11,8 +11,6 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.paths import States
 
-__all__ = ["RodUnits", "to_lab_frame"]
-
 
 class RodUnits(Protocol):
     """Units of dimensionless loads: a `Rod`, or arrays for many rods."""

@@ -20,8 +20,6 @@ from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Direction
 
-__all__ = ["carried_paths", "frame_of", "friction_angle_of", "rotated_paths", "sweep_paths", "to_sweep_frame"]
-
 _DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 
 # Difference of travels [L] that rounding may make. A tip that touches first does so on both sides of the rod: its side

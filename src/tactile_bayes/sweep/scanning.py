@@ -32,8 +32,6 @@ from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.path import carried_paths, friction_angle_of, sweep_paths, to_sweep_frame
 
-__all__ = ["Scan", "acting", "equilibria", "scan"]
-
 _MARGIN = 15  # number of drive steps before first contact and after snap-off
 # Largest number of corrections of a tapered rod's standoff, and the last change of the arc length [L].
 _MOST_MOVES, _SETTLED = 50, 1e-15

@@ -19,8 +19,6 @@ from tactile_bayes.sweep.columns import ManyUnits, phases_of, sweep_events, swee
 from tactile_bayes.sweep.path import frame_of, friction_angle_of, rotated_paths
 from tactile_bayes.sweep.scanning import acting
 
-__all__ = ["scan_many"]
-
 
 def scan_many(
     contours: Contour,

@@ -15,8 +15,6 @@ from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig import Rig, make_record
 from tactile_bayes.sweep.drive import Carried, Drive
 
-__all__ = ["blind_angles", "record_template"]
-
 
 def blind_angles(drive_step: float) -> Floats:
     """Return drive angles [rad] from before any first contact with an object above the pivot to after any snap-off."""

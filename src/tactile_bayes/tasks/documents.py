@@ -13,8 +13,6 @@ import numpy as np
 from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["LARGEST", "read_json", "read_toml", "toml_value"]
-
 _DEEPEST = 64  # largest depth of lists and tables in one another, and largest number of parts of a dotted key
 LARGEST = 1 << 23  # largest number of characters of a TOML text, which takes seconds to parse
 _BARE = re.compile(r"[A-Za-z0-9_-]+")

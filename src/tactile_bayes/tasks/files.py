@@ -16,8 +16,6 @@ from pathlib import Path
 
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["alone_in", "errors_of", "is_temporary", "refuse_replacing", "replace_together", "write_atomically"]
-
 _HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 _TEMPORARY = re.compile(r"\.tactile-bayes-(?P<host>[0-9a-f]{8})-[0-9a-f]{16}\.tmp")
 _DAY = 86_400.0

@@ -17,8 +17,6 @@ from tactile_bayes.tasks.documents import read_json
 from tactile_bayes.tasks.files import alone_in, write_atomically
 from tactile_bayes.tasks.workers import TaskProgress, Workers, run_tasks, workers_of
 
-__all__ = ["Kind", "ResultsStore", "keep_outcomes", "open_results_store"]
-
 Task = TypeVar("Task")
 Outcome = TypeVar("Outcome")
 

@@ -11,8 +11,6 @@ from contextlib import contextmanager
 
 import numpy as np
 
-__all__ = ["cores", "in_parts", "one_thread"]
-
 _PARTS = 2  # parts for each thread, of which some take longer than others
 _here = threading.local()
 

@@ -23,8 +23,6 @@ from tactile_bayes.errors import ParameterError, TaskError
 from tactile_bayes.matplotlib_defaults import ignore_user_settings
 from tactile_bayes.tasks.threads import cores, one_thread
 
-__all__ = ["TaskProgress", "Workers", "run_tasks", "workers_of"]
-
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 

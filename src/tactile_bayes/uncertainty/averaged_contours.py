@@ -9,8 +9,6 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
 
-__all__ = ["averaged_heights", "family_weights"]
-
 
 def family_weights(comparison: xr.Dataset) -> tuple[Floats, str]:
     """Return the weight of each family, shape (families,), of sum one, and their source, "evidence" or "stacking"."""

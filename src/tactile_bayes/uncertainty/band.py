@@ -21,8 +21,6 @@ from tactile_bayes.uncertainty.averaged_contours import averaged_heights, family
 from tactile_bayes.uncertainty.quantiles import quantile_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
 
-__all__ = ["contour_band", "contour_heights", "contours_drawn", "grid_points", "length_unit"]
-
 _DRAWS = 4000
 
 _NUMBERS_PER_HEIGHT = 12  # numbers that a shape-free contour reads for one of its heights

@@ -9,8 +9,6 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Locus
 
-__all__ = ["Triangle", "triangle"]
-
 
 class Triangle(NamedTuple):
     """Region of a convex contour between two of its points with known tangents, for each of n contours.

@@ -12,8 +12,6 @@ from tactile_bayes.inference.result import contact_draws
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES, TANGENTIAL, TIP
 from tactile_bayes.reconstruction.estimate import spread_across
 
-__all__ = ["LEAST_DRAWS", "contact_moments"]
-
 _DRAWS = ("chain", "draw")
 LEAST_DRAWS = 10  # smallest number of draws in contact from which a standard deviation is computed
 

@@ -13,8 +13,6 @@ from tactile_bayes.checks import check_probability, check_whole_number
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.result import contact_draws
 
-__all__ = ["ContactRegion", "contact_region"]
-
 _BLOCK = 1_000_000
 
 

@@ -17,8 +17,6 @@ from tactile_bayes.uncertainty.band import contour_band, length_unit
 from tactile_bayes.uncertainty.certificate import Triangle, triangle
 from tactile_bayes.uncertainty.quantiles import central_levels
 
-__all__ = ["gap", "has_gap"]
-
 _GRID_POINTS = 101  # number of grid points of x across the gap
 
 

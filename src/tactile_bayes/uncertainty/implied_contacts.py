@@ -23,8 +23,6 @@ from tactile_bayes.record import CHANNELS, record_hash, validate
 from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.sweep import to_lab_frame
 
-__all__ = ["contacts_of", "implied_contacts"]
-
 _BLOCK = 200  # number of contours whose paths are traced at a time
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 # Attributes of the posterior that hold for the contacts, too.

@@ -14,8 +14,6 @@ from tactile_bayes.uncertainty.band import contours_drawn, grid_points, length_u
 from tactile_bayes.uncertainty.quantiles import quantile_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
 
-__all__ = ["normal_band", "normal_offsets"]
-
 _BLOCK = 100_000  # number of normals that are searched at once
 # Lower bound of the rate: where the contour's parameter does not move the point, the root stays as it is.
 _SLOWEST = float(np.finfo(float).tiny)

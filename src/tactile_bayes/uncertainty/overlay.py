@@ -18,8 +18,6 @@ from tactile_bayes.record.points import read_points
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 from tactile_bayes.uncertainty.summary import reach
 
-__all__ = ["Distance", "Overlay", "overlay_distance", "read_overlay"]
-
 
 @dataclass(frozen=True, eq=False)
 class Overlay:

@@ -8,8 +8,6 @@ import xarray as xr
 from tactile_bayes.checks import check_probability
 from tactile_bayes.inference.result import refuse_no_contour
 
-__all__ = ["predictive_interval"]
-
 
 def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
     """Return the central posterior predictive interval of every sample of the record, noise included.

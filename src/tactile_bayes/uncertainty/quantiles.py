@@ -7,8 +7,6 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_probability, check_switch
 
-__all__ = ["central_levels", "quantile_band"]
-
 _ROUNDING = 1e-9  # share of its largest width below which a band is so narrow that its draws differ only by rounding
 
 

@@ -10,8 +10,6 @@ import xarray as xr
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.record import rod_of
 
-__all__ = ["BEYOND_REACH", "beyond_reach", "reach_attributes"]
-
 # Status of a band at grid points where only the family and the prior determine it.
 BEYOND_REACH = "beyond the reach of the rod"
 _ENDS = ("reach_left", "reach_right")

@@ -13,8 +13,6 @@ from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.uncertainty.gap import gap, has_gap
 from tactile_bayes.uncertainty.quantiles import central_levels
 
-__all__ = ["gap_if_any", "reach", "summary"]
-
 
 def summary(posterior: xr.DataTree, probability: float = 0.95, edges: xr.Dataset | None = None) -> xr.Dataset:
     """Return median, central interval, R̂ and effective sample size of each parameter, and the gap if there is one."""

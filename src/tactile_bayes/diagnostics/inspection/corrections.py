@@ -14,8 +14,6 @@ from tactile_bayes.record.origin import column_entry
 from tactile_bayes.record.rig_entry import rig_entries, rig_entry
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
 
-__all__ = ["OTHER_ANGLE", "Correction", "as_it_is", "corrections_for"]
-
 Transform = Callable[[xr.Dataset], xr.Dataset]
 
 # Beginning of the texts of corrections that change the drive angle, and with it perhaps the directions.

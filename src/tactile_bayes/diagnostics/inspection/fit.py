@@ -16,8 +16,6 @@ from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rig.corrected import Corrected
 
-__all__ = ["Fit", "fit_of"]
-
 _FEWEST = 10  # number of loaded samples below which the fit is not judged
 _CORRECTED = 1 / 3  # share of the misfits that may remain for a correction to be named
 # Share of the samples that a further change must correct: loads that are mirrored twice fit as well as before.

@@ -26,8 +26,6 @@ from tactile_bayes.rig.corrected import corrected
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["Inspection", "inspect_record"]
-
 # Number of steps of an inspection: unloaded samples, Step 2, fit of contacts; each correction tried adds one.
 _STEPS = 3
 

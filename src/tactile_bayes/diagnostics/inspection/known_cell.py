@@ -10,8 +10,6 @@ from tactile_bayes.errors import RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import present_channels
 
-__all__ = ["CellSource", "known_cell"]
-
 CellSource = Literal["given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"]
 
 

@@ -20,8 +20,6 @@ from tactile_bayes.record.origin import column_entry
 from tactile_bayes.record.rig_entry import rig_entries, rig_entry
 from tactile_bayes.rig.parameters import PARAMETERS
 
-__all__ = ["UNFIT", "far_off", "inspection_messages", "prefix_of", "quantity"]
-
 # Share of loaded samples without a fitting contact above which it is reported: a rod 10 % stiffer than stated stays
 # below it at the usual noise.
 UNFIT = 0.25

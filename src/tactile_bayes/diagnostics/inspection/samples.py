@@ -12,8 +12,6 @@ from tactile_bayes.diagnostics.inspection.stretches import centred
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN, robust_deviation
 from tactile_bayes.record import means_of_positions, positions_of
 
-__all__ = ["outliers", "repeat_chance", "repeated", "stuck", "uneven_steps"]
-
 _FEWEST = 8  # number of unloaded samples below which their scatter does not identify outliers
 _EFFICIENCY = 0.37  # efficiency of the median absolute deviation relative to the standard deviation, in normal noise
 _SHORTEST = 3  # smallest number of equal readings in a row that is reported

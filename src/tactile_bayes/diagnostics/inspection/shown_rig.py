@@ -12,8 +12,6 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record.origin import column_entry
 from tactile_bayes.rig import Rig
 
-__all__ = ["shown_rig"]
-
 _MOVED = 1e-3  # probability that a zero which stays where it is seems to have moved as far between unloaded stretches
 _DIGITS = 3  # number of significant digits of a noise that is estimated
 

@@ -11,8 +11,6 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.numerics.scatter import robust_deviation
 from tactile_bayes.record import means_of_positions
 
-__all__ = ["Autocorrelation", "PositionScatter", "autocorrelation", "centred", "position_scatter", "unloaded_stretches"]
-
 _CUT = 4.0  # robust standard deviations at which residuals are clipped, so that no single outlier dominates
 
 

@@ -18,8 +18,6 @@ from tactile_bayes.record import (
     travels_of,
 )
 
-__all__ = ["channel_table", "sample_table", "sweep_table"]
-
 _FROM_ZERO_LOAD = ("bias", "bias_uncertainty", "noise", "noise_uncertainty", "resolution", "same_bias_p_value")
 
 

@@ -25,8 +25,6 @@ from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.reconstruction import Samples
 from tactile_bayes.record import turned
 
-__all__ = ["ContactDensity", "ContactPrior", "Evaluated"]
-
 LogPrior = Callable[[Floats, Floats, Floats], Floats]
 ContactPrior = Literal["flat", "polar"] | LogPrior
 

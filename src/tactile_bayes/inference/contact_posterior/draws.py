@@ -20,17 +20,6 @@ from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.numerics.random_numbers import spawn
 from tactile_bayes.numerics.selection import resampled
 
-__all__ = [
-    "CHAINS",
-    "LEAST_DRAWS",
-    "ContactDraws",
-    "ContactWeights",
-    "MixedDraws",
-    "draw_contacts",
-    "mixed",
-    "weigh_contacts",
-]
-
 CHAINS = 4  # number of chains
 LEAST_DRAWS = 400.0  # smallest number of effective draws
 _PROPOSALS, _MIN_PROPOSALS = 4, 1000  # number of proposals per resampled draw, and of a sample at least

@@ -27,8 +27,6 @@ from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.rig.corrected import Corrected, corrected
 from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["density_of", "infer_contacts"]
-
 _MIN_MISFIT_PROBABILITY = 1e-4  # probability of a misfit below which the message reports that the loads do not fit
 _MOST_DRAWS = 10**6  # largest number of draws for each sample
 # Directions of the force over the angle of friction, and their prior probabilities: mostly a rod slides as the drive

@@ -7,8 +7,6 @@ from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["ContactProposal"]
-
 _WIDTHS = np.array([1.15, 3.0])  # of the normal densities of a branch, in standard deviations of the approximation
 _SHARES = np.array([0.75, 0.25])
 _MAX_DISTANCE = 30.0  # of a mean beyond the edge, in standard deviations, so that probabilities stay positive

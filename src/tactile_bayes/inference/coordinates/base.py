@@ -10,8 +10,6 @@ import numpy as np
 from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.densities import LogProbability, Mixture
 
-__all__ = ["Coordinates", "Logarithms", "in_coordinates"]
-
 
 class Coordinates:
     """A change of variables between coordinates and as many parameters; here they are the same."""

@@ -14,8 +14,6 @@ from tactile_bayes.inference.coordinates.base import Coordinates, Logarithms
 from tactile_bayes.inference.densities import Mixture
 from tactile_bayes.numerics.differences import central_slopes
 
-__all__ = ["FlankCoordinates"]
-
 # Share of the draws, and distance of the vertex from x over its median: if a larger share is nearer, the vertex may
 # lie on the other side as well, which these coordinates exclude.
 _MAX_SHARE, _NEAR = 0.01, 0.1

@@ -25,8 +25,6 @@ from tactile_bayes.numerics.random_numbers import Seed, whole_seed
 from tactile_bayes.tasks import alone_in, is_temporary, write_atomically
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["Checkpoint", "changes", "identity_of_run", "open_checkpoint"]
-
 _START = "starting points"  # they follow from the other entries
 _MAX_CHARACTERS = 60  # largest number of characters of an entry in an error message
 

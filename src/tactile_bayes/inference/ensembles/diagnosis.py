@@ -11,8 +11,6 @@ from arviz_stats.base.array import array_stats
 
 from tactile_bayes.arrays import Flags, Floats
 
-__all__ = ["Diagnosis", "Mode", "autocorrelation_time", "lost_walkers", "modes_message", "modes_of", "walker_major"]
-
 _TAIL = (0.05, 0.95)  # quantiles that define the effective sample size of the tails
 _LOST_BELOW = 10.0  # distance of a lost walker's largest log-probability below the median of all walkers
 

@@ -12,16 +12,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.densities import LogProbability, Mixture, Proposal
 
-__all__ = [
-    "FittedMove",
-    "Moves",
-    "NormalMove",
-    "moves_in",
-    "standard_moves",
-    "step_ensembles",
-    "whitened_moves",
-]
-
 Moves = Sequence[tuple[Any, float]]  # moves of an ensemble, with their shares. They keep nothing from step to step.
 _MIN_NEW_SHARE, _WHOLLY_NEW = 0.2, 0.5  # least share of the new draw in a step, and the probability that it is all
 _SHORT_SCALE = 0.25  # scale of short differences over the usual scale, for targets along bent ridges or between bounds

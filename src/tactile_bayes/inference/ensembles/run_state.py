@@ -16,8 +16,6 @@ from tactile_bayes.inference.ensembles.diagnosis import lost_walkers
 from tactile_bayes.inference.ensembles.moves import Moves, step_ensembles
 from tactile_bayes.inference.ensembles.walkers import RandomState, generator_at, state_of
 
-__all__ = ["Block", "RunState", "StoredSteps", "make_block", "next_diagnosis"]
-
 _GROWTH = 1.25  # ratio of the steps at two successive diagnoses: all diagnoses together then cost five times the last
 
 

@@ -32,8 +32,6 @@ from tactile_bayes.inference.ensembles.walkers import CheckedTarget, first_rando
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 from tactile_bayes.numerics.selection import evenly_spread
 
-__all__ = ["Draws", "Progress", "sample"]
-
 
 @dataclass(frozen=True, eq=False)
 class Draws:

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from tactile_bayes.checks import check_number, check_optional, check_positive, check_switch, check_whole_number, refused
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["SamplerSettings", "settings_of"]
-
 _MOST = 10**9  # largest number of ensembles, walkers and steps
 
 

@@ -13,15 +13,6 @@ from tactile_bayes.inference.densities import LogProbability
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.numerics.random_numbers import Seed, spawn
 
-__all__ = [
-    "CheckedTarget",
-    "RandomState",
-    "first_random_state",
-    "generator_at",
-    "scatter_walkers",
-    "state_of",
-]
-
 _MAX_ROUNDS = 100  # of draws, as many in each as there are walkers
 RandomState = tuple[Any, ...]  # of NumPy's Mersenne Twister, which emcee's moves use, as from `get_state`
 

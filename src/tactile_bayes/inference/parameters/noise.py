@@ -17,8 +17,6 @@ from tactile_bayes.rig.stated import Stated
 if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
 
-__all__ = ["Noise", "noise_of"]
-
 
 class Noise(NamedTuple):
     """Parameters of a load cell's noise, with their priors."""

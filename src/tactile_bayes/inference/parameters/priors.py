@@ -15,8 +15,6 @@ from tactile_bayes.contours.families import family_named, sides_of
 from tactile_bayes.contours.family import ContourFamily, FamilyParameter
 from tactile_bayes.distributions import Distribution, numbers_of
 
-__all__ = ["default_priors", "matched_priors", "mean_log_radius", "own_priors", "widened"]
-
 
 def own_priors(family: ContourFamily, length: float) -> dict[str, Distribution]:
     """Return the default priors of a family's parameters, except the vertex; those of one entry share one object."""

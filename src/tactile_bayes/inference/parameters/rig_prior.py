@@ -17,8 +17,6 @@ from tactile_bayes.rig.parameters import MAY_VANISH
 from tactile_bayes.rig.rig_prior import RigPrior
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["refuse_other_rig", "rig_prior"]
-
 # Parameters, by parts of their names, that belong to one record (zeros, pivots and gauge) or to rod and object
 # (friction).
 _PASSING = ("bias", "drift", "friction", "base", "gauge")

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from tactile_bayes.rig.rig import Rig
     from tactile_bayes.rig.rig_prior import RigPrior
 
-__all__ = ["Unknowns", "belongs", "unknowns_of"]
-
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _SAME_DIRECTION = 1e-3  # range of drive angles [rad] within which a rod keeps its direction
 # Parameters of the noise, which are none of the forward model.

@@ -8,8 +8,6 @@ from scipy.special import logsumexp, ndtr
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.load_cell import LoadCell
 
-__all__ = ["EncoderErrors"]
-
 _WIDEST, _NARROWEST = 0.75, 0.1  # distance between neighbouring errors, in standard deviations, at most and at least
 _REACH = 3.75  # largest error that is taken into account, in standard deviations
 _STEEP = np.array([10.0, 30.0, 30.0])  # change of loads close to snap-off [EI/L and EI/L² per rad]

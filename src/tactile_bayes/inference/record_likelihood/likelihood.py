@@ -31,8 +31,6 @@ from tactile_bayes.record import CHANNELS, frame_of, rod_of, to_dimensionless, t
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.poses.forward_table import Tables
 
-__all__ = ["RecordLikelihood", "events_of"]
-
 # Error of loads over their noise that is negligible for 360 samples: it changes their log-likelihood by less than 0.05
 # in 999 of 1000 records.
 _UNFELT = 2e-3

@@ -15,8 +15,6 @@ from tactile_bayes.mechanics.branches.sweeps import Segments
 from tactile_bayes.reconstruction import contact_sides, drive_histories, least_turn
 from tactile_bayes.record import CHANNELS, base_of_sample, present_channels, rod_of
 
-__all__ = ["RecordSegments", "without_errors"]
-
 _OFF = 1e-6  # distance of recorded poses from a line [L and rad] that is rounding of the record
 _SCATTER = 10.0  # range of drive angles, over the noise of their readings, of a rod that is clamped at one
 # Rotation as a line, with the drive angle as travel.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-__all__ = ["RigValues"]
-
 
 class RigValues(NamedTuple):
     """Deviations of a rig from the stated one; numbers, or arrays of shape (n,) with one for every contour."""

@@ -16,8 +16,6 @@ from tactile_bayes.mechanics.rods.surface import Surface
 if TYPE_CHECKING:
     from tactile_bayes.mechanics.poses.forward_table import Box, ForwardTable, Tables
 
-__all__ = ["RodTables"]
-
 # Ranges of tables: distances from the stated taper and rest curvature [1/L], three and four standard deviations of the
 # default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and
 # for uneven curvature that of the rest curvature.

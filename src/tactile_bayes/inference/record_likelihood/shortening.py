@@ -20,8 +20,6 @@ from tactile_bayes.reconstruction import least_turn, turned_sweeps, with_sides
 from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels, rows_of_sweeps
 from tactile_bayes.record.sweep_segments import turning_points
 
-__all__ = ["MOST_SAMPLES", "is_long", "shortened", "thinned"]
-
 MOST_SAMPLES = 2000  # largest number of samples that the likelihood takes one by one
 _BINS = 700  # number of bins of the drive angle in all sweep segments, before they are split
 _FEWEST_BINS = 12  # least number of bins of a segment

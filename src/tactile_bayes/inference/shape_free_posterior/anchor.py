@@ -10,8 +10,6 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["Anchor"]
-
 _NODE, _WEIGHT = np.polynomial.legendre.leggauss(24)  # of the quadrature between vertex and anchor
 _SLOPE_ANGLES = np.linspace(-1.4, 1.4, 57)  # slope angles that may be the anchor's [rad]
 _LARGEST = 50.0  # bound of the change of the logarithm of a radius, far beyond any prior

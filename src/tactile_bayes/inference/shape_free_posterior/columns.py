@@ -8,8 +8,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.rig.parameters import MAY_VANISH
 
-__all__ = ["joined", "linear_names", "scale_names", "split", "white_scales"]
-
 _OF_ROUGHNESS = ("amplitude", "length_scale")
 
 

@@ -17,8 +17,6 @@ from tactile_bayes.inference.shape_free_posterior.columns import joined, white_s
 from tactile_bayes.inference.shape_free_posterior.observations import LinearPrior, linearised
 from tactile_bayes.inference.shape_free_posterior.observer import Observer
 
-__all__ = ["NormalApproximation"]
-
 _FAR_DOWN = -35.0  # standard normal number of which, and of all below, a truncation at less changes nothing
 
 

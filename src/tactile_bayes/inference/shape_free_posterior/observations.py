@@ -12,8 +12,6 @@ from tactile_bayes.inference.shape_free_posterior.columns import linear_names, w
 from tactile_bayes.inference.shape_free_posterior.observer import HUBER_THRESHOLD, Observer
 from tactile_bayes.numerics.scatter import robust_deviation
 
-__all__ = ["LinearPrior", "Observations", "linearised"]
-
 # Step of the first differences by which loads are linearised, over the scale of each coordinate, and the largest step
 # of the further ones.
 _STEP, _LARGEST_STEP = 1e-5, 0.01

@@ -10,8 +10,6 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.reconstruction import loaded_samples
 
-__all__ = ["HUBER_THRESHOLD", "Observer"]
-
 HUBER_THRESHOLD = 4.0  # residual in standard deviations from which Huber's loss is linear
 _MIN_WIDTH = 0.01  # smallest standard deviation of a snap-off, over half a step of the drive angle
 

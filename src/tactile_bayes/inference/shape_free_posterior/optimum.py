@@ -14,8 +14,6 @@ from tactile_bayes.inference.shape_free_posterior.observations import LinearPrio
 from tactile_bayes.inference.shape_free_posterior.observer import Observer
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
-__all__ = ["whitening_at"]
-
 _ROUNDS = 20  # largest number of linearisations
 _GAINED = 0.5  # smallest gain in log-density of a round for another one to follow
 _DAMPINGS: Floats = np.power(10.0, np.arange(15))  # dampings of steps that are tried beside the full one

@@ -12,8 +12,6 @@ from tactile_bayes.inference.coordinates.base import Coordinates
 from tactile_bayes.inference.shape_free_posterior.columns import joined, split
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation
 
-__all__ = ["Whitening"]
-
 _FAR = 4.0  # largest distance of the logarithm of a scale from its starting value; the density is zero beyond
 _LARGEST = 50.0  # bound of the logarithm of a radius, far beyond any prior
 

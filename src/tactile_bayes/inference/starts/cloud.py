@@ -10,8 +10,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.densities import ANYTHING, Ends, LogProbability
 
-__all__ = ["Cloud", "gather"]
-
 _WIDER = 2.0  # standard deviation of the starting points over that of the posterior
 _DEFICIT = 12.0  # log-probability per parameter of a start below the best: three times the mean that _WIDER causes
 _ROUNDS = 30  # of the cross-entropy method, at most

@@ -21,8 +21,6 @@ from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.rig.corrected import corrected
 from tactile_bayes.rig.parameters import GROUPS
 
-__all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
-
 _PRIOR_DRAWS = 1000
 # Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
 # early, since a sample at an event is loaded or not.

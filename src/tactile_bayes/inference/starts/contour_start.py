@@ -28,8 +28,6 @@ from tactile_bayes.inference.starts.modes import Modes
 from tactile_bayes.inference.starts.pilot import standardise
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
 
-__all__ = ["Walk", "walk_of"]
-
 # Standard deviations, half those of the starting points, of the logarithms of amplitude and length scale, of that of
 # noise, and of the other whitened coordinates: points that are farther out in all of these at once are improbable.
 _ROUGHNESS_SPREAD, _NOISE_SPREAD, _WHITENED_SPREAD = 0.3, 0.1, 0.7

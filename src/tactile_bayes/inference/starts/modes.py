@@ -18,8 +18,6 @@ from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.starts.cloud import Cloud, gather
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, optima_of
 
-__all__ = ["Modes", "flank_at_contacts"]
-
 _MANY_SAMPLES = 100  # loaded ones, from which an optimum that explains the record is taken for the only one
 _MAX_SEARCHES = 9  # after which no other begins, unless none of them explains a record of few loaded samples
 # Searches that end in known modes, after which no other mode is expected: for a record of many loaded samples, and for

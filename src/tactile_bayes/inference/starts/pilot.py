@@ -15,8 +15,6 @@ from tactile_bayes.inference.ensembles.run_state import Block, make_block
 from tactile_bayes.inference.ensembles.walkers import RandomState, first_random_state
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
-__all__ = ["standardise"]
-
 _STEPS = (40, 80, 160, 320)  # of each pilot run
 # Gain of mean log-density by a further change of these coordinates, and share of the steps that move a walker, below
 # and above which no further run is made.

@@ -8,8 +8,6 @@ from scipy.special import logsumexp
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.streams.stream_state import StreamState
 
-__all__ = ["WIDER", "surprise_after"]
-
 WIDER = (1.5, 3.0, 6.0)  # factors on the noise of the alternatives with which the e-value compares the model
 
 

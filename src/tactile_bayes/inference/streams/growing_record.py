@@ -8,8 +8,6 @@ import xarray as xr
 from tactile_bayes.errors import RecordError
 from tactile_bayes.record import carried_sweeps, validate
 
-__all__ = ["continued"]
-
 
 def continued(record: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
     """Return a record with new samples behind its own."""

@@ -20,8 +20,6 @@ from tactile_bayes.inference.streams.e_value import WIDER
 from tactile_bayes.inference.streams.stream_state import StreamState
 from tactile_bayes.numerics.selection import resampled
 
-__all__ = ["DECORRELATED", "LOST_ONCE", "SETTLED", "Mover", "Particles"]
-
 # Number of parts of the mixture by which particles along a bent ridge move: 0.28 of its proposals for the first 28
 # samples of a double sweep were accepted, 0.20 of those of 4 parts, 0.29 of 12, and 0.05 of a single distribution.
 _PARTS = 8

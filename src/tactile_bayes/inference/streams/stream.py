@@ -36,8 +36,6 @@ from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import write_netcdf
 from tactile_bayes.rig.rig import Rig, rig_of
 
-__all__ = ["LEVELS", "Stream"]
-
 LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)  # levels of the quantiles of parameters and of the band
 _MOST_SURPRISE = 700.0  # largest logarithm of an e-value that is stated, which is finite
 _PRIOR_DRAWS = 4000  # number of draws from the prior for the share of contours within reach

@@ -18,8 +18,6 @@ from tactile_bayes.record import validate
 from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["StreamState", "read_tree", "state_in", "tree_of"]
-
 _KIND = "stream of tactile-bayes"
 _FORMAT = 2
 _HOW = "begin a new stream, or put a copy of the file back"

@@ -26,8 +26,6 @@ from tactile_bayes.mechanics.branches.series import change_of, tail
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
-__all__ = ["FIRST_LENGTH", "LONGEST", "Here", "Setting", "Step", "advance", "next_length"]
-
 # Length of the first leg, and those between which all lie; see `leg_from`. First legs of 0.1 and 1 take 4 and 20 % more
 # Newton steps in likelihoods; legs of more than 1 save nothing, and one of 1e-6 is beside a singularity.
 FIRST_LENGTH, LONGEST, _SHORTEST = 0.5, 1.0, 1e-6

@@ -50,8 +50,6 @@ from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.poses.beam import is_straight
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 
-__all__ = ["MOST_CHANGES", "BranchWorkspace", "branch_workspace", "follow_branch", "refuse"]
-
 MOST_CHANGES = 16  # largest number of phases of a branch that are recorded
 # Largest number of legs of a path, to which one for each knot and this number for each line of its drive are added.
 _MOST, _MOST_ON_LINE = 256, 2

@@ -12,8 +12,6 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import golden
 from tactile_bayes.mechanics.poses.beam import Beam, rest_point
 
-__all__ = ["travel_into"]
-
 # Parts of stem and rod at whose ends depths are compared, and steps of the search between them.
 _PARTS, _SHRINKS = 16, 24
 # Depth [L] of a rod that has just been released, which errors of exact events and of others may cause.

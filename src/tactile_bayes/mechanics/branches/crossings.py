@@ -26,20 +26,6 @@ from tactile_bayes.mechanics.branches.scene import BY_Q, Equilibrium, Scene
 from tactile_bayes.mechanics.branches.series import crossing, value, weighted
 from tactile_bayes.mechanics.compiler import compiled, inlined
 
-__all__ = [
-    "DIP",
-    "LOST",
-    "NOT_SLIPPING",
-    "change_of_mode",
-    "change_of_phase",
-    "end_of_line",
-    "first_fall",
-    "first_knot",
-    "polished_fold",
-    "regained",
-    "release",
-]
-
 # Least fall of the drive angle beyond a maximum that makes it the snap-off [rad]. After a smaller fall the rod hardly
 # jumps, since the same object stops it at once.
 DIP = 1e-4

@@ -48,18 +48,6 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.beam import beam_pose, is_far_from_table, tip_pose, whole_pose
 from tactile_bayes.mechanics.poses.pose import Pose, scaled
 
-__all__ = [
-    "SETTLED",
-    "Balance",
-    "Rates",
-    "balance",
-    "nowhere",
-    "settle",
-    "settle_at",
-    "settle_at_limit",
-    "unloaded",
-]
-
 _MOST_STEPS = 25  # Newton steps of a search; those that converge take two to six
 _MOST_TURN, _MOST_LOADING = 0.4, 1.0  # largest changes of q, and of f over 1 + f, in a step
 SETTLED = 1e-8  # step, over the largest, after which a first-order correction leaves rounding errors only: its square

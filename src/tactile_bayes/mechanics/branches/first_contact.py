@@ -36,10 +36,9 @@ from tactile_bayes.mechanics.branches.scene import (
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import golden, newton_step
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.poses.beam import Beam, Chord, chord_to, mirrored_beam
+from tactile_bayes.mechanics.poses.beam import Beam, chord_to, mirrored_beam
+from tactile_bayes.mechanics.poses.pose import Chord
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
-
-__all__ = ["Beginning", "beginning", "clear_angle"]
 
 
 class _Sought(IntEnum):

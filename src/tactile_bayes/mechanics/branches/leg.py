@@ -29,25 +29,6 @@ from tactile_bayes.mechanics.branches.series import two_values, weighted
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.numerics import chebyshev
 
-__all__ = [
-    "ANGLE",
-    "HARDLY",
-    "NUDGE",
-    "PLACE",
-    "RATE",
-    "REST",
-    "Accuracy",
-    "Leg",
-    "LegSeries",
-    "guess",
-    "leg_from",
-    "leg_series",
-    "sample_leg",
-    "settle_on",
-    "share_of",
-    "shortened",
-]
-
 # Weights of q and f in the length of a leg, the last if the base is carried. Away from first contact all is smooth in
 # p, where it is monotone: five times these weights, or a fifth, change the Newton steps of likelihoods by 12 %.
 _BY_ROD, _BY_FORCE, _BY_FORCE_ON_LINE = 0.2, 0.03, 0.3

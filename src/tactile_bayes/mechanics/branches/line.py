@@ -15,22 +15,6 @@ import numpy as np
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = [
-    "LINE_COLUMNS",
-    "NO_LINE",
-    "Line",
-    "LinePath",
-    "Offset",
-    "components",
-    "drive_angle_at",
-    "line_at",
-    "line_of",
-    "lines_through",
-    "off_line",
-    "only_turns",
-    "pose_at",
-]
-
 # Columns of a line in an array: its beginning (x, y, drive angle), the change of these with the travel, and travel at
 # beginning and end.
 LINE_COLUMNS = 8

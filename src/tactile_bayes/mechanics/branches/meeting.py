@@ -64,8 +64,6 @@ from tactile_bayes.mechanics.branches.scene import (
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 
-__all__ = ["KNOT", "OPEN", "Meeting", "fate_of", "go_on", "in_mode", "meet", "slid_back"]
-
 # How a leg is left: the branch goes on smoothly, or there is a knot of the contour, a change of the phase between tip
 # and rod, the end of a line of the drive, or sliding or sticking ends.
 _SMOOTHLY, KNOT, _PHASE, _LINE, _MODE = range(5)

@@ -18,23 +18,6 @@ from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
 
-__all__ = [
-    "Half",
-    "Outline",
-    "Place",
-    "bearing",
-    "beside",
-    "ends",
-    "frame",
-    "from_base",
-    "is_inside",
-    "mirrored",
-    "narrower",
-    "on_object",
-    "over",
-    "place",
-]
-
 _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3  # rod lengths beyond which an end of a contour does not matter
 # Largest number of steps in which the parameter at an x is sought, and the last one over the range: beside it the

@@ -33,26 +33,6 @@ from tactile_bayes.mechanics.branches.scene import Anchor, Equilibrium, Scene, a
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
-__all__ = [
-    "ROLLING",
-    "STUCK",
-    "Contact",
-    "Limit",
-    "Move",
-    "contact_at",
-    "is_possible",
-    "limit",
-    "moves",
-    "slides",
-    "sliding_on",
-    "slip",
-    "slips_clearly",
-    "stuck",
-    "tip_touches",
-    "touching",
-    "turned_over",
-]
-
 # Codes of the phases in which a tip, or the rod, sticks, beside `TIP` and `TANGENTIAL`, in which they slide.
 STUCK, ROLLING = 3, 4
 _LONGEST = 1.5  # largest arc length [L] at which a contact is sought: a Newton step may pass the tip by half the rod

@@ -28,22 +28,6 @@ from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.poses.beam import bending
 
-__all__ = [
-    "STATE",
-    "STATE_COLUMNS",
-    "Course",
-    "Followed",
-    "Found",
-    "Legs",
-    "Samples",
-    "largest_curvature",
-    "legs_for",
-    "recall",
-    "store",
-    "write_event",
-    "write_samples",
-]
-
 STATE_COLUMNS = (
     *("phase", "parameter", "x", "y", "slope_angle", "drive_angle"),
     *("holding_moment", "force_x", "force_y", "arclength", "tip_angle", "travel", "friction_angle", "sticks"),

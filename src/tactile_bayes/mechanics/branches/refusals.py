@@ -18,8 +18,6 @@ from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.poses.beam import PARTS, free_end, from_tip, loaded_part, rest_curvature
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
-__all__ = ["ruled_out"]
-
 _SHORT_END = 1e-3  # length of a free end [L] up to which its curvature at the contact tells whether it is in the object
 _ROUNDING = 1e-9  # how far beyond the end of the contour rounding may put a contact at it
 _ACROSS = 0.5 * math.pi

@@ -10,26 +10,6 @@ from tactile_bayes.mechanics.branches.outline import Outline
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.beam import Beam, rubbed_otherwise
 
-__all__ = [
-    "BY_FORCE",
-    "BY_P",
-    "BY_Q",
-    "NOWHERE",
-    "NO_FORCE",
-    "Anchor",
-    "Equilibrium",
-    "Rig",
-    "Scene",
-    "anchored",
-    "cross",
-    "dot",
-    "in_phase",
-    "less",
-    "on_line",
-    "times",
-    "with_friction",
-]
-
 
 class Equilibrium(NamedTuple):
     """Coordinates of an equilibrium, or a direction in their space. What p and q are depends on the phase: see

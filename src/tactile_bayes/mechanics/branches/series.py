@@ -6,8 +6,6 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
 
-__all__ = ["at_all", "change_of", "copy_rows", "crossing", "tail", "two_values", "value", "weighted"]
-
 
 @compiled
 def weighted(rows: Floats, weights: Floats, out: Floats) -> None:

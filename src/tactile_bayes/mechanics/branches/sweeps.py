@@ -37,8 +37,6 @@ from tactile_bayes.tasks import in_parts
 if TYPE_CHECKING:
     from tactile_bayes.contours.base import Contour
 
-__all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "shapes_of", "solve_sweeps"]
-
 # Difference of drive angles [rad] that errors of a likelihood may cause where the contact has no force.
 _SAME_ANGLE = 1e-5
 _TOUCHES, _TOO_FAR, _BEGINS_INSIDE = (

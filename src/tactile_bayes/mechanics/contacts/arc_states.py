@@ -29,8 +29,6 @@ from typing import NamedTuple
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.pose import pose
 
-__all__ = ["MOST_LOAD", "NO_CONTACT", "Found", "arc_contact", "arc_zeros", "is_moderate"]
-
 MOST_LOAD = 1e6  # largest load f s1² and square of the bend κ0 s1: a rod would make a hundred turns
 _CLOSE = 0.012  # spread of the arguments of Carlson's R_F for which eight terms of its series (DLMF 19.36.1) are exact
 

@@ -19,20 +19,6 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.rods.profile import Rods, rods_of
 
-__all__ = [
-    "ARCLENGTH",
-    "DRIVE_ANGLE",
-    "FORCE",
-    "PLACE",
-    "PSI1",
-    "ContactStateSlopes",
-    "ContactStates",
-    "contact_states",
-    "contact_states_and_slopes",
-    "contact_workspace",
-    "place_by_wrench",
-]
-
 FORCE, PSI1, ARCLENGTH, DRIVE_ANGLE = range(4)  # indices of the coordinates, also of derivatives by them
 # Rows of `ContactStates.place`, by the names of a record's columns.
 PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")

@@ -15,8 +15,6 @@ from tactile_bayes.mechanics.contacts.arc_states import MOST_LOAD
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, WholePose, mirrored_by, whole_pose
 from tactile_bayes.mechanics.poses.pose import Pose
 
-__all__ = ["contact_state", "moved", "wrench_slopes", "write_contact_states"]
-
 _MEANS = 20  # steps of the arithmetic–geometric mean: more than enough
 
 

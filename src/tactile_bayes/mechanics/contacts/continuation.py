@@ -19,8 +19,6 @@ from tactile_bayes.mechanics.poses.pose import Pose
 from tactile_bayes.mechanics.poses.taylor import FARTHEST
 from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = ["NOWHERE", "Start", "State", "continued_state", "unloaded_arc"]
-
 _MOST_STEPS = 200
 
 _LEAST_STEP = 1e-9  # share of a continuation below which it ends

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 
-__all__ = ["ContactFit", "RawFit", "Reading", "SheetFit"]
-
 
 class Reading(NamedTuple):
     """Samples of forward contacts and their uncertainty, dimensionless."""

@@ -13,8 +13,6 @@ from tactile_bayes.mechanics.contacts.fits import RawFit, Reading
 from tactile_bayes.mechanics.contacts.states import contact_pair
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, mirrored_by
 
-__all__ = ["Room", "Workspace", "descents", "raw_fits"]
-
 _SAME = 1e-9  # distance [L] below which two contact points differ by rounding only
 
 

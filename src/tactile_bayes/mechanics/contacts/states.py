@@ -30,8 +30,6 @@ from tactile_bayes.mechanics.poses.taylor import (
 )
 from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = ["contact", "contact_of", "contact_pair", "write_contacts", "write_shapes"]
-
 _EXACT = 1e-6  # arc length [L] and angle [rad] that count as zero in Step 2 without errors
 
 

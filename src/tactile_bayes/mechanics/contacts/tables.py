@@ -21,17 +21,6 @@ from tactile_bayes.mechanics.poses.arc import arc_to, chord_deficit, chord_direc
 from tactile_bayes.mechanics.poses.chord import tangential_arc, tip_arc
 from tactile_bayes.numerics import chebyshev
 
-__all__ = [
-    "MOST_FRICTION",
-    "Tables",
-    "Workspace",
-    "in_polar",
-    "prepare",
-    "series",
-    "tables",
-    "workspace",
-]
-
 # Largest friction angle of the tables [rad]: nearer to the fold of the map the series would be longer.
 MOST_FRICTION = 0.58
 _TERMS = 10  # terms of each series in a cell of tip contact, in angle and in share

@@ -24,8 +24,6 @@ from tactile_bayes.mechanics.poses.beam import Varied, mirrored_by
 from tactile_bayes.mechanics.poses.chord import NO_ARC, tangential_arc, tip_arc
 from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = ["continued_wrenches", "wrenches"]
-
 _BEYOND = 1e-12  # angle by which rounding may turn a chord beyond the line of force through the pivot [rad]
 
 

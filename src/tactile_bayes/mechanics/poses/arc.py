@@ -26,19 +26,6 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled, inlined
 
-__all__ = [
-    "SHORT_COSINE",
-    "Arc",
-    "arc_and_slopes",
-    "arc_at",
-    "arc_to",
-    "chord_deficit",
-    "chord_deficit_rate",
-    "chord_direction",
-    "chord_direction_rate",
-    "slopes_by_chi",
-]
-
 # Cosine of the amplitude below which an arc is short: the closed forms of C and S cancel there; quadrature is used.
 SHORT_COSINE = math.cos(1.0)
 _HALVINGS = 5  # halvings of F(χ) after the first; a few terms of a series are exact for the remainder

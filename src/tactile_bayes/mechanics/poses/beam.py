@@ -44,36 +44,6 @@ from tactile_bayes.mechanics.poses.taylor import (
 )
 from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = [
-    "PARTS",
-    "Beam",
-    "Chord",
-    "Varied",
-    "WholePose",
-    "beam_of",
-    "beam_pose",
-    "bending",
-    "by_kind",
-    "chord_to",
-    "end_of_arc",
-    "free_end",
-    "from_tip",
-    "is_far_from_table",
-    "is_straight",
-    "lever_of_stem",
-    "loaded_part",
-    "mirrored_beam",
-    "mirrored_by",
-    "rest_curvature",
-    "rest_point",
-    "rubbed_otherwise",
-    "tip_pose",
-    "varied",
-    "varied_of",
-    "whole_pose",
-    "with_sign",
-]
-
 PARTS = 8  # number of parts of a rod between which a second contact is sought in `loaded_part`
 _MOST_STEPS, _SETTLED = 20, 1e-10  # largest number of Newton steps to a distance from the pivot, and the last one [L]
 

@@ -20,8 +20,6 @@ from tactile_bayes.mechanics.poses.arc import (
     slopes_by_chi,
 )
 
-__all__ = ["NO_ARC", "tangential_arc", "tip_arc"]
-
 _SETTLED = 1e-8  # relative Newton step after which only rounding errors are left
 _MAX_STEPS = 40
 

@@ -45,8 +45,6 @@ from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 from tactile_bayes.numerics import chebyshev
 from tactile_bayes.tasks import in_parts
 
-__all__ = ["GRADES", "NO_TABLE", "NO_TABLES", "Box", "ForwardTable", "Tables", "forward_table", "prepare"]
-
 _WORST = 1e-5  # largest error of the pose with which a table is of use
 # Nodes in a taper, bend and friction angle that vary, also for friction of either sense: angles of a wider range.
 _OUTER, _OUTER_OF_BOTH, _BOTH = (5, 5, 7), (5, 5, 12), 0.7

@@ -23,8 +23,6 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled, inlined
 
-__all__ = ["Jacobi", "jacobi", "jacobi_and_slopes"]
-
 _TERMS = 7  # terms of the power series
 _SMALL = 0.02  # largest parameter, with t scaled to one, for which these suffice: the remainder is below 1e-16
 

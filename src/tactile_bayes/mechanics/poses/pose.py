@@ -28,8 +28,6 @@ from typing import NamedTuple
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.jacobi import Jacobi, jacobi, jacobi_and_slopes
 
-__all__ = ["ACROSS", "Chord", "Pose", "by_arclength", "pose", "pose_and_slopes", "scaled"]
-
 ACROSS = 1e-6  # cosine of the angle of a chord to the rod that counts as zero: the rod goes no farther from the pivot
 
 

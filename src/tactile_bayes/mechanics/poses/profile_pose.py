@@ -26,8 +26,6 @@ from tactile_bayes.mechanics.poses.taylor import (
 )
 from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = ["at_contact", "part_along", "pose_along", "pose_along_and_slopes", "pose_along_in_phase"]
-
 
 @compiled
 def pose_along(profile: Profile, psi1: float, arclength: float, force: float, work: Floats) -> Pose:

@@ -31,19 +31,10 @@ from tactile_bayes.mechanics.poses.taylor import (
 )
 from tactile_bayes.mechanics.rods.profile import Profile
 
-__all__ = [
-    "Chord",
-    "beyond_along",
-    "chord_along",
-    "largest_bending_along",
-    "rest_along",
-    "shape_along",
-]
-
 _SAMPLES = 48  # points of a rod of length one, and one for each step, at which the bending is compared
 
 
-class Chord(NamedTuple):
+class RestPoint(NamedTuple):
     """Point of a rod at rest, in the frame of its base."""
 
     arclength: float  # arc length from where the rod begins [L]
@@ -90,7 +81,7 @@ def shape_along(
 
 
 @compiled
-def rest_along(profile: Profile, stem: float, arclength: float, work: Floats) -> Chord:
+def rest_along(profile: Profile, stem: float, arclength: float, work: Floats) -> RestPoint:
     """Point of the rod at rest at an arc length."""
     march = _at_rest(profile, begin(profile, 0.0, FORWARD, State(0.0, 0.0, stem, 0.0)), arclength, work)
     return _chord(profile, march.at, march.state)
@@ -111,7 +102,7 @@ def _at_rest(profile: Profile, march: March, until: float, work: Floats) -> Marc
 
 
 @compiled
-def chord_along(profile: Profile, stem: float, distance: float, work: Floats) -> Chord:
+def chord_along(profile: Profile, stem: float, distance: float, work: Floats) -> RestPoint:
     """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
 
     The rod is continued beyond its tip as in `contacts.states`."""
@@ -137,9 +128,9 @@ def chord_along(profile: Profile, stem: float, distance: float, work: Floats) ->
 
 
 @compiled
-def _chord(profile: Profile, arclength: float, at: State) -> Chord:
+def _chord(profile: Profile, arclength: float, at: State) -> RestPoint:
     curvature = rest_curvature_at(profile, cell_at(profile, arclength, FORWARD), arclength)
-    return Chord(arclength, math.hypot(at.u, at.v), math.atan2(at.v, at.u), at.psi, curvature)
+    return RestPoint(arclength, math.hypot(at.u, at.v), math.atan2(at.v, at.u), at.psi, curvature)
 
 
 @compiled

@@ -15,22 +15,6 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.pose import ACROSS, Chord, Pose, scaled
 from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
-__all__ = [
-    "BEYOND",
-    "COLUMNS",
-    "GROUP",
-    "MOST_FORCE",
-    "MOST_NODES",
-    "MOST_ROWS",
-    "SCALE",
-    "TERMS",
-    "chord_in",
-    "is_far",
-    "length_of",
-    "pose_in",
-    "sheet",
-]
-
 # Most terms in ψ1 or s1, terms in the force and in the distance of the rod at rest, and most nodes in what differs
 # between rods.
 MOST_ROWS, TERMS, MOST_NODES = 28, 24, 14

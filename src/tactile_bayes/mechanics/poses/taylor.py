@@ -36,32 +36,6 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.rods.profile import MOST_MODES, Profile
 
-__all__ = [
-    "BACKWARD",
-    "EXACT",
-    "FARTHEST",
-    "FORWARD",
-    "ROUGH",
-    "Followed",
-    "March",
-    "Slopes",
-    "State",
-    "Step",
-    "advance",
-    "arclength_to",
-    "begin",
-    "bending_at",
-    "cell_at",
-    "most_rest_curvature",
-    "moved",
-    "peak",
-    "point_at",
-    "rest_curvature_at",
-    "rise",
-    "workspace",
-    "write_shape",
-]
-
 _TERMS = 24  # terms of the series
 # Size of the last terms of a slope [rad], and that with which a rod is followed roughly, to a part in a thousand.
 EXACT, ROUGH = 1e-15, 1e-6

@@ -18,8 +18,6 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics import chebyshev
 from tactile_bayes.tasks.documents import read_json
 
-__all__ = ["MISS", "Along", "GivenAlong", "along", "modes_along", "text_along"]
-
 _ORDER = 12  # coefficients of the polynomials that represent a function
 MISS = 1e-12  # largest error of these, as a share of the largest value, if no other is stated
 _ROUNDING = 1e-15  # size of coefficients that are rounding errors, as a share of the largest

@@ -16,8 +16,6 @@ from tactile_bayes.checks import check_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.rods.along import Along, GivenAlong, along
 
-__all__ = ["MOST_MODES", "STEEPEST_TAPER", "Profile", "Rods", "profile_of", "rods_of"]
-
 STEEPEST_TAPER = 0.95  # largest taper: the rod bends 1.6e5 times as easily at its tip as at its base
 # Modes of the rest curvature: three hold 99.8 % of how far traced rods deflect otherwise than their mean.
 MOST_MODES = 3

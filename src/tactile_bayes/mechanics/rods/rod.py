@@ -18,8 +18,6 @@ from tactile_bayes.mechanics.rods.profile import MOST_MODES, STEEPEST_TAPER, Pro
 from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["LARGEST_STRAIN", "Rod", "round_rigidity"]
-
 _THICKEST = 1e70  # diameter whose fourth power overflows [m]
 # Turn between base and tip [rad] up to which every point of an arc is farther from the base than those before it.
 _MOST_TURN = math.pi

@@ -15,8 +15,6 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["Surface"]
-
 
 class Surface(NamedTuple):
     """Surface of a rod; lengths in rod lengths."""

@@ -28,8 +28,6 @@ from tactile_bayes.checks import check_numbers, check_positive
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["MeasuredCone", "TracedRod", "measured_cone", "traced_rod"]
-
 _FEWEST = 8  # least number of points: four for a linear curvature, and four for their scatter
 _FREE = 4  # unknowns without a prior: the offset of the base and its direction, level and trend of the curvature
 _TERMS = 20  # terms of the curvature
