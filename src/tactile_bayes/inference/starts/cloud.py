@@ -58,7 +58,7 @@ def gather(
     size = centre.size
     top = float(log_probability(centre[None])[0])
     for _ in range(_ROUNDS):
-        root = _square_root(covariance)
+        root = square_root(covariance)
         cloud = Cloud(centre, _WIDER * root, -np.inf, ends)
         points = cloud.draw(rng, 60 * size)
         values = log_probability(points)
@@ -80,7 +80,7 @@ def gather(
     return replace(cloud, floor=floor, is_possible=top > -np.inf)
 
 
-def _square_root(covariance: Floats) -> Floats:
+def square_root(covariance: Floats) -> Floats:
     """Return R with R Rᵀ the covariance, even if rounding has made that singular."""
     scale = np.sqrt(np.diag(covariance))
     values, axes = np.linalg.eigh(covariance / np.outer(scale, scale))

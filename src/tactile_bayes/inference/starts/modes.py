@@ -15,7 +15,7 @@ from tactile_bayes.inference.deadline import Deadline
 from tactile_bayes.inference.densities import ANYTHING, Ends, Proposal
 from tactile_bayes.inference.importance import EFFICIENT, approximate
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
-from tactile_bayes.inference.starts.cloud import Cloud, gather
+from tactile_bayes.inference.starts.cloud import Cloud, gather, square_root
 from tactile_bayes.inference.starts.contour_optimum import ContourOptimum, optima_of
 
 _MANY_SAMPLES = 100  # loaded ones, from which an optimum that explains the record is taken for the only one
@@ -89,10 +89,16 @@ class Modes:
         return tried >= _MAX_SEARCHES and (bool(self.found) or many_samples)
 
     def _is_known(self, optimum: ContourOptimum) -> bool:
-        """Return True if an optimum belongs to a mode that was found before."""
+        """Return True if an optimum belongs to a mode that was found before: it is near its own, or in its proposal."""
         point = optimum.point[None]
         far = _MODE_RADIUS * np.sqrt(point.size)
-        return any(np.linalg.norm(mode.proposal.steps(mode.coordinates.of(point))) < far for mode in self.found)
+        for mode in self.found:
+            # Along a bent ridge a proposal may leave out the optimum that it was made around.
+            off = (self._own.of(point) - self._own.of(mode.optimum.point[None]))[0]
+            steps = np.linalg.solve(square_root(mode.optimum.covariance), off)
+            if min(np.linalg.norm(steps), np.linalg.norm(mode.proposal.steps(mode.coordinates.of(point)))) < far:
+                return True
+        return False
 
     def _around(self, optimum: ContourOptimum) -> Mode:
         """Approximate a mode in the coordinates in which it is nearer to normal; modes on a flank share them."""
