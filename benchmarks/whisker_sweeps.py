@@ -59,7 +59,7 @@ UNTOUCHED = 15  # number of readings before contact
 BEFORE = np.radians(-108.0)  # bearing from which the probe arrives, on the other side of the whisker
 SWEEPS = tuple(f"cylinder_may25/trial{k}" for k in range(5)) + tuple(f"cylinder_may03/trial{k}" for k in range(1, 5))
 LONG = tb.SamplerSettings(walkers=40, min_ess=400, max_r_hat=1.03, max_seconds=420)
-ENOUGH = tb.SamplerSettings(min_ess=400, max_r_hat=1.03, max_seconds=300)
+ENOUGH = tb.SamplerSettings(ensembles=2, walkers=40, min_ess=400, max_r_hat=1.03, max_seconds=600)
 ENOUGH_OF_ANY_SHAPE = tb.SamplerSettings(min_ess=400, max_r_hat=1.03, max_seconds=1200)
 
 
