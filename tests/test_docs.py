@@ -139,7 +139,7 @@ def test_commands_and_options_that_are_shown_exist(path: Path) -> None:
 @pytest.mark.parametrize(
     ("families", "noise", "page"),
     [
-        (FAMILIES, "usual", ROOT / "README.md"),
+        (FAMILIES, "usual", DOCS / "trust.md"),
         pytest.param(FAMILIES, "tenth", DOCS / "trust.md", marks=pytest.mark.slow),
         (FAMILIES, "threefold", DOCS / "trust.md"),
         (STICKING, "usual", DOCS / "trust.md"),
@@ -149,6 +149,16 @@ def test_a_table_of_calibrations_is_that_of_the_published_replicates(
     families: dict[str, Family], noise: str, page: Path
 ) -> None:
     assert table(noise, published(families, noise)) in TEXTS[page]
+
+
+def test_readme_shows_rows_of_tables_in_the_docs() -> None:
+    shown = TEXTS[ROOT / "README.md"]
+    calibrations = [line for line in shown.split("\n") if line.startswith(("| band", "| contact"))]
+    ratios = [line.rstrip() for line in shown.split("\n") if re.search(r" µs +[\d,]+$| ms +[\d,]+$", line)]
+    assert len(calibrations) == 3
+    assert len(ratios) == 5
+    assert all(line in TEXTS[DOCS / "trust.md"] for line in calibrations)
+    assert all(line in TEXTS[DOCS / "comparisons.md"] for line in ratios)
 
 
 def test_every_notebook_is_named() -> None:
