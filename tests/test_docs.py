@@ -154,7 +154,7 @@ def test_a_table_of_calibrations_is_that_of_the_published_replicates(
 def test_readme_shows_rows_of_tables_in_the_docs() -> None:
     shown = TEXTS[ROOT / "README.md"]
     calibrations = [line for line in shown.split("\n") if line.startswith(("| band", "| contact"))]
-    ratios = [line.rstrip() for line in shown.split("\n") if re.search(r" µs +[\d,]+$| ms +[\d,]+$", line)]
+    ratios = [line.rstrip() for line in shown.split("\n") if re.search(r" [mnµ]s +[\d,]+$", line)]
     assert len(calibrations) == 3
     assert len(ratios) == 5
     assert all(line in TEXTS[DOCS / "trust.md"] for line in calibrations)
