@@ -3,7 +3,7 @@
 Truths are drawn from the default priors of a family and of the unknowns of the rig, at the usual noise, a tenth of
 it and three times as much; see `tactile_bayes.calibrate`. Results are kept in results/calibration, so that a run that
 was stopped goes on; a number stands for that of replicates. With the argument "published", the tables are those of the
-replicates in data/calibration.
+replicates in benchmarks/replicates, where "publish" writes what they need of the results.
 
 By name, all as "sticking", and at the usual noise only, there are also drives on which a rod may stick: "stage" and
 "stage-both", an upright whisker that is carried past one way, or both, and "turned", a rotation that turns back in
@@ -12,7 +12,7 @@ contact. In "stage-0.3" and the like the true coefficient of friction is this on
 
 from __future__ import annotations
 
-import json
+import csv
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -23,10 +23,11 @@ import xarray as xr
 
 import tactile_bayes as tb
 from tactile_bayes.calibration.calibrate import experiment_of
-from tactile_bayes.calibration.store import REPLICATES
+from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.calibration.summary import CLAIMS, summary
 
-OUT, PUBLISHED = Path("results/calibration"), Path(__file__).parents[1] / "data" / "calibration"
+OUT, PUBLISHED = Path("results/calibration"), Path(__file__).parent / "replicates"
+NUMBERS = (*CLAIMS, "converged", "check_passed")  # that the tables need, beside the ranks
 SEED = 2026
 
 
@@ -93,12 +94,28 @@ def published(families: Iterable[str], noise: str) -> dict[str, xr.Dataset]:
     """Return the calibrations whose replicates are published, by family."""
     found = {}
     for family in families:
-        path = PUBLISHED / folder_of(family, noise) / "replicates.json"
+        path = PUBLISHED / f"{folder_of(family, noise)}.csv"
         if path.exists():
-            rows = json.loads(path.read_text(encoding="utf-8"))["replicates"]
-            outcomes = {row["number"]: REPLICATES.decode(row) for row in rows}
+            with path.open(encoding="utf-8", newline="") as file:
+                outcomes = {number: _outcome(row) for number, row in enumerate(csv.DictReader(file))}
             found[family] = summary(experiment_of(**conditions(family, noise)), outcomes)
     return found
+
+
+def _outcome(row: dict[str, str]) -> Outcome:
+    known = {name: float(text) for name, text in row.items() if text}
+    ranks = {name: int(value) for name, value in known.items() if name not in NUMBERS}
+    return Outcome(ranks, {name: known[name] for name in NUMBERS if name in known}, "")
+
+
+def publish(family: str, noise: str, made: xr.Dataset) -> None:
+    """Write ranks and claims of a calibration, a row for each replicate."""
+    names = [name for name in NUMBERS if name in made]
+    columns = {str(name): made["ranks"].sel(quantity=name).values for name in made.quantity.values}
+    columns = {name: [rank if rank >= 0 else "" for rank in ranks] for name, ranks in columns.items()}
+    columns |= {name: [str(v) if np.isfinite(v) else "" for v in made[name].values.tolist()] for name in names}
+    with (PUBLISHED / f"{folder_of(family, noise)}.csv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file).writerows([columns, *zip(*columns.values(), strict=True)])
 
 
 def table(noise: str, calibrations: dict[str, xr.Dataset]) -> str:
@@ -150,6 +167,8 @@ def main(*chosen: str) -> None:
             made = published(families, noise)
         else:
             made = {name: calibrated(name, noise, count) for name in families}
+        for name, one in made.items() if "publish" in chosen else ():
+            publish(name, noise, one)
         print(f"\n{table(noise, made)}\n", flush=True)
 
 
