@@ -64,7 +64,8 @@ STICKING = {
     "stage-both-0.3": Family("upright, both ways, μ = 0.3", 200, (FORTH, BACK), 0.3),
     "turned": Family("rotations that turn back", 200, (tb.Motion(0.0, 0.0, np.radians([-30.0, 100.0, 60.0, 210.0])),)),
 }
-EVERY = {**FAMILIES, **STICKING}
+TRACED = {"traced": Family("traced rods", 200)}  # each swept with a rod of its own, by `benchmarks.traced`
+EVERY = {**FAMILIES, **STICKING, **TRACED}
 NOISES = {
     "usual": Noise("at the usual noise", 0.05, 0.02),
     "tenth": Noise("at a tenth of the noise", 0.005, 0.002),
@@ -82,9 +83,10 @@ def load_cell(noise: str) -> tb.LoadCell:
 
 def conditions(family: str, noise: str) -> dict[str, Any]:
     """Arguments of `calibrate` and `experiment_of`."""
-    one, found = EVERY[family], {"rig": tb.Rig(load_cell=load_cell(noise)), "rng": SEED, "family": family}
+    one, name = EVERY[family], family if family in FAMILIES else "parabola"
+    found = {"rig": tb.Rig(load_cell=load_cell(noise)), "rng": SEED, "family": name}
     if one.drive is not None:
-        found |= {"family": "parabola", "drive": one.drive}
+        found["drive"] = one.drive
     if one.friction is not None:
         found["truth"] = tb.Rig(unknown={"friction": one.friction})
     return found
@@ -106,6 +108,16 @@ def _outcome(row: dict[str, str]) -> Outcome:
     known = {name: float(text) for name, text in row.items() if text}
     ranks = {name: int(value) for name, value in known.items() if name not in NUMBERS}
     return Outcome(ranks, {name: known[name] for name in NUMBERS if name in known}, "")
+
+
+def pooled(family: str, noise: str, each: Iterable[xr.Dataset]) -> xr.Dataset:
+    """Return one calibration of replicates that were made one by one, each with a rig of its own."""
+    outcomes = {}
+    for number, one in enumerate(each):
+        of_one, names = one.isel(replicate=0), [name for name in NUMBERS if name in one]
+        ranks = {str(name): int(rank) for name, rank in zip(one.quantity.values, of_one["ranks"].values, strict=True)}
+        outcomes[number] = Outcome(ranks, {name: float(of_one[name]) for name in names}, str(of_one.message.values))
+    return summary(experiment_of(**conditions(family, noise)), outcomes)
 
 
 def publish(family: str, noise: str, made: xr.Dataset) -> None:

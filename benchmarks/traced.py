@@ -6,7 +6,8 @@ the errors over the standard deviations.
 
 With the argument "records" it prints how often intervals of 90 % hold in posteriors of records, each swept with a rod
 of its own, of which 25 points were traced with a scatter of a thousandth of the length; a number stands for that of
-records, and "tenth" for a tenth of the usual noise. Results are kept in results/traced.
+records, and "tenth" for a tenth of the usual noise. Results are kept in results/traced, and with "publish" what their
+table needs in benchmarks/replicates.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import xarray as xr
 from scipy.integrate import cumulative_simpson
 
 import tactile_bayes as tb
-from benchmarks.calibration import CLAIMS, load_cell
+from benchmarks.calibration import TRACED, load_cell, pooled, publish, table
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.rods.traced import traced_rod
@@ -117,21 +118,27 @@ def swept_rods(number: int) -> tuple[tb.Rod, tb.Rod]:
         return rod, tb.Rod.from_shape(*points(curvature, 25, 1e-3, rng)[:2])
 
 
-def records(count: int, noise: str) -> None:
-    cell, found = load_cell(noise), []
-    for number in range(count):
-        true, traced = swept_rods(number)
-        rig, out = tb.Rig(traced, cell), OUT / noise / str(number)
-        one = tb.calibrate("parabola", rig, truth=tb.Rig(true, cell), replicates=1, rng=number, out=out)
-        found.append(one)
-        every = xr.concat([each.coverage.reindex(claim=list(CLAIMS)) for each in found], "record").mean("record")
-        shares = [f"{name} {float(every.sel(claim=name)):.0%}" for name in CLAIMS]
-        print(f"{number + 1} records: {', '.join(shares)}; {one.attrs['verdict']}", flush=True)
+def records(count: int, noise: str) -> xr.Dataset:
+    true_and_traced = map(swept_rods, range(count))
+    return pooled("traced", noise, (record(number, *rods, noise) for number, rods in enumerate(true_and_traced)))
+
+
+def record(number: int, true: tb.Rod, traced: tb.Rod, noise: str) -> xr.Dataset:
+    """Calibrate by one replicate, or read it."""
+    cell, out = load_cell(noise), OUT / noise / str(number)
+    rig, truth = tb.Rig(traced, cell), tb.Rig(true, cell)
+    one = tb.calibrate("parabola", rig, truth=truth, replicates=1, rng=number, out=out)
+    print(f"record {number}: {str(one.message.values[0]).partition(':')[0]}", flush=True)
+    return one
 
 
 if __name__ == "__main__":
     numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
     if "records" in sys.argv:
-        records(*(numbers or [200]), "tenth" if "tenth" in sys.argv else "usual")
+        noise = "tenth" if "tenth" in sys.argv else "usual"
+        calibration = records(*(numbers or [TRACED["traced"].replicates]), noise)
+        print(f"{table(noise, {'traced': calibration})}\n\n{calibration.attrs['verdict']}")
+        if "publish" in sys.argv:
+            publish("traced", noise, calibration)
     else:
         main(*numbers)

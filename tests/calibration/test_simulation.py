@@ -157,6 +157,17 @@ def test_the_truth_has_what_is_known_of_it():
     assert made.truth["taper"] == 0.0  # as stated
 
 
+def test_the_modes_of_a_trace_have_no_true_value_if_the_rod_is_not_what_it_says():
+    s = np.linspace(0.0, 1.0, 25)
+    shaken = 1e-3 * np.random.default_rng(1).normal(size=(2, s.size))
+    traced = Rod.from_shape(s + shaken[0], shaken[1])
+    of_trace = {"rest_shape_1", "rest_shape_2", "rest_shape_3"}
+    unknown = {**NOTHING, "rest_shape": "default"}
+    made = simulated(rod=traced, unknown=unknown, truth=replace(real(), rod=Rod()))
+    assert not of_trace & set(made.truth)
+    assert of_trace & set(simulated(rod=traced, unknown=unknown).truth)
+
+
 @pytest.mark.parametrize("told", [pytest.param(0.0, marks=pytest.mark.slow), 0.1])
 def test_friction(told):
     made = simulated(unknown={**NOTHING, "friction": told}, truth=real(friction=0.3))

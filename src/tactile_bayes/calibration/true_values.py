@@ -20,7 +20,8 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
     """Return the true values of parameters by name, those drawn first, relative to the rod and load cell assumed.
 
     What has no true value is left out: the noise scale if channels differ, the noise of a load cell that states none,
-    the length of a discrepancy that the simulated rig does not have, and parameters of another family.
+    the length of a discrepancy that the simulated rig does not have, the modes of a trace if the rod is not what it
+    says, and parameters of another family.
     """
     known = {**simulated.own_family.known, **simulated.unknowns.known, **drawn}
     rod, stated = rod_of(simulated.record), rod_of(assumed.record)
@@ -35,8 +36,10 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
     }
     more = _differences(cell, stated_cell)
     times = {**_ratios(cell, stated_cell), "rigidity_scale": rod.flexural_rigidity / stated.flexural_rigidity}
-    found = {}
+    found, of_trace = {}, () if rod.rest_curvature == stated.rest_curvature else GROUPS["rest_shape"]
     for name in dict.fromkeys((*drawn, *assumed.priors)):
+        if name in of_trace:
+            continue
         value = values.get(name, _neutral(name))
         if value is not None and math.isfinite(times.get(name, 1.0)):
             found[name] = times.get(name, 1.0) * (value + more.get(name, 0.0))
