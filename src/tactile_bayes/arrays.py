@@ -17,7 +17,7 @@ Index: TypeAlias = NDArray[np.intp]
 """Whole numbers of any shape that count along an axis."""
 
 
-class Draws(Protocol):
+class RandomSource(Protocol):
     """Source of random numbers: a `Generator`, or many side by side."""
 
     def standard_normal(self, size: tuple[int, ...], /) -> Any: ...

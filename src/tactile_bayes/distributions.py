@@ -42,7 +42,7 @@ class Distribution(Protocol):
     def std(self) -> Any: ...
 
 
-class Kind(NamedTuple):
+class DistributionKind(NamedTuple):
     """A distribution by the name and the numbers that a table states."""
 
     size: int
@@ -59,7 +59,7 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "uniform": Kind(
+    "uniform": DistributionKind(
         2,
         lambda low, high: low < high,
         "the first must be below the second",
@@ -68,7 +68,7 @@ KINDS = {
         lambda n: (n["loc"], n["loc"] + n["scale"]),
         lambda low, high, share: low + (high - low) * share,
     ),
-    "log_uniform": Kind(
+    "log_uniform": DistributionKind(
         2,
         lambda low, high: 0.0 < low < high,
         "both must be positive, the first below the second",
@@ -77,7 +77,7 @@ KINDS = {
         lambda n: None if n["loc"] else (n["a"] * n["scale"], n["b"] * n["scale"]),
         lambda low, high, share: np.exp(math.log(low) + math.log(high / low) * share),
     ),
-    "normal": Kind(
+    "normal": DistributionKind(
         2,
         lambda mean, deviation: deviation >= 0.0,
         "they are mean and standard deviation, which is not negative",
@@ -86,7 +86,7 @@ KINDS = {
         lambda n: (n["loc"], n["scale"]),
         lambda mean, deviation, share: mean + deviation * ndtri(open_share(share)),
     ),
-    "log_normal": Kind(
+    "log_normal": DistributionKind(
         2,
         lambda median, deviation: median > 0.0 and deviation >= 0.0,
         "they are the median, positive, and the logarithm's standard deviation, which is not negative",
@@ -95,7 +95,7 @@ KINDS = {
         lambda n: None if n["loc"] else (n["scale"], n["s"]),
         lambda median, deviation, share: median * np.exp(deviation * ndtri(open_share(share))),
     ),
-    "half_normal": Kind(
+    "half_normal": DistributionKind(
         1,
         lambda scale: scale >= 0.0,
         "it is the scale, which is not negative",

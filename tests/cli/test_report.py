@@ -14,7 +14,7 @@ from tactile_bayes.cli.command import Output
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.record import write_record
 from tactile_bayes.report.overlay import Laid
-from tactile_bayes.report.writing import Written
+from tactile_bayes.report.writing import WrittenPage
 from tactile_bayes.rig import Rig
 from tactile_bayes.uncertainty import contour_band, overlay_distance, read_overlay
 from tactile_bayes.uncertainty.summary import reach
@@ -95,7 +95,7 @@ def test_json_for_scripts(folder, tmp_path, monkeypatch):
     def write(run, path, *options):
         assert run == [folder]
         path.write_text("a page", encoding="utf-8")
-        return Written(path, Laid("", {}), None)
+        return WrittenPage(path, Laid("", {}), None)
 
     monkeypatch.setattr("tactile_bayes.report.writing.report_into", write)
     result = call(folder, "--out", out, "--json")

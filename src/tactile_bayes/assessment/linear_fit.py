@@ -11,7 +11,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.numerics.blocks import blocks
-from tactile_bayes.planning.error_covariance import Whitening, whitening
+from tactile_bayes.planning.error_covariance import NoiseWhitening, whitening
 from tactile_bayes.planning.record_information import prior_precision, scaled_cell
 
 # Number of Gauss-Newton steps before the last; starts are draws of the posterior, or truths of predicted records.
@@ -124,7 +124,7 @@ class Linearisation:
         self._mean, self._prior = np.array(means), precision * np.outer(self._scales, self._scales)
         margin, ends = 2.0 * _DIFFERENCE * self._scales, model.ends  # differences stay within the bounds
         self._low, self._high = ends.low[: self._count] + margin, ends.high[: self._count] - margin
-        self._shared: Whitening | None = None
+        self._shared: NoiseWhitening | None = None
         cell, (samples, channels) = model.likelihood.load_cell, model.likelihood.measured.shape
         if samples * channels > _MOST_CORRELATED and np.any(wandering_deviation(cell, samples)):
             raise InferenceError(
@@ -211,7 +211,7 @@ class Linearisation:
     def _off(self, readings: Floats, expected: Floats) -> Floats:
         return np.nan_to_num(readings - expected)[..., None]
 
-    def _whitening(self, point: Floats, expected: Floats, by_angle: Floats | None) -> tuple[Whitening, Floats]:
+    def _whitening(self, point: Floats, expected: Floats, by_angle: Floats | None) -> tuple[NoiseWhitening, Floats]:
         """Return the whitening at a point, and the standard deviation of each channel, shape (3,)."""
         cell = scaled_cell(self.model.likelihood.load_cell, self.model.noise_scale(point[None])[0])
         noise = np.asarray(np.where(cell.noise > 0.0, cell.noise, 1.0), dtype=np.float64)

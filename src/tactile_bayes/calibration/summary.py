@@ -26,7 +26,7 @@ CLAIMS = {
 }
 
 
-class Described(Protocol):
+class Repeated(Protocol):
     """An experiment that was repeated."""
 
     @property
@@ -43,7 +43,7 @@ class _Fault(NamedTuple):
     message: str
 
 
-def summary(experiment: Described, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
+def summary(experiment: Repeated, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
     """Return the result of a calibration; see `calibrate`."""
     numbers = sorted(outcomes)
     rows = [outcomes[number] for number in numbers]

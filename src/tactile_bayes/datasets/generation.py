@@ -182,7 +182,7 @@ def _drawn(
 
 
 def _keep(
-    spec: Specification, records: Records, candidates: _Candidates, tried: Mapping[int, _Tried], is_kept: Flags
+    spec: Specification, records: Records, candidates: _Candidates, tried: Mapping[int, _Followed], is_kept: Flags
 ) -> None:
     """Write accepted candidates to their records."""
     count, sweeps = records.index.size, spec.sweep_count
@@ -227,7 +227,7 @@ def _turns(spec: Specification, index: Index) -> dict[str, Index]:
     return turns
 
 
-class _Tried(NamedTuple):
+class _Followed(NamedTuple):
     """Sweeps along the valid contours of one group, with the sweeps of a candidate side by side."""
 
     candidate: Index  # indices of the candidates
@@ -236,9 +236,9 @@ class _Tried(NamedTuple):
     units: ManyUnits
 
 
-def _tried(spec: Specification, candidates: _Candidates) -> tuple[NDArray[Any], dict[int, _Tried]]:
+def _tried(spec: Specification, candidates: _Candidates) -> tuple[NDArray[Any], dict[int, _Followed]]:
     """Test candidates: the reason for each rejection, `_GOOD` without one, and sweeps by group."""
-    why, tried = np.full(candidates.row.size, _GOOD, dtype=object), dict[int, _Tried]()
+    why, tried = np.full(candidates.row.size, _GOOD, dtype=object), dict[int, _Followed]()
     for g in np.unique(candidates.group).tolist():
         contours, built = _built(spec, g, candidates, why)
         if contours is not None:
@@ -269,7 +269,7 @@ def _built(spec: Specification, g: int, candidates: _Candidates, why: NDArray[An
     return (contour(its).broadcast_to(its.shape) if its.size else None), its
 
 
-def _swept(spec: Specification, contours: Contour, candidate: Index, values: Mapping[str, Floats]) -> _Tried:
+def _swept(spec: Specification, contours: Contour, candidate: Index, values: Mapping[str, Floats]) -> _Followed:
     """Sweep along contours, given the numbers of rods and pivots as they are built."""
     place = np.repeat(np.arange(candidate.size), spec.sweep_count)
     count = candidate.size
@@ -299,7 +299,7 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
         polished=False,
         lines=drives.lines,
     )
-    return _Tried(candidate, paths, drives, units)
+    return _Followed(candidate, paths, drives, units)
 
 
 def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
@@ -311,7 +311,7 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
     return np.where((fate == Reachability.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
 
 
-def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
+def _of_sweeps(spec: Specification, tried: _Followed) -> dict[str, NDArray[Any]]:
     """Columns of every sweep, shape (n,)."""
     paths = tried.paths
     phases = np.array([_touching(phases) for phases in phases_of(paths)], dtype=object)
@@ -337,7 +337,7 @@ def _touching(phases: str) -> str:
     return "-".join(phase for phase, _ in groupby(phases.upper().split("-")))
 
 
-def _of_samples(tried: _Tried, index: Index) -> dict[str, NDArray[Any]]:
+def _of_samples(tried: _Followed, index: Index) -> dict[str, NDArray[Any]]:
     """Columns of the samples of sweeps, shape (*index.shape, k)."""
     paths, way, ends = tried.paths, tried.drives.way, tried.drives.ends
     samples = sweep_samples(paths, tried.units, index)

@@ -80,7 +80,7 @@ def bridge_evidence(
     )
 
 
-def _fitted(points: Floats) -> _Fit:
+def _fitted(points: Floats) -> _ScoreFit:
     """Return the fit to points, (n, d), along parameters, which resolves bounds, or uncorrelated axes: the likelier."""
     deviation = points.std(axis=0)
     same = np.flatnonzero(deviation <= 0.0)
@@ -91,7 +91,7 @@ def _fitted(points: Floats) -> _Fit:
         if not sizes[0] > _FLAT * sizes[-1]:
             raise np.linalg.LinAlgError
         uncorrelated = directions / np.sqrt(sizes) @ directions.T / deviation[:, None]
-        fits = [_Fit(points, axes) for axes in (np.diag(1.0 / deviation), uncorrelated)]
+        fits = [_ScoreFit(points, axes) for axes in (np.diag(1.0 / deviation), uncorrelated)]
     except np.linalg.LinAlgError:
         raise InferenceError(
             "a half of the draws lies in a plane: give more draws, or fewer parameters if one follows from others"
@@ -103,7 +103,7 @@ def _covariance(points: Floats) -> Floats:
     return np.atleast_2d(np.cov(points.T))
 
 
-class _Fit:
+class _ScoreFit:
     """A normal distribution of normal scores along axes."""
 
     def __init__(self, points: Floats, axes: Floats) -> None:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Draws, Floats
+from tactile_bayes.arrays import Floats, RandomSource
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 
@@ -15,7 +15,7 @@ from tactile_bayes.load_cell.discrepancy import Discrepancy
 def corrupted_loads(
     sheet: DataSheet,
     loads: Floats,
-    rng: Draws,
+    rng: RandomSource,
     noise_scale: ArrayLike = 1.0,
     discrepancy: Discrepancy | None = None,
     zeros: ArrayLike = 0.0,
@@ -43,7 +43,7 @@ def corrupted_loads(
     return rounded(readings, sheet.resolution)
 
 
-def corrupted_angles(sheet: DataSheet, angles: Floats, direction: ArrayLike, rng: Draws) -> Floats:
+def corrupted_angles(sheet: DataSheet, angles: Floats, direction: ArrayLike, rng: RandomSource) -> Floats:
     """Simulate readings of drive angles of any shape: offset, backlash by the direction, noise, then the steps."""
     noise = sheet.drive_angle_noise * rng.standard_normal(angles.shape)
     return rounded(angles + sheet.misread(direction) + noise, np.array(sheet.drive_angle_resolution))

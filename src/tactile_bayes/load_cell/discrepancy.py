@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tactile_bayes.arrays import Draws, Floats, Index
+from tactile_bayes.arrays import Floats, Index, RandomSource
 from tactile_bayes.checks import check_array, check_kind, check_numbers, refused
 
 __all__ = ["Course", "Discrepancy", "joined"]
@@ -115,7 +115,7 @@ class Discrepancy:
         together[np.ix_(self.course.order, self.course.order)] = ordered
         return np.asarray(self.deviation[:, None] * together[..., None] * self.deviation)
 
-    def draw(self, rng: Draws) -> Floats:
+    def draw(self, rng: RandomSource) -> Floats:
         """Draw discrepancies, shape (..., samples, 3)."""
         batch, rate = self.deviation.shape[:-2], self.rate
         normal = np.moveaxis(rng.standard_normal((*self.deviation.shape, 2)), -3, 0)

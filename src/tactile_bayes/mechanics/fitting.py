@@ -203,11 +203,13 @@ class _Descent:
 
     def go(self, who: Index, gain: float, most_steps: int) -> None:
         """Descend with the samples `who` until the gain that the next step promises is small."""
-        from tactile_bayes.mechanics.contacts.single_sample import Workspace, descents
+        from tactile_bayes.mechanics.contacts.single_sample import SampleWorkspace, descents
         from tactile_bayes.mechanics.poses.beam import varied_of  # numba takes a second to load
 
         count, target = len(self._free), self._target
-        workspace = Workspace(np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), contact_workspace())
+        workspace = SampleWorkspace(
+            np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), contact_workspace()
+        )
         of_rods = target.rods.curvature, varied_of(target.rods.profile), target.rods.stem
         known = target.reading, *of_rods, target.whitening, who, np.array(self._free)
         descents(*known, gain, most_steps, self.z, self.misfit, self._normal, self._hardness, workspace)

@@ -39,7 +39,7 @@ class States(NamedTuple):
         return States(self.parameter[where], self.x[where], self.y[where], self.slope_angle[where], Wrench(*wrench))
 
 
-class Mode(NamedTuple):
+class ContactMode(NamedTuple):
     """How rod and object touch along a part of a path."""
 
     tip: bool  # true if the tip touches, else the rod
@@ -135,13 +135,13 @@ class Paths:
         shape (*index.shape,); NaN out of contact."""
         return _as_states(self.sampled[index, sample])
 
-    def modes(self) -> list[list[Mode]]:
+    def modes(self) -> list[list[ContactMode]]:
         """Return how each path touches, one after the other."""
         column = {name: self.events[..., k] for k, name in enumerate(STATE_COLUMNS)}
         to_right = (column["friction_angle"] < 0.0) != self.sweep_frame.mirrored[:, None]
         found = zip(column["phase"] == TIP, column["sticks"] > 0.0, to_right, self.phases, strict=True)
         return [
-            [Mode(*map(bool, one)) for one in zip(tip[:n], sticks[:n], right[:n], strict=True)]
+            [ContactMode(*map(bool, one)) for one in zip(tip[:n], sticks[:n], right[:n], strict=True)]
             for tip, sticks, right, n in found
         ]
 

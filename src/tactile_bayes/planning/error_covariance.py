@@ -13,7 +13,7 @@ from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.discrepancy import Discrepancy
 
 
-class Whitening(NamedTuple):
+class NoiseWhitening(NamedTuple):
     """Linear map of readings to independent ones of unit variance."""
 
     present: Flags  # true for channels that were measured, shape (3,)
@@ -34,7 +34,7 @@ class Whitening(NamedTuple):
 
 def whitening(
     cell: LoadCell, loads: Floats, by_angle: Floats, present: Flags, discrepancy: Discrepancy | None = None
-) -> Whitening:
+) -> NoiseWhitening:
     """Return the whitening of the readings of loads, with errors of the encoder to first order.
 
     Shapes: loads (samples, 3), by_angle (samples, 3), present (3,).
@@ -47,7 +47,7 @@ def whitening(
     index = np.arange(3)
     if not shared:
         chosen = covariance[:, present][:, :, present]
-        return Whitening(present, np.asarray(np.linalg.inv(np.linalg.cholesky(chosen))), None)
+        return NoiseWhitening(present, np.asarray(np.linalg.inv(np.linalg.cholesky(chosen))), None)
     covariance[:, index, index] -= wandering**2
     chosen = covariance[:, present][:, :, present]
     channels = int(present.sum())
@@ -59,7 +59,7 @@ def whitening(
     for c in range(channels):
         whole[:, c, :, c] += sums[..., c]
     size = samples * channels
-    return Whitening(present, None, np.asarray(np.linalg.cholesky(whole.reshape(size, size))))
+    return NoiseWhitening(present, None, np.asarray(np.linalg.cholesky(whole.reshape(size, size))))
 
 
 def _wandering(cell: LoadCell, samples: int) -> Floats:

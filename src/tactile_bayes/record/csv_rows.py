@@ -80,8 +80,8 @@ def read_rows(file: BinaryIO, layout: Layout, source: Source) -> tuple[dict[str,
 def _read_once(
     chunks: Iterator[bytes], layout: Layout, most: int, source: Source
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
-    columns = {name: _Column(most) for name in layout.names}
-    lines = _Column(most)
+    columns = {name: _Values(most) for name in layout.names}
+    lines = _Values(most)
     lines.append(np.empty(0, np.int64))
     above = layout.line
     for chunk in chunks:
@@ -110,7 +110,7 @@ def _chunks(file: BinaryIO) -> Iterator[bytes]:
         yield rest
 
 
-class _Column:
+class _Values:
     """The values of a column one after the other. Numbers go into one array: memory that is never written to costs
     nothing, and that of many small arrays would not be given back. A word that comes again is kept once.
     """

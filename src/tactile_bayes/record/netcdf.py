@@ -15,7 +15,7 @@ import h5netcdf
 import xarray as xr
 from xarray.backends import H5NetCDFStore, InMemoryDataStore
 
-from tactile_bayes.record.netcdf_content import Group, UnsafeError, content_of
+from tactile_bayes.record.netcdf_content import FileGroup, UnsafeError, content_of
 from tactile_bayes.record.netcdf_process import content_elsewhere
 from tactile_bayes.record.table import Source, Table, table_of
 from tactile_bayes.tasks import write_atomically
@@ -96,7 +96,7 @@ def read_netcdf(
     return result
 
 
-def _dataset(group: Group, options: Mapping[str, Any]) -> xr.Dataset:
+def _dataset(group: FileGroup, options: Mapping[str, Any]) -> xr.Dataset:
     variables = {
         name: xr.Variable(dims, values, attrs, {"dtype": str if values.dtype.kind == "O" else values.dtype})
         for name, (dims, values, attrs) in group.variables.items()

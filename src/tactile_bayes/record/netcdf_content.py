@@ -38,7 +38,7 @@ class UnsafeError(ValueError):
     """A file is whole, as far as is known, and is not to be read all the same."""
 
 
-class Group(NamedTuple):
+class FileGroup(NamedTuple):
     """A group of a file."""
 
     # Dimensions, values as stored, and attributes, by name.
@@ -54,7 +54,7 @@ def is_cut_short(content: bytes) -> bool:
     return begin is not None and int.from_bytes(content[begin : begin + 8], "little") > len(content)
 
 
-def content_of(content: bytes, with_groups: bool) -> dict[str, Group]:
+def content_of(content: bytes, with_groups: bool) -> dict[str, FileGroup]:
     """Return the content of a NetCDF 4 file by the path of its groups, or of the root alone; refuse an unsafe one."""
     with h5py.File(io.BytesIO(content), "r") as hdf5:
         refuse_unsafe(hdf5, len(content))
@@ -82,7 +82,7 @@ def refuse_unsafe(hdf5: h5py.File, size: int) -> None:
             if len(known) > _OBJECTS:
                 raise UnsafeError(f"it has more than {_OBJECTS:,} groups and variables")
             _refuse_attributes(part, size)
-            if isinstance(part, h5py.Group):
+            if isinstance(part, h5py.FileGroup):
                 waiting.append((part, depth + 1))
             elif isinstance(part, h5py.Dataset):
                 total += _size_of(part, size)
@@ -97,7 +97,7 @@ def refuse_unsafe_variable(hdf5: h5py.File, name: str, size: int) -> None:
     _size_of(part, size)
 
 
-def _part_of(group: h5py.Group, name: str) -> h5py.HLObject:
+def _part_of(group: h5py.FileGroup, name: str) -> h5py.HLObject:
     """Return a group or variable, and refuse a link."""
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         raise UnsafeError(f"{group.name.rstrip('/')}/{name} is a link, which may lead to another file")
@@ -147,18 +147,18 @@ def _refuse_attributes(part: h5py.HLObject, size: int) -> None:
             raise UnsafeError(f"the attribute {name} of {part.name} is said to have {stored:,} bytes")
 
 
-def _groups(path: str, group: h5netcdf.Group) -> Iterator[tuple[str, Group]]:
+def _groups(path: str, group: h5netcdf.FileGroup) -> Iterator[tuple[str, FileGroup]]:
     yield path, _group(group)
     for name, part in group.groups.items():
         yield from _groups(f"{path.rstrip('/')}/{name}", part)
 
 
-def _group(group: h5netcdf.Group) -> Group:
+def _group(group: h5netcdf.FileGroup) -> FileGroup:
     variables = {
         name: (variable.dimensions, _plain(variable[...]), _attributes(variable))
         for name, variable in group.variables.items()
     }
-    return Group(variables, _attributes(group))
+    return FileGroup(variables, _attributes(group))
 
 
 def _plain(values: Any) -> NDArray[Any]:
@@ -167,7 +167,7 @@ def _plain(values: Any) -> NDArray[Any]:
     return array.astype(np.dtype(array.dtype.str), copy=False) if array.dtype.kind != "O" else array.astype(object)
 
 
-def _attributes(of: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
+def _attributes(of: h5netcdf.FileGroup | h5netcdf.Variable) -> dict[str, Any]:
     """Return attributes, texts as such, as xarray does."""
     found = dict(of.attrs)
     for name, value in found.items():
@@ -180,7 +180,7 @@ def _attributes(of: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
 # ---- from the script to the process that waits for it
 
 
-def send(groups: Mapping[str, Group], write: Callable[[bytes], object]) -> None:
+def send(groups: Mapping[str, FileGroup], write: Callable[[bytes], object]) -> None:
     """Write groups as arrays of numbers, one after the other; the first is a table of everything, as JSON."""
     arrays: list[NDArray[Any]] = []
     table = {
@@ -199,12 +199,12 @@ def send(groups: Mapping[str, Group], write: Callable[[bytes], object]) -> None:
         np.save(file, array, allow_pickle=False)
 
 
-def received(file: BinaryIO) -> dict[str, Group]:
+def received(file: BinaryIO) -> dict[str, FileGroup]:
     """Return the groups that `send` has written."""
     count, table = json.loads(np.load(file, allow_pickle=False).tobytes())
     arrays = [np.load(file, allow_pickle=False) for _ in range(count)]
     return {
-        path: Group(
+        path: FileGroup(
             {
                 name: (tuple(dims), _unpacked(values, arrays), _all_unpacked(attrs, arrays))
                 for name, (dims, values, attrs) in group["variables"].items()

@@ -9,10 +9,10 @@ import sys
 from signal import Signals
 
 from tactile_bayes.record import netcdf_content
-from tactile_bayes.record.netcdf_content import Group, UnsafeError, is_cut_short, received, time_limit
+from tactile_bayes.record.netcdf_content import FileGroup, UnsafeError, is_cut_short, received, time_limit
 
 
-def content_elsewhere(content: bytes, with_groups: bool) -> dict[str, Group]:
+def content_elsewhere(content: bytes, with_groups: bool) -> dict[str, FileGroup]:
     """Return what `content_of` returns, or raise what it raises, from a process with limits of time and memory.
 
     The process runs a script, not a function of multiprocessing: it then needs no `__main__` that can be imported, and

@@ -24,7 +24,7 @@ _POINTS = 33
 
 
 @dataclass(frozen=True)
-class Motion:
+class Frames:
     """Rods along the most probable contour, at samples of a record, sweep after sweep; in the record's units.
 
     Attributes
@@ -69,7 +69,7 @@ class Motion:
     every: int
 
 
-def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
+def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Frames:
     """Return the rods of the most probable draw, with its rigidity, encoder, friction, suspension and pivots."""
     record = record_of(posterior)
     best = posterior["sample_stats"]["lp"].argmax(("chain", "draw"))
@@ -103,7 +103,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     first = likelihood.segments.bases[batch_index]
     base_x = paths.sweep_frame.base_x[batch_index] + base_x - first[:, 0]
     base_y = paths.sweep_frame.base_y[batch_index] + base_y - first[:, 1]
-    return Motion(
+    return Frames(
         contour=contour.take(np.array(0)),
         samples=samples,
         sweep=numbers[samples],

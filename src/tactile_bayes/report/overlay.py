@@ -11,7 +11,7 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.report.drawing import Plot
-from tactile_bayes.report.wording import Shown, Table, percent, shown_as
+from tactile_bayes.report.wording import PageTable, Shown, percent, shown_as
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.uncertainty.overlay import Distance, Overlay, overlay_distance
 
@@ -92,7 +92,7 @@ def distance_cells(distance: Distance, unit: Shown) -> list[str]:
     return [unit.text(distance.rms, 3), unit.text(distance.largest, 3), inside]
 
 
-def overlay_table(band: xr.Dataset, overlay: Overlay) -> Table:
+def overlay_table(band: xr.Dataset, overlay: Overlay) -> PageTable:
     """Return the distance of a contour from another one as a table of one row."""
     found = overlay_distance(band, overlay)
     unit = shown_as("contact_x", band["x"].attrs, band["x"].values)
@@ -101,7 +101,7 @@ def overlay_table(band: xr.Dataset, overlay: Overlay) -> Table:
     heads = ["overlaid", *heads, f"largest at x{unit.bracketed}", "both from", "to"]
     places = [unit.text(value) for value in (found.at, found.left, found.right)]
     row = [overlay.name, *distance_cells(found, fine), *places]
-    return Table(f"Distance of the median from {overlay.name}", heads, [row])
+    return PageTable(f"Distance of the median from {overlay.name}", heads, [row])
 
 
 def note_of(overlay: Overlay, band: xr.Dataset) -> list[str]:

@@ -18,7 +18,7 @@ from tactile_bayes.report.overlay import note_of, overlay_table
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
 from tactile_bayes.report.trust import check_messages, check_table, contacts_messages, convergence, trust_tables
-from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as, spread
+from tactile_bayes.report.wording import PageTable, chance, fixed, percent, sentence, shown_as, spread
 
 _WELL = "All is well"  # beginning of the first verdict if nothing is wrong
 
@@ -43,7 +43,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "answer": _answer(findings),
         "dimensionless": attrs["units"] == "dimensionless",
         "contour": contour,
-        "band_table": Table(
+        "band_table": PageTable(
             f"The band at some positions{contour.unit.bracketed}", ["x", "lower", "median", "upper"], contour.rows, 0
         ),
         "overlay": findings.overlay and overlay_table(findings.band, findings.overlay),
@@ -67,7 +67,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
             (channel, label, unit, readings.data["said"][channel][first]) for channel, label, unit in readings.channels
         ],
         "motion_every": motion.every,
-        "all_readings": Table("The readings", ["sample", "sweep", "φ₀ [°]", *travel, *heads], readings.rows, 0),
+        "all_readings": PageTable("The readings", ["sample", "sweep", "φ₀ [°]", *travel, *heads], readings.rows, 0),
         "everything": _parameters(findings, mute=False) if any(map(is_direction, stats.parameter.values)) else None,
         "approximations": str(attrs.get("approximations", "")),
         "command": command_of(attrs),
@@ -166,12 +166,12 @@ def _shapes(comparison: xr.Dataset | None) -> dict[str, Any] | None:
     heads = ["shape", "probability", "log evidence", "check p", "fits"]
     return {
         "verdict": str(comparison.attrs["verdict"]),
-        "table": Table("Shapes, given that it is one of them", heads, rows),
+        "table": PageTable("Shapes, given that it is one of them", heads, rows),
         "bars": bars,
     }
 
 
-def _parameters(findings: Findings, *, mute: bool) -> Table:
+def _parameters(findings: Findings, *, mute: bool) -> PageTable:
     family = str(findings.posterior.attrs["family"])
     rows = []
     for name in findings.numbers["quantity"].values:
@@ -184,7 +184,7 @@ def _parameters(findings: Findings, *, mute: bool) -> Table:
     share = percent(findings.probability)
     heads = ["quantity", "meaning", "unit", "estimate", f"{share} from", "to", "R̂", "ESS bulk", "ESS tails"]
     caption = "Estimates are medians, intervals central" if mute else "All parameters, and the gap"
-    return Table(caption, heads, rows, 3)
+    return PageTable(caption, heads, rows, 3)
 
 
 def parameter_cells(row: xr.Dataset, family: str) -> list[str]:

@@ -25,7 +25,7 @@ from tactile_bayes.record import (
 )
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
 from tactile_bayes.report.findings import Findings
-from tactile_bayes.report.frames import Motion
+from tactile_bayes.report.frames import Frames
 from tactile_bayes.report.wording import Shown, percent, shown_as
 
 _WORDS = {"holding_moment": "holding moment", "force_x": "force x", "force_y": "force y"}
@@ -62,7 +62,7 @@ def channel_names(record: xr.Dataset) -> dict[str, str]:
     return _WORDS | (_TURNING if frame_of(record) == "turning" else {})
 
 
-def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
+def readings_figure(findings: Findings, motion: Frames) -> ReadingsFigure:
     """Draw the readings along the drive, and the rod at the largest load of the first sweep."""
     record, present = findings.record, present_channels(findings.record)
     words = channel_names(record)
@@ -127,7 +127,7 @@ def _sweep_name(record: xr.Dataset, number: int) -> str:
     return name if len(bases) == 1 else f"{name}, pivot {bases.index(pivot) + 1}"
 
 
-def _in_frame(findings: Findings, motion: Motion) -> Floats:
+def _in_frame(findings: Findings, motion: Frames) -> Floats:
     """Return the loads of the rod along the axes of the load cell, shape (n, 3)."""
     if frame_of(findings.record) == "fixed":
         return motion.loads
@@ -135,7 +135,7 @@ def _in_frame(findings: Findings, motion: Motion) -> Floats:
     return np.stack([moment, *turned(force_x, force_y, motion.cell_angle)], axis=-1)
 
 
-def _rods(findings: Findings, motion: Motion, first: int) -> tuple[Markup, dict[str, Any]]:
+def _rods(findings: Findings, motion: Frames, first: int) -> tuple[Markup, dict[str, Any]]:
     """Return the map of the rod in one frame, and all frames, in the drawing's own units."""
     attrs = findings.record["base_x"].attrs
     x, y = motion.rod_x, motion.rod_y
@@ -270,14 +270,14 @@ def _places(findings: Findings, along: DriveAxis, events: xr.Dataset, event: str
     return places
 
 
-def _length(findings: Findings, motion: Motion) -> Shown:
+def _length(findings: Findings, motion: Frames) -> Shown:
     """Return the unit in which lengths beside the rod are shown."""
     about = np.concatenate([motion.rod_x.ravel(), motion.rod_y.ravel()])
     return shown_as("contact_x", findings.record["base_x"].attrs, about)
 
 
 def _said(
-    findings: Findings, motion: Motion, shown: Mapping[str, Shown], bent: Floats
+    findings: Findings, motion: Frames, shown: Mapping[str, Shown], bent: Floats
 ) -> tuple[dict[str, Any], list[list[str]]]:
     """Return the entries of the table beside the rod in every frame, and a table of all readings."""
     record, interval, present = findings.record, findings.interval, present_channels(findings.record)

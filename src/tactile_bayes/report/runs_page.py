@@ -24,7 +24,7 @@ from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.report.findings import contour_posterior, probability_of
 from tactile_bayes.report.overlay import DISTANCE_HEADS, Laid, distance_cells, note_of
 from tactile_bayes.report.runs_figure import runs_figure
-from tactile_bayes.report.wording import Table, percent, shown_as, spread
+from tactile_bayes.report.wording import PageTable, percent, shown_as, spread
 from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.runs.names import MANY
 from tactile_bayes.uncertainty.band import contour_band
@@ -146,7 +146,7 @@ def _table(
     found: Mapping[Path, _Found],
     out: Path,
     reference: Overlay,
-) -> Table:
+) -> PageTable:
     """Return a row for each run, of one that failed with the reason."""
     columns = list(dict.fromkeys(column for each in found.values() for column in each.shown))
     widths = {path: each.band["upper"].values - each.band["lower"].values for path, each in found.items()}
@@ -180,7 +180,7 @@ def _table(
         "Estimates are medians with central intervals, widths of bands medians over x; distances are those of the "
         f"median contour from {reference.name}"
     )
-    return Table(caption, heads, rows, 3)
+    return PageTable(caption, heads, rows, 3)
 
 
 def _interval(numbers: xr.Dataset, name: str, unit: str) -> str:

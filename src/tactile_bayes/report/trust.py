@@ -13,7 +13,7 @@ from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.readings_figure import channel_names
-from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as
+from tactile_bayes.report.wording import PageTable, chance, fixed, percent, sentence, shown_as
 from tactile_bayes.tasks.documents import read_json
 
 
@@ -32,7 +32,7 @@ def convergence(findings: Findings) -> list[str]:
     return said
 
 
-def trust_tables(findings: Findings) -> list[Table]:
+def trust_tables(findings: Findings) -> list[PageTable]:
     """Return the tables of `tactile-bayes trust`: parts, claims, effect of the prior; none if it was not run."""
     found = findings.trust
     if found is None:
@@ -45,7 +45,7 @@ def trust_tables(findings: Findings) -> list[Table]:
         by = fixed(float(np.nanmax(np.abs(moves))), ".1f") if most else ""
         parts.append([str(name), chance(float(row["part_p_value"])), fixed(float(row["part_sd"]), ".1f"), by, most])
     heads = ["this part alone", "p", "off by [sd]", "moves by [sd]", "most"]
-    tables = [Table("Prediction of the rest of the record by each part", heads, parts)]
+    tables = [PageTable("Prediction of the rest of the record by each part", heads, parts)]
     if "claim" in found.dims:
         claims = [
             [CLAIMS[str(name)], f"{percent(round(share, 3))} ± {percent(round(error, 3))}", str(int(count))]
@@ -58,7 +58,7 @@ def trust_tables(findings: Findings) -> list[Table]:
             )
         ]
         stated = f"stated with {percent(float(found.attrs['probability']))}"
-        tables.append(Table("Records like this one, simulated and inferred", [stated, "holds in", "of"], claims))
+        tables.append(PageTable("Records like this one, simulated and inferred", [stated, "holds in", "of"], claims))
     if "assumption" in found.dims:
         others = [
             [
@@ -69,7 +69,7 @@ def trust_tables(findings: Findings) -> list[Table]:
             for row in (found.isel(assumption=k) for k in range(found.sizes["assumption"]))
         ]
         heads = ["assumption instead", "in the gap", "beside it", "fits"]
-        tables.append(Table("Distance that the median of the band moves, over its width", heads, others))
+        tables.append(PageTable("Distance that the median of the band moves, over its width", heads, others))
     rows = [
         [str(name), *(fixed(float(value), ".3f") for value in row), str(by)]
         for name, row, by in zip(
@@ -77,7 +77,7 @@ def trust_tables(findings: Findings) -> list[Table]:
         )
     ]
     heads = ["quantity", "contour's prior", "rig's prior", "record", "set by"]
-    return [*tables, Table("Sensitivity to prior and record (0.05 matters)", heads, rows)]
+    return [*tables, PageTable("Sensitivity to prior and record (0.05 matters)", heads, rows)]
 
 
 def check_messages(findings: Findings) -> list[str]:
@@ -107,7 +107,7 @@ def check_messages(findings: Findings) -> list[str]:
     return said
 
 
-def check_table(findings: Findings) -> Table | None:
+def check_table(findings: Findings) -> PageTable | None:
     """Return the misfit by channel; None if there are too few draws."""
     check = findings.check
     if check is None:
@@ -133,7 +133,7 @@ def check_table(findings: Findings) -> Table | None:
             ]
         )
     heads = ["channel", *DISCREPANCIES, "worst stretch", "off there by"]
-    return Table("Misfit by channel: shares of predicted records that are at least as discrepant", heads, rows)
+    return PageTable("Misfit by channel: shares of predicted records that are at least as discrepant", heads, rows)
 
 
 def contacts_messages(findings: Findings) -> list[str]:

@@ -14,7 +14,7 @@ from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.report.contour_figure import ContourFindings, contour_figure
 from tactile_bayes.report.meanings import is_direction
 from tactile_bayes.report.page import parameter_cells
-from tactile_bayes.report.wording import Table, percent
+from tactile_bayes.report.wording import PageTable, percent
 from tactile_bayes.report.writing import rendered
 from tactile_bayes.tasks import write_atomically
 from tactile_bayes.uncertainty.summary import gap_if_any
@@ -52,7 +52,7 @@ def write_watch_page(
         refresh=refresh,
         is_well=is_well,
         contour=contour,
-        parameters=Table("Estimates are medians, intervals central", heads, rows, 3),
+        parameters=PageTable("Estimates are medians, intervals central", heads, rows, 3),
     )
     with write_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

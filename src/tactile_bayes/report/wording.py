@@ -11,7 +11,7 @@ import numpy as np
 from tactile_bayes.plotting.labels import number, shown_unit
 
 
-class Table(NamedTuple):
+class PageTable(NamedTuple):
     """A table: caption, heads, rows, and the number of leading columns with text instead of numbers."""
 
     caption: str

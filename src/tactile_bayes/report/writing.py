@@ -25,7 +25,7 @@ from tactile_bayes.tasks import refuse_replacing, write_atomically
 _ESCAPES = {code: f"\\u{code:04x}" for code in (ord("<"), ord(">"), ord("&"), 0x2028, 0x2029)}
 
 
-class Written(NamedTuple):
+class WrittenPage(NamedTuple):
     """A page that was written, the distances of its runs from the overlay, and a figure of both."""
 
     path: Path
@@ -89,7 +89,7 @@ def report_into(
     compare: str | os.PathLike[str] | None,
     overlay: str | os.PathLike[str] | None,
     progress: Callable[[int, int], object] | None,
-) -> Written:
+) -> WrittenPage:
     """Write the page of `write_report`, and return what a command says of it."""
     given = [run] if isinstance(run, str | os.PathLike) or not isinstance(run, Sequence) else list(run)
     folders = [check_path("run", each, "give the folder of a run, of several, or a list of them") for each in given]
@@ -125,7 +125,7 @@ def report_into(
     with write_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     report(count, count)
-    return Written(path, laid, figure if other is not None and one is not None else None)
+    return WrittenPage(path, laid, figure if other is not None and one is not None else None)
 
 
 def _rendered(page: dict[str, Any]) -> str:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from tactile_bayes.mechanics.branches.line import lines_through
-from tactile_bayes.mechanics.paths import Mode, Paths
+from tactile_bayes.mechanics.paths import ContactMode, Paths
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.sweep.drive import Carried, Direction, Drive
@@ -101,7 +101,7 @@ class SweepEvents:
 _PHASES = {True: "tip", False: "tangential"}
 
 
-def _change(before: Mode, after: Mode) -> str:
+def _change(before: ContactMode, after: ContactMode) -> str:
     """Name of a change between two parts of a path."""
     if before.tip != after.tip:
         return f"{_PHASES[before.tip]} → {_PHASES[after.tip]}"

@@ -32,14 +32,14 @@ _MAX_LOG_MASS_RATIO = 9.0  # from which the smaller mode is left out: one draw i
 _EXTENT_DRAWS = 500  # from which the extent of a proposal is estimated
 
 
-class Mode(NamedTuple):
+class PosteriorMode(NamedTuple):
     """Mode of the posterior."""
 
     optimum: ContourOptimum
     cloud: Cloud
     proposal: Proposal
     coordinates: Coordinates  # of the cloud and the proposal
-    usual: Mode | None = None  # the mode in the model's own coordinates, if those are others
+    usual: PosteriorMode | None = None  # the mode in the model's own coordinates, if those are others
 
 
 class Modes:
@@ -47,10 +47,10 @@ class Modes:
 
     def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
         self.model, self.rng, self.deadline = model, rng, deadline
-        self.found: list[Mode] = []
+        self.found: list[PosteriorMode] = []
         self._own = model.coordinates
 
-    def found_by_search(self) -> list[Mode]:
+    def found_by_search(self) -> list[PosteriorMode]:
         """Return modes, that with the most mass first: one if it explains many loaded samples, else all of mass."""
         found = self.found
         for optimum in sorted(self._not_explaining(), key=lambda one: one.cost):
@@ -100,7 +100,7 @@ class Modes:
                 return True
         return False
 
-    def _around(self, optimum: ContourOptimum) -> Mode:
+    def _around(self, optimum: ContourOptimum) -> PosteriorMode:
         """Approximate a mode in the coordinates in which it is nearer to normal; modes on a flank share them."""
         model, point = self.model, optimum.point
         usual = self._in(self._own, optimum, optimum.covariance, model.walked_ends)
@@ -119,11 +119,13 @@ class Modes:
                 return mode
         return usual
 
-    def _in(self, coordinates: Coordinates, optimum: ContourOptimum, covariance: Floats, ends: Ends = ANYTHING) -> Mode:
+    def _in(
+        self, coordinates: Coordinates, optimum: ContourOptimum, covariance: Floats, ends: Ends = ANYTHING
+    ) -> PosteriorMode:
         target, centre = in_coordinates(self.model.log_probability, coordinates), coordinates.of(optimum.point[None])[0]
         cloud = gather(target, centre, covariance, self.rng, self.deadline, ends)
         proposal = approximate(target, cloud.centre, cloud.narrow_covariance, self.rng, self.deadline, ends)
-        return Mode(optimum, cloud, proposal, coordinates)
+        return PosteriorMode(optimum, cloud, proposal, coordinates)
 
 
 def flank_at_contacts(model: ContourModel, point: Floats) -> FlankCoordinates | None:

@@ -69,7 +69,7 @@ class Here(NamedTuple):
     longest: float  # largest length of a leg
 
 
-class Step(NamedTuple):
+class LegStep(NamedTuple):
     """A leg, with its series in the workspace."""
 
     is_sound: bool  # false if the branch does not cut all planes of the leg
@@ -83,7 +83,7 @@ class Step(NamedTuple):
 
 
 @inlined
-def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: LegSeries) -> tuple[Step, float]:
+def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: LegSeries) -> tuple[LegStep, float]:
     """Next leg, at most as long as given, and the factor of the length of the one after it."""
     exact = work.accuracy.exact
     least, known, before, pace, is_noise = LONGEST * 0.5**work.accuracy.halvings, 0.0, math.inf, 1.0, False
@@ -107,13 +107,13 @@ def advance(here: Here, setting: Setting, length: float, in_dip: bool, work: Leg
 
 
 @inlined
-def next_length(here: Here, step: Step, pace: float, work: LegSeries) -> float:
+def next_length(here: Here, step: LegStep, pace: float, work: LegSeries) -> float:
     """Length of the next leg."""
     return max(min(pace * step.length, here.longest), LONGEST * 0.5**work.accuracy.halvings)
 
 
 @inlined
-def _trial(here: Here, setting: Setting, length: float, known: float, work: LegSeries) -> Step:
+def _trial(here: Here, setting: Setting, length: float, known: float, work: LegSeries) -> LegStep:
     """Leg of at most some length, which ends at the first knot of the contour, and where the force vanishes.
 
     `known` is as in `sample_leg`."""
@@ -138,7 +138,7 @@ def _trial(here: Here, setting: Setting, length: float, known: float, work: LegS
             if is_sound:
                 leg, length = shortened(leg, share), share * length
                 is_sound, end, before_end = sample_leg(scene, leg, begin, here.before, share, is_released, work)
-    return Step(is_sound, leg, length, end, before_end, knot, at_knot, is_released)
+    return LegStep(is_sound, leg, length, end, before_end, knot, at_knot, is_released)
 
 
 @compiled

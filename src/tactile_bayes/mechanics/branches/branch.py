@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.advance import FIRST_LENGTH, LONGEST, Here, Setting, Step, advance, next_length
+from tactile_bayes.mechanics.branches.advance import FIRST_LENGTH, LONGEST, Here, LegStep, Setting, advance, next_length
 from tactile_bayes.mechanics.branches.equilibrium import nowhere
 from tactile_bayes.mechanics.branches.first_contact import Beginning, beginning
 from tactile_bayes.mechanics.branches.leg import (
@@ -32,10 +32,10 @@ from tactile_bayes.mechanics.branches.leg import (
 from tactile_bayes.mechanics.branches.meeting import OPEN, Meeting, fate_of, go_on, meet, slid_back
 from tactile_bayes.mechanics.branches.phase import contact_at, slides, tip_touches
 from tactile_bayes.mechanics.branches.readings import (
-    Course,
-    Found,
     Legs,
-    Samples,
+    PathResults,
+    PathSamples,
+    TravelCourse,
     largest_curvature,
     legs_for,
     recall,
@@ -76,7 +76,7 @@ def branch_workspace(accuracy: Accuracy, order: int, samples: int, knots: int, l
 
 @compiled
 def follow_branch(
-    scene: Scene, lines: Floats | None, samples: Samples, workspace: BranchWorkspace, found: Found
+    scene: Scene, lines: Floats | None, samples: PathSamples, workspace: BranchWorkspace, found: PathResults
 ) -> None:
     """Follow a branch from first contact to snap-off, and write its events and what is known of its samples.
 
@@ -113,7 +113,7 @@ def follow_branch(
 
 
 @inlined
-def _begin(start: Beginning, found: Found) -> Here:
+def _begin(start: Beginning, found: PathResults) -> Here:
     """Where a branch begins; its events so far are written."""
     begin, event = start.state, found.event
     event.reach, event.distance, event.snap_off, event.phases = start.reach, start.near.distance, OPEN, 0
@@ -137,11 +137,11 @@ def _grow(
     followed: int,
     here: Here,
     setting: Setting,
-    step: Step,
+    step: LegStep,
     met: Meeting,
-    samples: Samples,
+    samples: PathSamples,
     workspace: BranchWorkspace,
-    found: Found,
+    found: PathResults,
 ) -> int:
     """Store the growing part of a leg, unless it is ruled out, and write what is known of the path with it; return the
     number of legs that are stored."""
@@ -161,7 +161,7 @@ def _grow(
     steadiness = 0.0
     if samples.angles.size and not met.is_maximum and at.travel > begin:
         steadiness = min(max(value(work.series[RATE], stop) * stop / (at.travel - begin), 0.0), 1.0)
-    store(followed, scene, here.line, step.leg, at.at, Course(stop, begin, at.travel, steadiness), work, legs)
+    store(followed, scene, here.line, step.leg, at.at, TravelCourse(stop, begin, at.travel, steadiness), work, legs)
     event.snap_angle, event.snap_parameter = at.travel, contact_at(scene, at.at).p
     return followed + 1
 
@@ -172,9 +172,9 @@ def _end(
     here: Here,
     lines: Floats | None,
     start: Beginning,
-    samples: Samples,
+    samples: PathSamples,
     workspace: BranchWorkspace,
-    found: Found,
+    found: PathResults,
 ) -> None:
     """Write the end of a path and its samples; or why there is none."""
     event, wants_states, first = found.event, found.events.size > 0, start.state.travel
@@ -189,7 +189,7 @@ def _end(
         angles = legs.angles[: samples.angles.size]
         for j in range(samples.angles.size):
             angles[j] = first + samples.angles[j] * (event.snap_angle - first) + here.scene.rig.offset
-        samples = Samples(angles, samples.rows, False)
+        samples = PathSamples(angles, samples.rows, False)
     for k in range(followed):
         part = recall(k, here.scene, lines, work, legs)
         if part.course.end > part.course.begin:

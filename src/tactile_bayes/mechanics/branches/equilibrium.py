@@ -23,8 +23,8 @@ from tactile_bayes.mechanics.branches.line import Line, components, off_line
 from tactile_bayes.mechanics.branches.outline import Place, narrower, place
 from tactile_bayes.mechanics.branches.phase import (
     STUCK,
-    Contact,
     Move,
+    Touch,
     contact_at,
     is_possible,
     limit,
@@ -147,7 +147,7 @@ def balance(scene: Scene, at: Equilibrium) -> tuple[Balance, _Equations]:
 
 
 @compiled
-def _posed(scene: Scene, contact: Contact, force: float, by_p: Move) -> tuple[Pose, Pose, Pose, Pose]:
+def _posed(scene: Scene, contact: Touch, force: float, by_p: Move) -> tuple[Pose, Pose, Pose, Pose]:
     """Pose of the rod, and its derivatives by p, q and the force."""
     psi1, arclength = contact.psi1, contact.arclength
     if slides(scene.phase):

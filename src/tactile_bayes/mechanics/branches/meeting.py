@@ -7,7 +7,7 @@ import math
 from typing import Any, NamedTuple
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.branches.advance import LONGEST, Here, Setting, Step
+from tactile_bayes.mechanics.branches.advance import LONGEST, Here, LegStep, Setting
 from tactile_bayes.mechanics.branches.crossings import (
     LOST,
     NOT_SLIPPING,
@@ -51,9 +51,9 @@ from tactile_bayes.mechanics.branches.phase import (
 from tactile_bayes.mechanics.branches.scene import (
     BY_FORCE,
     NO_FORCE,
-    Anchor,
     Equilibrium,
     Scene,
+    StuckContact,
     anchored,
     dot,
     in_phase,
@@ -98,7 +98,7 @@ class Meeting(NamedTuple):
 
 
 @inlined
-def meet(here: Here, step: Step, in_dip: bool, is_first: bool, work: LegSeries) -> Meeting:
+def meet(here: Here, step: LegStep, in_dip: bool, is_first: bool, work: LegSeries) -> Meeting:
     """How a leg is left, and its part before that on which the travel grows: none if the branch is in a dip."""
     scene = here.scene
     kind, share, left = _SMOOTHLY, 1.0, step.end
@@ -138,7 +138,7 @@ def _ending(line: Line | None, found: Balance) -> Balance:
 
 
 @inlined
-def fate_of(step: Step, met: Meeting) -> int:
+def fate_of(step: LegStep, met: Meeting) -> int:
     """How the path ends on a leg, a `SnapOff`, or `OPEN`."""
     if met.is_maximum:
         if abs(met.at.holding_moment) <= _NO_MOMENT:
@@ -149,7 +149,7 @@ def fate_of(step: Step, met: Meeting) -> int:
 
 
 @inlined
-def go_on(here: Here, setting: Setting, step: Step, met: Meeting, event: Any, work: LegSeries) -> Here:
+def go_on(here: Here, setting: Setting, step: LegStep, met: Meeting, event: Any, work: LegSeries) -> Here:
     """Where the branch goes on; NaN where it, the drive or the contour ends, or friction would not let it go on, which
     is written."""
     if event.snap_off > _NEVER:
@@ -184,7 +184,7 @@ def go_on(here: Here, setting: Setting, step: Step, met: Meeting, event: Any, wo
 
 
 @inlined
-def _behind(here: Here, setting: Setting, step: Step, met: Meeting) -> Here:
+def _behind(here: Here, setting: Setting, step: LegStep, met: Meeting) -> Here:
     """Beginning of what follows a change of the phase, a knot, or the end of a line, in the same mode of friction."""
     if met.kind == _LINE:
         return _on_next_line(here, setting.lines, step, met)
@@ -203,7 +203,7 @@ def _rolled_on(scene: Scene, at: Equilibrium) -> Scene:
     if scene.phase != ROLLING:
         return scene
     contact = contact_at(scene, at)
-    return anchored(scene, Anchor(contact.p, contact.arclength))
+    return anchored(scene, StuckContact(contact.p, contact.arclength))
 
 
 @compiled
@@ -265,7 +265,7 @@ def _stopped(here: Here) -> Here:
 
 
 @inlined
-def _regained_at(here: Here, step: Step, met: Meeting, most: float, work: LegSeries) -> tuple[float, Balance]:
+def _regained_at(here: Here, step: LegStep, met: Meeting, most: float, work: LegSeries) -> tuple[float, Balance]:
     """Position on a leg at which the travel exceeds its maximum again, as `regained`, and the equilibrium there."""
     scene, behind = here.scene, met.stop
     if step.end.at.force < 0.0:
@@ -280,7 +280,7 @@ def _regained_at(here: Here, step: Step, met: Meeting, most: float, work: LegSer
 
 
 @inlined
-def _on_next_line(here: Here, lines: Floats | None, step: Step, met: Meeting) -> Here:
+def _on_next_line(here: Here, lines: Floats | None, step: LegStep, met: Meeting) -> Here:
     """Beginning of a leg on the next line of the drive; NaN after the last."""
     if not _goes_on(lines, here.line):
         return _stopped(here)

@@ -25,7 +25,7 @@ _FAR = 1e3  # rod lengths beyond which an end of a contour does not matter
 _MOST_STEPS, _SETTLED = 60, 1e-7
 
 
-class Half(NamedTuple):
+class OutlineHalf(NamedTuple):
     """One side of the vertex."""
 
     kind: int
@@ -37,8 +37,8 @@ class Half(NamedTuple):
 class Outline(NamedTuple):
     """One contour in the sweep frame; lengths in rod lengths."""
 
-    left: Half
-    right: Half
+    left: OutlineHalf
+    right: OutlineHalf
     low: float
     high: float  # least and greatest parameter of a table; they have no meaning without one
     sign: float  # −1 if the table is mirrored

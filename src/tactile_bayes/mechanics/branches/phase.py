@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.mechanics.branches.outline import Outline, beside, place
-from tactile_bayes.mechanics.branches.scene import Anchor, Equilibrium, Scene, anchored, in_phase, with_friction
+from tactile_bayes.mechanics.branches.scene import Equilibrium, Scene, StuckContact, anchored, in_phase, with_friction
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
@@ -44,7 +44,7 @@ _NODES, _WEIGHTS = (tuple(column.tolist()) for column in np.polynomial.legendre.
 _MOST_STEPS = 8  # Newton steps to where a rod has rolled to its tip
 
 
-class Contact(NamedTuple):
+class Touch(NamedTuple):
     """Where rod and object touch, and the direction of the force."""
 
     p: float  # parameter of the contour
@@ -87,16 +87,16 @@ def tip_touches(phase: int) -> bool:
 
 
 @compiled
-def contact_at(scene: Scene, at: Equilibrium) -> Contact:
+def contact_at(scene: Scene, at: Equilibrium) -> Touch:
     """Contact of an equilibrium."""
     phase, gamma, half_angle, anchor = scene.phase, scene.rig.friction_angle, scene.outline.half_angle, scene.anchor
     if phase == TIP:
-        return Contact(at.p, gamma, at.q, 1.0)
+        return Touch(at.p, gamma, at.q, 1.0)
     if phase == TANGENTIAL:
-        return Contact(at.p, gamma, half_angle - gamma, at.q)
+        return Touch(at.p, gamma, half_angle - gamma, at.q)
     if phase == STUCK:
-        return Contact(anchor.p, at.q, at.p - at.q, 1.0)
-    return Contact(at.p, at.q, half_angle - at.q, _rolled(scene.outline, anchor, at.p))
+        return Touch(anchor.p, at.q, at.p - at.q, 1.0)
+    return Touch(at.p, at.q, half_angle - at.q, _rolled(scene.outline, anchor, at.p))
 
 
 @compiled
@@ -112,7 +112,7 @@ def moves(phase: int, speed: float) -> tuple[Move, Move]:
 
 
 @compiled
-def _rolled(outline: Outline, anchor: Anchor, p: float) -> float:
+def _rolled(outline: Outline, anchor: StuckContact, p: float) -> float:
     """Arc length at which a rod touches that has rolled on the contour from its anchor.
 
     It grows as the contour's parallel curve on which the centreline lies, ds1 = dσ − s1 sin ε dα: by the half angle ε
@@ -158,7 +158,7 @@ def turned_over(scene: Scene, at: Equilibrium) -> tuple[Scene, Equilibrium, Equi
         there = in_phase(scene, TIP if to_tip else TANGENTIAL)
         end = limit(there, contact.p)
         return there, Equilibrium(contact.p, end.value, at.force), Equilibrium(0.0, -end.sense, 0.0)
-    there = anchored(in_phase(scene, STUCK if to_tip else ROLLING), Anchor(contact.p, 1.0))
+    there = anchored(in_phase(scene, STUCK if to_tip else ROLLING), StuckContact(contact.p, 1.0))
     end = limit(there, contact.p)
     return there, Equilibrium(end.value, contact.friction_angle, at.force), Equilibrium(-end.sense, 0.0, 0.0)
 
@@ -182,7 +182,7 @@ def stuck(scene: Scene, at: Equilibrium) -> tuple[Scene, Equilibrium]:
     """A sliding contact as one that sticks."""
     contact = contact_at(scene, at)
     tip, gamma = tip_touches(scene.phase), contact.friction_angle
-    there = anchored(in_phase(scene, STUCK if tip else ROLLING), Anchor(contact.p, contact.arclength))
+    there = anchored(in_phase(scene, STUCK if tip else ROLLING), StuckContact(contact.p, contact.arclength))
     return there, Equilibrium(contact.psi1 + gamma if tip else contact.p, gamma, at.force)
 
 
@@ -196,6 +196,6 @@ def sliding_on(scene: Scene, at: Equilibrium) -> tuple[Scene, Equilibrium]:
 
 
 @compiled
-def is_possible(contact: Contact) -> bool:
+def is_possible(contact: Touch) -> bool:
     """False if an equilibrium is sought too far away."""
     return _LEAST_PSI1 <= contact.psi1 <= _MOST_PSI1 and 0.0 <= contact.arclength <= _LONGEST

@@ -14,9 +14,9 @@ from tactile_bayes.mechanics.branches.line import drive_angle_at
 from tactile_bayes.mechanics.branches.outline import on_object, place
 from tactile_bayes.mechanics.branches.phase import contact_at, slides, tip_touches
 from tactile_bayes.mechanics.branches.scene import (
-    Anchor,
     Equilibrium,
     Scene,
+    StuckContact,
     anchored,
     in_phase,
     on_line,
@@ -47,7 +47,7 @@ _MOST_HALVINGS = 100  # largest number of steps to an exact state: more than hal
 _PIECES = 16  # pieces of a leg between which curvatures are compared: the largest is found to some 1e-5 of itself
 
 
-class Samples(NamedTuple):
+class PathSamples(NamedTuple):
     """Samples of one path."""
 
     angles: Floats  # travels, or drive angles as read, in the sweep frame, increasing
@@ -55,7 +55,7 @@ class Samples(NamedTuple):
     relative: bool  # true if angles are shares of the travel from first contact to snap-off
 
 
-class Found(NamedTuple):
+class PathResults(NamedTuple):
     """Results of a path."""
 
     loads: Floats  # loads with the sign of the sweep and the rod's rigidity, initially zero, shape (rows, 3)
@@ -66,7 +66,7 @@ class Found(NamedTuple):
     event: Any  # events of the path, one record; see `Solutions`
 
 
-class Course(NamedTuple):
+class TravelCourse(NamedTuple):
     """Course of the travel along a leg."""
 
     stop: float  # position at which the leg, or the path, ends
@@ -80,10 +80,10 @@ class Legs(NamedTuple):
 
     phase: Index
     line: Index  # number of the line of the drive
-    # Angle of the friction, and the anchor of a contact that sticks, as in `Rig` and `Anchor`, shape (legs, 3).
+    # Angle of the friction, and where a contact sticks, as in `RigParameters` and `StuckContact`, shape (legs, 3).
     friction: Floats
     leg: Floats  # as in `Leg`, and the equilibrium where its growing part ends, shape (legs, 4, 3)
-    course: Floats  # as in `Course`, shape (legs, 4)
+    course: Floats  # as in `TravelCourse`, shape (legs, 4)
     series: Floats  # as in `LegSeries`, shape (legs, 7, order)
     angles: Floats  # drive angles of all samples, if shares were given
     wanted: Floats  # travels of the samples on a leg
@@ -99,7 +99,7 @@ class Followed(NamedTuple):
     scene: Scene
     leg: Leg
     end: Equilibrium
-    course: Course
+    course: TravelCourse
     work: LegSeries
     room: Legs
 
@@ -117,7 +117,7 @@ def legs_for(legs: int, order: int, samples: int) -> Legs:
 
 @compiled
 def store(
-    k: int, scene: Scene, line: int, leg: Leg, end: Equilibrium, course: Course, work: LegSeries, legs: Legs
+    k: int, scene: Scene, line: int, leg: Leg, end: Equilibrium, course: TravelCourse, work: LegSeries, legs: Legs
 ) -> None:
     """Keep a leg as number k."""
     legs.phase[k], legs.line[k], rows, friction = scene.phase, line, legs.leg[k], legs.friction[k]
@@ -135,9 +135,13 @@ def recall(k: int, scene: Scene, lines: Floats | None, work: LegSeries, legs: Le
     copy_rows(legs.series[k], work.series)
     rows, course, friction = legs.leg[k], legs.course[k], legs.friction[k]
     leg = Leg(_equilibrium(rows[0]), _equilibrium(rows[1]), _equilibrium(rows[2]))
-    there = anchored(on_line(in_phase(scene, legs.phase[k]), lines, legs.line[k]), Anchor(friction[1], friction[2]))
+    there = anchored(
+        on_line(in_phase(scene, legs.phase[k]), lines, legs.line[k]), StuckContact(friction[1], friction[2])
+    )
     there = with_friction(there, friction[0])
-    return Followed(there, leg, _equilibrium(rows[3]), Course(course[0], course[1], course[2], course[3]), work, legs)
+    return Followed(
+        there, leg, _equilibrium(rows[3]), TravelCourse(course[0], course[1], course[2], course[3]), work, legs
+    )
 
 
 @compiled
@@ -194,7 +198,7 @@ def _write_state(
 
 
 @compiled
-def write_samples(samples: Samples, part: Followed, wants_states: bool, out: Found) -> None:
+def write_samples(samples: PathSamples, part: Followed, wants_states: bool, out: PathResults) -> None:
     """Write the loads of the samples on a leg, and their states if these are wanted: exact ones, or from the series."""
     scene, work, room, rig = part.scene, part.work, part.room, part.scene.rig
     samples, found = _on_leg(samples, part), room.found
@@ -219,7 +223,7 @@ def write_samples(samples: Samples, part: Followed, wants_states: bool, out: Fou
 
 
 @compiled
-def _on_leg(samples: Samples, part: Followed) -> Samples:
+def _on_leg(samples: PathSamples, part: Followed) -> PathSamples:
     """Samples on a leg. Their travels are written to the room, and positions at which these are reached if the rate of
     the travel is linear in the position."""
     course, room, offset, angles = part.course, part.room, part.scene.rig.offset, samples.angles
@@ -234,7 +238,7 @@ def _on_leg(samples: Samples, part: Followed) -> Samples:
         root = math.sqrt(course.steadiness * course.steadiness + 4.0 * (1.0 - course.steadiness) * left)
         way_left = 2.0 * left / (course.steadiness + root) if left > 0.0 else 0.0
         room.twice[j] = 4.0 * course.stop * (1.0 - way_left) - 2.0
-    return Samples(angles[first:last], samples.rows[first:last], samples.relative)
+    return PathSamples(angles[first:last], samples.rows[first:last], samples.relative)
 
 
 @compiled

@@ -12,7 +12,7 @@ from tactile_bayes.mechanics.branches.advance import Here, Setting
 from tactile_bayes.mechanics.branches.leg import PLACE, REST, LegSeries, guess
 from tactile_bayes.mechanics.branches.meeting import Meeting
 from tactile_bayes.mechanics.branches.outline import Place, beside, is_inside
-from tactile_bayes.mechanics.branches.phase import STUCK, Contact, contact_at, tip_touches
+from tactile_bayes.mechanics.branches.phase import STUCK, Touch, contact_at, tip_touches
 from tactile_bayes.mechanics.branches.scene import Equilibrium, Scene
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.poses.beam import PARTS, free_end, from_tip, loaded_part, rest_curvature
@@ -75,7 +75,7 @@ def _second_contact(scene: Scene, ends: tuple[float, float], goes_on: bool, stop
 
 
 @inlined
-def _touches_twice(scene: Scene, at: Contact, force: float, wholly: bool, ends: tuple[float, float]) -> bool:
+def _touches_twice(scene: Scene, at: Touch, force: float, wholly: bool, ends: tuple[float, float]) -> bool:
     """True if a rod touches the object at another point too, between the ends of the contour.
 
     In tangential contact the free end has its rest shape. It is in the object at once where the contour is less
@@ -131,5 +131,5 @@ def _folded_over(scene: Scene, stop: float, work: LegSeries) -> float:
 
 
 @compiled
-def _is_folded(scene: Scene, at: Contact) -> bool:
+def _is_folded(scene: Scene, at: Touch) -> bool:
     return at.psi1 + at.friction_angle > math.pi - scene.outline.half_angle

@@ -24,7 +24,7 @@ BY_P, BY_Q, BY_FORCE = Equilibrium(1.0, 0.0, 0.0), Equilibrium(0.0, 1.0, 0.0), E
 NO_FORCE = Equilibrium(0.0, 0.0, 0.0)
 
 
-class Rig(NamedTuple):
+class RigParameters(NamedTuple):
     """Parameters of the loads other than rod and contour."""
 
     # Angle from the contour's normal to the force of a contact that slides, ± arctan μ [rad]: > 0 where it slides to
@@ -37,14 +37,14 @@ class Rig(NamedTuple):
     force_unit: float  # EI/L and EI/L² of the rod, in the units of loads
 
 
-class Anchor(NamedTuple):
+class StuckContact(NamedTuple):
     """A contact of object and rod that does not slip."""
 
     p: float  # parameter of the contour
     arclength: float
 
 
-NOWHERE = Anchor(0.0, 0.0)
+NOWHERE = StuckContact(0.0, 0.0)
 
 
 class Scene(NamedTuple):
@@ -52,11 +52,11 @@ class Scene(NamedTuple):
 
     outline: Outline
     beam: Beam
-    rig: Rig
+    rig: RigParameters
     # Drive that carries the base, which is at the origin at its beginning; None for a rotation about a pivot.
     line: Line | None
     phase: int
-    anchor: Anchor  # where it sticks, if it does
+    anchor: StuckContact  # where it sticks, if it does
 
 
 @compiled
@@ -66,7 +66,7 @@ def in_phase(scene: Scene, phase: int) -> Scene:
 
 
 @compiled
-def anchored(scene: Scene, anchor: Anchor) -> Scene:
+def anchored(scene: Scene, anchor: StuckContact) -> Scene:
     """Scene with another place where it sticks."""
     return Scene(scene.outline, scene.beam, scene.rig, scene.line, scene.phase, anchor)
 
@@ -83,7 +83,7 @@ def on_line(scene: Scene, lines: Floats | None, k: int) -> Scene:
 def with_friction(scene: Scene, angle: float) -> Scene:
     """Scene with friction of an angle, which acts in either sense."""
     own, compliance, offset, sign, moment_unit, force_unit = scene.rig
-    rig = Rig(angle, compliance, offset, sign, moment_unit, force_unit)
+    rig = RigParameters(angle, compliance, offset, sign, moment_unit, force_unit)
     beam = scene.beam if angle == own else rubbed_otherwise(scene.beam)
     return Scene(scene.outline, beam, rig, scene.line, scene.phase, scene.anchor)
 

@@ -22,9 +22,9 @@ from tactile_bayes.mechanics.branches.clearance import travel_into
 from tactile_bayes.mechanics.branches.first_contact import clear_angle
 from tactile_bayes.mechanics.branches.leg import Accuracy
 from tactile_bayes.mechanics.branches.line import NO_LINE, Line, line_of
-from tactile_bayes.mechanics.branches.outline import Half, Outline, mirrored
-from tactile_bayes.mechanics.branches.readings import STATE, STATE_COLUMNS, Found, Samples
-from tactile_bayes.mechanics.branches.scene import NOWHERE, Rig, Scene
+from tactile_bayes.mechanics.branches.outline import Outline, OutlineHalf, mirrored
+from tactile_bayes.mechanics.branches.readings import STATE, STATE_COLUMNS, PathResults, PathSamples
+from tactile_bayes.mechanics.branches.scene import NOWHERE, RigParameters, Scene
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.phases import TIP
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, beam_of, varied_of
@@ -167,15 +167,15 @@ _SWEEP, _EVENTS = _side_by_side(Sweeps._fields), _side_by_side(Solutions._fields
 
 
 @compiled
-def _half(kind: int, size: float, shape: float, length: float) -> Half:
+def _half(kind: int, size: float, shape: float, length: float) -> OutlineHalf:
     """Half of a contour in rod lengths."""
     if kind == PARABOLA:
-        return Half(kind, size * length, shape, 1.0)
+        return OutlineHalf(kind, size * length, shape, 1.0)
     if kind == OVAL:
-        return Half(kind, size / length, shape / length, 1.0)
+        return OutlineHalf(kind, size / length, shape / length, 1.0)
     if kind == POWER_LAW:
-        return Half(kind, size * length ** (shape - 1.0), shape, length ** min(1.0, shape - 1.0))
-    return Half(kind, size, shape, 1.0)
+        return OutlineHalf(kind, size * length ** (shape - 1.0), shape, length ** min(1.0, shape - 1.0))
+    return OutlineHalf(kind, size, shape, 1.0)
 
 
 @compiled
@@ -212,7 +212,7 @@ def _scene(
     sign = -1.0 if sweep.backward else 1.0
     offset = sign * sweep.offset if line is None else 0.0  # it is in the lines
     moment = sweep.rigidity / sweep.relative_length
-    rig = Rig(sweep.friction_angle, sweep.compliance, offset, sign, moment, moment / sweep.relative_length)
+    rig = RigParameters(sweep.friction_angle, sweep.compliance, offset, sign, moment, moment / sweep.relative_length)
     outline = _outline(shapes, sweep, table)
     beam = _beam(varied, known, sweep, sign, outline.half_angle, line is not None)
     return Scene(outline, beam, rig, line, TIP, NOWHERE)
@@ -310,8 +310,8 @@ def _solve(
         for k in range(count):
             knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
-        samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
-        found = Found(loads[c], all_states[c], event_states[i], event)
+        samples = PathSamples(segments.angles[first:last], segments.rows[first:last], segments.relative)
+        found = PathResults(loads[c], all_states[c], event_states[i], event)
         follow_branch(scene, room, samples, workspace, found)
         event.clear_angle = math.nan
         if asks_clearance and event.reach == _TOUCHES:

@@ -33,7 +33,7 @@ MOST_LOAD = 1e6  # largest load f s1² and square of the bend κ0 s1: a rod woul
 _CLOSE = 0.012  # spread of the arguments of Carlson's R_F for which eight terms of its series (DLMF 19.36.1) are exact
 
 
-class Found(NamedTuple):
+class FoundContact(NamedTuple):
     """Contact that follows from a base wrench, mirrored to a forward one; NaN where there is none. See `Contact`."""
 
     x: float
@@ -44,7 +44,7 @@ class Found(NamedTuple):
     modulus: float
 
 
-NO_CONTACT = Found(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+NO_CONTACT = FoundContact(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
 @compiled
@@ -151,7 +151,7 @@ def _length(swing: _Pendulum, moment: float, force: float, curvature: float) -> 
 
 
 @compiled
-def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, curvature: float) -> Found:
+def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, curvature: float) -> FoundContact:
     """Contact that follows from a base wrench, without integration or root search; see `contact_from_wrench`."""
     force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
     swing = _pendulum(phi0 - beta, moment, force, curvature)
@@ -160,16 +160,18 @@ def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, 
     if _reaches_contact(swing, moment, force, curvature):
         arclength = _length(swing, moment, force, curvature)
     if not is_moderate(arclength, force, curvature):
-        return Found(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
+        return FoundContact(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
     psi1 = 0.5 * math.pi - 2.0 * math.atan2(math.sqrt(swing.square), math.sqrt(swing.complement))
     here = pose(psi1, arclength, force, curvature)
     u, v = moment / force, here.v
     x, y = (u * fy + v * fx) / force, (v * fy - u * fx) / force
-    return Found(x, y, beta - delta, arclength, phi0 - here.turn, modulus)
+    return FoundContact(x, y, beta - delta, arclength, phi0 - here.turn, modulus)
 
 
 @compiled
-def arc_zeros(phi0: float, moment: float, fx: float, fy: float, delta: float, curvature: float) -> tuple[Found, Found]:
+def arc_zeros(
+    phi0: float, moment: float, fx: float, fy: float, delta: float, curvature: float
+) -> tuple[FoundContact, FoundContact]:
     """Points at which the moment first rises and first falls through zero; see `states.contact_pair`."""
     rising = arc_contact(phi0, moment, fx, fy, delta, curvature)
     if moment > 0.0:
@@ -181,15 +183,15 @@ def arc_zeros(phi0: float, moment: float, fx: float, fy: float, delta: float, cu
 
 
 @compiled
-def _mirrored(found: Found) -> Found:
+def _mirrored(found: FoundContact) -> FoundContact:
     x, y, slope_angle, arclength, tip_angle, modulus = found
-    return Found(-x, y, -slope_angle, arclength, math.pi - tip_angle, modulus)
+    return FoundContact(-x, y, -slope_angle, arclength, math.pi - tip_angle, modulus)
 
 
 @compiled
-def _beyond(zero: Found, fx: float, fy: float, curvature: float) -> Found:
+def _beyond(zero: FoundContact, fx: float, fy: float, curvature: float) -> FoundContact:
     """Point at which the moment rises through zero, beyond one at which it falls."""
     if not zero.arclength <= 1.0:
         return NO_CONTACT
     x, y, _, arclength, tip_angle, modulus = arc_contact(zero.tip_angle, 0.0, fx, fy, 0.0, curvature)
-    return Found(zero.x + x, zero.y + y, zero.slope_angle, zero.arclength + arclength, tip_angle, modulus)
+    return FoundContact(zero.x + x, zero.y + y, zero.slope_angle, zero.arclength + arclength, tip_angle, modulus)

@@ -29,7 +29,7 @@ _UNIFORM, _STIFFENED, _WHOLE = 0.0, 1.0, 2.0
 _NUDGE = 1e-6  # change of the share for a derivative by it, which serves for a first guess
 
 
-class State(NamedTuple):
+class ContactState(NamedTuple):
     """Base wrench of a contact and its derivatives; NaN where the rod cannot make the contact."""
 
     drive_angle: float
@@ -42,7 +42,7 @@ class State(NamedTuple):
     by_distance: float  # as in `Wrench`
 
 
-NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+NOWHERE = ContactState(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
 class Start(NamedTuple):
@@ -167,7 +167,7 @@ def _continued(
 @compiled
 def continued_state(
     x: float, y: float, alpha: float, delta: float, beam: Beam, tip: bool, start: Start, room: Profile | None
-) -> State:
+) -> ContactState:
     """State of a contact, continued from that of another rod with the same contact; NaN where this ends.
 
     The derivatives follow from those of the pose: with the slope of the contour the frame of the force turns.
@@ -189,4 +189,4 @@ def continued_state(
     by_distance = 0.5 * (by_q * dq + at.by_force.turn * df) / (u * u + v * v)
     tip_angle = beta + psi1
     drive_angle = tip_angle + at.here.turn
-    return State(drive_angle, force * u, -force * sin, force * cos, arclength, tip_angle, by_slope, by_distance)
+    return ContactState(drive_angle, force * u, -force * sin, force * cos, arclength, tip_angle, by_slope, by_distance)

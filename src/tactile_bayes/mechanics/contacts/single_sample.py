@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import cached, compiled
-from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, Found
+from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, FoundContact
 from tactile_bayes.mechanics.contacts.contact_map import contact_state, moved
 from tactile_bayes.mechanics.contacts.fits import RawFit, Reading
 from tactile_bayes.mechanics.contacts.states import contact_pair
@@ -21,7 +21,7 @@ _SAME = 1e-9  # distance [L] below which two contact points differ by rounding o
 _POSSIBLE, _NEAR = 4.0, 1e-3
 
 
-class Workspace(NamedTuple):
+class SampleWorkspace(NamedTuple):
     """Arrays to write to, for k free coordinates."""
 
     trial: Floats  # shape (1, 4)
@@ -32,7 +32,7 @@ class Workspace(NamedTuple):
 
 @compiled
 def _miss(
-    reading: Reading, beam: Beam, whitening: Floats, i: int, z: Floats, j: int, free: Index, workspace: Workspace
+    reading: Reading, beam: Beam, whitening: Floats, i: int, z: Floats, j: int, free: Index, workspace: SampleWorkspace
 ) -> float:
     """Sum of squared deviations of a possible contact from a sample, in standard deviations; infinite if it is none."""
     slopes, by, count = workspace.slopes, workspace.by, free.size
@@ -72,7 +72,7 @@ def descents(
     misfit: Floats,
     normal: Floats,
     hardness: Floats,
-    workspace: Workspace,
+    workspace: SampleWorkspace,
 ) -> None:
     """Descend by Levenberg–Marquardt steps until the gain that the next step promises is small.
 
@@ -217,7 +217,7 @@ def _write_errors(reading: Reading, axes: Floats, i: int, room: Room) -> bool:
 
 
 @compiled
-def _deviation(found: Found, sample: _Sample, noisy: bool, room: Room, shifts: Floats) -> float:
+def _deviation(found: FoundContact, sample: _Sample, noisy: bool, room: Room, shifts: Floats) -> float:
     """Deviation of a point without moment from a contact at the tip or along the rod, in standard deviations, or in L
     and rad without noise; infinite for no point. With noise the shifts are written."""
     if math.isnan(found.arclength):
@@ -246,7 +246,7 @@ def _deviation(found: Found, sample: _Sample, noisy: bool, room: Room, shifts: F
 
 
 @compiled
-def _write_spread(found: Found, falls: bool, sample: _Sample, out: RawFit, i: int, room: Room) -> None:
+def _write_spread(found: FoundContact, falls: bool, sample: _Sample, out: RawFit, i: int, room: Room) -> None:
     """Write the covariance of a place from its shifts, and its bend from the contacts of samples with the errors."""
     covariance, shifts, errors = out.covariance[i], room.shifts[1 if falls else 0], room.errors
     is_none = math.isnan(found.arclength)

@@ -12,7 +12,7 @@ import math
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import cached, compiled
-from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, Found, arc_zeros
+from tactile_bayes.mechanics.contacts.arc_states import NO_CONTACT, FoundContact, arc_zeros
 from tactile_bayes.mechanics.poses.arc import SHORT_COSINE, arc_at
 from tactile_bayes.mechanics.poses.beam import Beam, Varied, by_kind, end_of_arc, lever_of_stem, mirrored_by
 from tactile_bayes.mechanics.poses.pose import pose
@@ -34,7 +34,7 @@ _EXACT = 1e-6  # arc length [L] and angle [rad] that count as zero in Step 2 wit
 
 
 @compiled
-def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
+def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> FoundContact:
     """Contact that follows from a base wrench, without integration or root search; see `contact_from_wrench`."""
     force, modulus = math.sqrt(fx * fx + fy * fy), math.nan
     root = math.sqrt(force)
@@ -47,7 +47,7 @@ def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> F
         modulus = a * a + b * b
     # A force without moment passes through the pivot of a straight rod: the contact may be anywhere.
     if not (complement > 0.0 and modulus > 0.0 and (b > 0.0 or (b == 0.0 and a < 0.0)) and force < math.inf):
-        return Found(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
+        return FoundContact(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
     # θ0 = atan2(a, b) and χ are related by tan χ = cot θ0 / √(1 − m).
     width = a_cos * math.sqrt(modulus)
     cos_chi = a * math.sqrt(complement) / width
@@ -61,13 +61,13 @@ def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> F
     else:
         cos, sin = math.cos(tip_angle), math.sin(tip_angle)
         x, y = along * cos - across * sin, along * sin + across * cos
-    return Found(x, y, beta - delta, arc.length / root, tip_angle, modulus)
+    return FoundContact(x, y, beta - delta, arc.length / root, tip_angle, modulus)
 
 
 @compiled
 def _zeros_along(
     profile: Profile, phi0: float, moment: float, fx: float, fy: float, delta: float, work: Floats
-) -> tuple[Found, Found]:
+) -> tuple[FoundContact, FoundContact]:
     """First two points without moment, for drive angle, holding moment, support reaction and friction angle.
 
     The moment rises through zero at one of them and falls at the other, which are returned in this order. There is no
@@ -89,9 +89,9 @@ def _zeros_along(
             cos, sin = math.cos(beta), math.sin(beta)
             x, y = end.u * cos - end.v * sin, end.u * sin + end.v * cos
             if sense > 0.0:
-                rising = Found(x, y, beta - delta, at, beta + end.psi, math.nan)
+                rising = FoundContact(x, y, beta - delta, at, beta + end.psi, math.nan)
             else:
-                falling = Found(x, y, beta - delta, at, beta + end.psi, math.nan)
+                falling = FoundContact(x, y, beta - delta, at, beta + end.psi, math.nan)
             if at > 1.0 or (rising.arclength > 0.0 and falling.arclength > 0.0):
                 break
             march, sense = begin(profile, at, FORWARD, State(end.psi, 0.0, end.u, end.v)), -sense
@@ -101,7 +101,7 @@ def _zeros_along(
 @by_kind
 def contact_pair(
     varied: Varied | None, beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float
-) -> tuple[Found, Found]:
+) -> tuple[FoundContact, FoundContact]:
     """Points of any rod that may be its contact: the moment rises through zero at the first, and falls at the second.
 
     A contact along the rod is of the first kind, and so is that of a tip, unless it is turned beyond the normal of the
@@ -120,19 +120,21 @@ def contact_pair(
 
 
 @compiled
-def _on_stem(stem: float, phi0: float, found: Found) -> Found:
+def _on_stem(stem: float, phi0: float, found: FoundContact) -> FoundContact:
     x, y, slope_angle, arclength, tip_angle, modulus = found
-    return Found(x + stem * math.cos(phi0), y + stem * math.sin(phi0), slope_angle, arclength, tip_angle, modulus)
+    return FoundContact(
+        x + stem * math.cos(phi0), y + stem * math.sin(phi0), slope_angle, arclength, tip_angle, modulus
+    )
 
 
 @compiled
-def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
+def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> FoundContact:
     """Contact of any rod that follows from a base wrench without errors."""
     return _exact_one(beam, contact_pair(beam, phi0, moment, fx, fy, delta))
 
 
 @compiled
-def _exact_one(beam: Beam, pair: tuple[Found, Found]) -> Found:
+def _exact_one(beam: Beam, pair: tuple[FoundContact, FoundContact]) -> FoundContact:
     """Point of a pair at which the moment rises through zero, unless the rod ends at the other one."""
     rising, falling = pair
     is_contact = _is_exact(rising.arclength, rising.tip_angle - rising.slope_angle)

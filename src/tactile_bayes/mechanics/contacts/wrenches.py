@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import cached, compiled
-from tactile_bayes.mechanics.contacts.continuation import NOWHERE, Start, State, continued_state, unloaded_arc
+from tactile_bayes.mechanics.contacts.continuation import NOWHERE, ContactState, Start, continued_state, unloaded_arc
 from tactile_bayes.mechanics.contacts.tables import MOST_FRICTION, Tables, Workspace, in_polar, prepare, series
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.poses.arc import Arc, chord_deficit, chord_deficit_rate, chord_direction_rate
@@ -49,18 +49,20 @@ def _tangential(x: float, y: float, alpha: float, delta: float, workspace: Works
 
 
 @compiled
-def _tangential_state(x: float, y: float, alpha: float, delta: float, length: float, arc: Arc, by_chi: Arc) -> State:
+def _tangential_state(
+    x: float, y: float, alpha: float, delta: float, length: float, arc: Arc, by_chi: Arc
+) -> ContactState:
     """State in tangential contact (Phase B)."""
     force = (arc.length / length) ** 2
     turning = by_chi.turn / chord_direction_rate(arc, by_chi) if arc.turn > 0.0 else 3.0
     beta = alpha + delta
     sin, cos = math.sin(beta), math.cos(beta)
     moment = force * (x * cos + y * sin)
-    return State(alpha + arc.turn, moment, -force * sin, force * cos, length, alpha, 1.0 - turning, 0.0)
+    return ContactState(alpha + arc.turn, moment, -force * sin, force * cos, length, alpha, 1.0 - turning, 0.0)
 
 
 @compiled
-def _tip_state(x: float, y: float, alpha: float, delta: float, known: Tables, workspace: Workspace) -> State:
+def _tip_state(x: float, y: float, alpha: float, delta: float, known: Tables, workspace: Workspace) -> ContactState:
     """State in tip contact (Phase A): distance and direction of the tip give amplitude and direction at the contact."""
     larger, smaller = max(abs(x), abs(y)), min(abs(x), abs(y))
     deficit2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
@@ -83,12 +85,14 @@ def _tip_state(x: float, y: float, alpha: float, delta: float, known: Tables, wo
         by_slope = 1.0 - (value_x * (1.0 + by_psi1.turn) - value_1 * by_chi.turn) / det
         by_distance = -0.5 * (angle_1 * by_chi.turn - angle_x * (1.0 + by_psi1.turn)) / det / value
     force, tip_angle = arc.length * arc.length, beta + 0.5 * math.pi - epsilon1
-    return State(tip_angle + arc.turn, force * u, -force * sin, force * cos, 1.0, tip_angle, by_slope, by_distance)
+    return ContactState(
+        tip_angle + arc.turn, force * u, -force * sin, force * cos, 1.0, tip_angle, by_slope, by_distance
+    )
 
 
 @cached
 def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArray[int8], out: Floats) -> None:
-    """Write states of straight rods (fields of `State`, and the arc length of tangential contact), shape (n, 9).
+    """Write states of straight rods (fields of `ContactState`, and the arc length of tangential contact), shape (n, 9).
 
     Contacts (contact point, slope angle, friction angle) are mirrored to forward ones, shape (n, 4). A phase is stored
     where it was `NONE`, for unknown.
@@ -150,6 +154,6 @@ def continued_wrenches(
 
 
 @compiled
-def _store(state: State, out: Floats) -> None:
+def _store(state: ContactState, out: Floats) -> None:
     for k in range(8):
         out[k] = state[k]

@@ -54,7 +54,7 @@ class Chord(NamedTuple):
     rate: float  # derivative of `at_point` by the length of the chord
 
 
-class _Start(NamedTuple):
+class _AtContact(NamedTuple):
     """State at the contact."""
 
     sin: float
@@ -64,9 +64,9 @@ class _Start(NamedTuple):
 
 
 @compiled
-def _start(psi1: float, arclength: float, force: float, curvature: float) -> _Start:
+def _start(psi1: float, arclength: float, force: float, curvature: float) -> _AtContact:
     a = 0.25 * math.pi - 0.5 * psi1
-    return _Start(math.sin(a), math.cos(a), 0.5 * curvature * arclength, force * arclength * arclength)
+    return _AtContact(math.sin(a), math.cos(a), 0.5 * curvature * arclength, force * arclength * arclength)
 
 
 class _Parts(NamedTuple):
@@ -82,7 +82,7 @@ class _Parts(NamedTuple):
 
 
 @compiled
-def _parts(start: _Start, at: Jacobi) -> _Parts:
+def _parts(start: _AtContact, at: Jacobi) -> _Parts:
     sin, cos, bend, load = start
     s, c, d, r, j = at
     s2, sin2, sc = s * s, sin * sin, sin * cos
@@ -131,7 +131,7 @@ def by_arclength(psi1: float, force: float, curvature: float, here: Pose) -> Pos
 
 @compiled
 def _by(
-    start: _Start,
+    start: _AtContact,
     at: Jacobi,
     by_x: Jacobi,
     by_y: Jacobi,

@@ -207,7 +207,7 @@ def _refuse_backward(feet: Floats, scatter: float) -> None:
         )
 
 
-class _Start(NamedTuple):
+class _Guess(NamedTuple):
     """A first guess."""
 
     length: float
@@ -215,7 +215,7 @@ class _Start(NamedTuple):
     slopes: Floats  # slopes of the rod at points of equal distance [rad]
 
 
-def _start_of(points: Floats) -> _Start:
+def _start_of(points: Floats) -> _Guess:
     """Polynomials through the points by the length of the chain that they form."""
     chain = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
     chain /= chain[-1]
@@ -224,7 +224,7 @@ def _start_of(points: Floats) -> _Start:
     arc = cumulative_trapezoid(np.hypot(x(z), y(z)), z, initial=0)
     slopes = np.unwrap(np.arctan2(y(z), x(z)))
     even = np.linspace(0.0, arc[-1], z.size)
-    return _Start(float(arc[-1]), np.interp(chain, z, arc) / arc[-1], np.interp(even, arc, slopes))
+    return _Guess(float(arc[-1]), np.interp(chain, z, arc) / arc[-1], np.interp(even, arc, slopes))
 
 
 class _Posterior(NamedTuple):
