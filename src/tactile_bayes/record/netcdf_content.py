@@ -82,7 +82,7 @@ def refuse_unsafe(hdf5: h5py.File, size: int) -> None:
             if len(known) > _OBJECTS:
                 raise UnsafeError(f"it has more than {_OBJECTS:,} groups and variables")
             _refuse_attributes(part, size)
-            if isinstance(part, h5py.FileGroup):
+            if isinstance(part, h5py.Group):
                 waiting.append((part, depth + 1))
             elif isinstance(part, h5py.Dataset):
                 total += _size_of(part, size)
@@ -97,7 +97,7 @@ def refuse_unsafe_variable(hdf5: h5py.File, name: str, size: int) -> None:
     _size_of(part, size)
 
 
-def _part_of(group: h5py.FileGroup, name: str) -> h5py.HLObject:
+def _part_of(group: h5py.Group, name: str) -> h5py.HLObject:
     """Return a group or variable, and refuse a link."""
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         raise UnsafeError(f"{group.name.rstrip('/')}/{name} is a link, which may lead to another file")
@@ -147,13 +147,13 @@ def _refuse_attributes(part: h5py.HLObject, size: int) -> None:
             raise UnsafeError(f"the attribute {name} of {part.name} is said to have {stored:,} bytes")
 
 
-def _groups(path: str, group: h5netcdf.FileGroup) -> Iterator[tuple[str, FileGroup]]:
+def _groups(path: str, group: h5netcdf.Group) -> Iterator[tuple[str, FileGroup]]:
     yield path, _group(group)
     for name, part in group.groups.items():
         yield from _groups(f"{path.rstrip('/')}/{name}", part)
 
 
-def _group(group: h5netcdf.FileGroup) -> FileGroup:
+def _group(group: h5netcdf.Group) -> FileGroup:
     variables = {
         name: (variable.dimensions, _plain(variable[...]), _attributes(variable))
         for name, variable in group.variables.items()
@@ -167,7 +167,7 @@ def _plain(values: Any) -> NDArray[Any]:
     return array.astype(np.dtype(array.dtype.str), copy=False) if array.dtype.kind != "O" else array.astype(object)
 
 
-def _attributes(of: h5netcdf.FileGroup | h5netcdf.Variable) -> dict[str, Any]:
+def _attributes(of: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
     """Return attributes, texts as such, as xarray does."""
     found = dict(of.attrs)
     for name, value in found.items():
