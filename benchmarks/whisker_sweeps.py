@@ -7,14 +7,12 @@ the peak, over some 6 mm. Taken from that README are the direction of the whiske
 coordinates, and 4.1 mm between the hinge of the sensor and the first traced point. From that point the rod is 51 mm
 long: there it lets go of the smaller cylinder. Its rigidity is that of a wire of 0.24 mm, and scales the gain.
 
-    python -m benchmarks.whisker_sweeps [--stem] [--length] [--shape-free] FOLDER [SWEEP ...]
+    python -m benchmarks.whisker_sweeps [--length] FOLDER [SWEEP ...]
 
 keeps the rig, every posterior and its figure in FOLDER, and goes on from there. SWEEP is like cylinder_may25/trial0, or
-cylinder_may25, the sweeps of a session in one record, which have one hysteresis if they repeat each other. With --stem
-the piece before the first traced point is rigid, and its length inferred, with a prior of 4.1 ± 2 mm. With --length the
-length of the rod is inferred from the sweeps, with a prior of ± 1.5 mm. Where a table shows that the rod lets go, after
-its record has ended, that is compared with what the posterior predicts. With --shape-free the contour need not be a
-circle, and how far the arc that was touched is from one is printed.
+cylinder_may25, the sweeps of a session in one record, which have one hysteresis if they repeat each other. With
+--length the length of the rod is inferred from the sweeps, with a prior of ± 1.5 mm. Where a table shows that the rod
+lets go, after its record has ended, that is compared with what the posterior predicts.
 """
 
 from __future__ import annotations
@@ -46,10 +44,8 @@ ORIGIN = np.array([64.3045, 98.0687])  # place of the sensor in the coordinates 
 # Direction of the whisker at the clamp. The object rests and the sensor moves, in a frame that is turned by half.
 DRIVE_ANGLE = np.radians(180.0 - 115.3)
 HINGE, LENGTH, DIAMETER, RIGIDITY = 4.1, 51.0, 0.24e-3, 1e-5
-STEM = 4.1e-3, 2e-3  # length of a rigid piece before the first traced point, and its standard deviation [m]
 FREE = 1.5e-3  # standard deviation of the rod's length where it is inferred [m]
-# Hysteresis over the peak: of a mean of readings there and back, which differ by 6 counts, and of a sweep.
-AT_POINTS, ON_SWEEPS = 0.0025, 0.01
+ON_SWEEPS = 0.01  # hysteresis over the peak
 COUNTS = 5e6  # roughly, counts to N m; the calibration finds them
 SENSOR = tb.LoadCell(moment_noise=3.0, gain=((COUNTS, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
@@ -58,17 +54,13 @@ RINGS = range(3, 9)
 UNTOUCHED = 15  # number of readings before contact
 BEFORE = np.radians(-108.0)  # bearing from which the probe arrives, on the other side of the whisker
 SWEEPS = tuple(f"cylinder_may25/trial{k}" for k in range(5)) + tuple(f"cylinder_may03/trial{k}" for k in range(1, 5))
-LONG = tb.SamplerSettings(walkers=40, min_ess=400, max_r_hat=1.03, max_seconds=420)
 ENOUGH = tb.SamplerSettings(ensembles=2, walkers=40, min_ess=400, max_r_hat=1.03, max_seconds=600)
-ENOUGH_OF_ANY_SHAPE = tb.SamplerSettings(min_ess=400, max_r_hat=1.03, max_seconds=1200)
 
 
-def whisker(on_stem: bool = False) -> tb.Rod:
-    """Return the rod, from the hinge to the tip, whose first piece is straight, or a rigid stem."""
+def whisker() -> tb.Rod:
+    """Return the rod, from the hinge to the tip, whose first piece is straight."""
     traced = _table("shape_y.csv")
     x, y = traced["x"], traced["y"]
-    if on_stem:
-        return tb.Rod.from_shape(1e-3 * x, 1e-3 * y, RIGIDITY, length=1e-3 * LENGTH, diameter=DIAMETER, stem=STEM[0])
     before = np.array([x[0] - x[3], y[0] - y[3]])
     before *= HINGE / np.hypot(*before)
     x, y = np.append(x[0] + before[0] * np.array([1.0, 0.5]), x), np.append(y[0] + before[1] * np.array([1.0, 0.5]), y)
@@ -124,13 +116,13 @@ def _end(counts: Floats) -> int:
     return int(np.argmax(released)) if released.any() else counts.size
 
 
-def hysteresis(share: float, rod: tb.Rod) -> dict[str, Any]:
-    """Return the priors of a discrepancy of about a share of the peak, and 6 mm long.
+def hysteresis(rod: tb.Rod) -> dict[str, Any]:
+    """Return the priors of the discrepancy of a sweep, which is 6 mm long.
 
     Other parameters follow a smooth deviation, so that residuals do not tell its size: it is given.
     """
     length = stats.lognorm(s=0.3, scale=6e-3 / rod.length)
-    return {"discrepancy_scale": stats.lognorm(s=0.01, scale=share), "discrepancy_length": length}
+    return {"discrepancy_scale": stats.lognorm(s=0.01, scale=ON_SWEEPS), "discrepancy_length": length}
 
 
 def _record(rod: tb.Rod, sweep: Floats, x: Floats, y: Floats, counts: Floats) -> xr.Dataset:
@@ -157,15 +149,9 @@ def calibrated(folder: Path, rod: tb.Rod) -> tuple[tb.Rig, xr.DataTree]:
             "suspension_compliance": stats.halfnorm(scale=0.3 / unit),
             **dict.fromkeys(("gauge_x", "gauge_y"), stats.norm(0.0, 3e-3)),
         }
-        options: dict[str, Any] = {}
-        if rod.stem:
-            unknown |= dict.fromkeys(("gauge_x", "gauge_y"), stats.norm(0.0, 5e-3)) | hysteresis(AT_POINTS, rod)
-            unknown["noise_scale"] = stats.lognorm(s=0.2)  # beside a discrepancy 30 readings do not tell it
-            unknown["stem"] = stats.truncnorm(-STEM[0] / STEM[1], np.inf, *STEM)
-            options = {"checkpoint": folder / "rig", "settings": LONG}
         probe = tb.contours.Circle(r=1e-5, q=-1e-5)
         rig = tb.Rig(load_cell=SENSOR, unknown=unknown)
-        rig = tb.calibrate_rig(points(rod), contour=probe, rig=rig, rng=1, **options)
+        rig = tb.calibrate_rig(points(rod), contour=probe, rig=rig, rng=1)
         assert rig.calibration is not None
         assert rig.calibration.posterior is not None
         rig.write(file)
@@ -173,50 +159,23 @@ def calibrated(folder: Path, rod: tb.Rod) -> tuple[tb.Rig, xr.DataTree]:
     return tb.Rig.read(file), tb.read_result(path)
 
 
-def measured(
-    folder: Path, name: str, rod: tb.Rod, rig: tb.Rig, of_any_length: bool = False, of_any_shape: bool = False
-) -> xr.DataTree:
+def measured(folder: Path, name: str, rod: tb.Rod, rig: tb.Rig, of_any_length: bool = False) -> xr.DataTree:
     """Return the posterior of the cylinder of a sweep, or of all sweeps of a session."""
-    path = folder / f"{file_name(name, of_any_length, of_any_shape)}.nc"
+    path = folder / f"{file_name(name, of_any_length)}.nc"
     if not path.exists():
         unknown: dict[str, Any] = dict.fromkeys(("moment_bias", "friction", "noise_scale"), "default")
-        unknown |= {"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(ON_SWEEPS, rod)}
+        unknown |= {"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(rod)}
         if of_any_length:
             unknown["length"] = stats.norm(rod.length, FREE)
-        found = tb.infer_contour(
-            record_of(name, rod),
-            family="shape-free" if of_any_shape else "circle",
-            rig=rig.with_unknown(**unknown),
-            rng=1,
-            settings=ENOUGH_OF_ANY_SHAPE if of_any_shape else ENOUGH,
-        )
+        record, rig = record_of(name, rod), rig.with_unknown(**unknown)
+        found = tb.infer_contour(record, family="circle", rig=rig, rng=1, settings=ENOUGH)
         tb.write_result(found, path)
     return tb.read_result(path)
 
 
-def file_name(name: str, of_any_length: bool, of_any_shape: bool) -> str:
+def file_name(name: str, of_any_length: bool) -> str:
     """Return the name of a posterior's files, without an ending."""
-    return f"{name.replace('/', '-')}{'-length' if of_any_length else ''}{'-shape-free' if of_any_shape else ''}"
-
-
-def roundness(found: xr.DataTree) -> str:
-    """Return the radius of a circle fitted to the arc that was touched, and its largest distance from the arc."""
-    touched = np.nanquantile(tb.uncertainty.implied_contacts(found, draws=100)["posterior"].slope_angle, [0.02, 0.98])
-    draws = found["posterior"].dataset.stack(every=("chain", "draw"))
-    contours = contours_of(draws.isel(every=slice(None, None, max(1, draws.sizes["every"] // 200))), "shape-free")
-    radii, off = [], []
-    for k in range(*contours.shape):
-        x, y = (1e3 * each for each in contours.take(k).point(np.linspace(*touched, 60)))
-        twice_x, twice_y, rest = np.linalg.lstsq(np.stack([x, y, np.ones(x.size)], axis=1), x**2 + y**2)[0]
-        radii.append(np.sqrt(rest + (twice_x**2 + twice_y**2) / 4.0))
-        off.append(np.abs(np.hypot(x - twice_x / 2.0, y - twice_y / 2.0) - radii[-1]).max())
-    low, high = np.degrees(touched)
-    middle, least, most = np.quantile(radii, [0.5, 0.025, 0.975])
-    off_by, off_least, off_most = np.quantile(off, [0.5, 0.025, 0.975])
-    return (
-        f"slopes of {low:.0f} to {high:.0f}°: a circle of {middle:.2f} mm ({least:.2f} to {most:.2f}), off by at most "
-        f"{off_by:.2f} mm ({off_least:.2f} to {off_most:.2f})"
-    )
+    return f"{name.replace('/', '-')}{'-length' if of_any_length else ''}"
 
 
 def radius(found: xr.DataTree) -> str:
@@ -279,23 +238,22 @@ def picture(posterior: xr.DataTree) -> Figure:
 
 
 def main() -> None:
-    arguments = [argument for argument in sys.argv[1:] if argument not in ("--stem", "--length", "--shape-free")]
+    arguments = [argument for argument in sys.argv[1:] if argument != "--length"]
     folder, names = Path(arguments[0]), arguments[1:] or SWEEPS
     folder.mkdir(parents=True, exist_ok=True)
-    rod, began = whisker(on_stem="--stem" in sys.argv), perf_counter()
-    free = "--length" in sys.argv, "--shape-free" in sys.argv
+    rod, began, free = whisker(), perf_counter(), "--length" in sys.argv
     rig, of_rig = calibrated(folder, rod)
     print(f"rig: {of_rig.attrs['message']} ({perf_counter() - began:.0f} s)")
     for name, draws in of_rig["posterior"].mean().items():
         print(f"  {name:24s} {float(draws):12.5g} ± {float(of_rig['posterior'][name].std()):.2g}")
     for name in names:
         began = perf_counter()
-        found = measured(folder, name, rod, rig, *free)
+        found = measured(folder, name, rod, rig, free)
         friction = found["posterior"].friction.values.ravel()
         off = found["observed_data"].holding_moment
         off = off - found["posterior_predictive"].holding_moment.mean(("chain", "draw"))
         print(
-            f"{name}: {roundness(found) if free[1] else radius(found)}, friction {friction.mean():.2f} ± "
+            f"{name}: {radius(found)}, friction {friction.mean():.2f} ± "
             f"{friction.std():.2f}, residuals {float(np.sqrt((off**2).mean())):.1f} counts, "
             f"{perf_counter() - began:.0f} s; {found.attrs['message']}",
             flush=True,
@@ -303,8 +261,7 @@ def main() -> None:
         if "length" in found["posterior"]:
             length = 1e3 * found["posterior"].length
             print(f"  length {float(length.mean()):.1f} ± {float(length.std()):.1f} mm of {1e3 * rod.length:.1f} mm")
-        if not free[1]:
-            picture(found).savefig(folder / f"{file_name(name, *free)}.png", dpi=110, bbox_inches="tight")
+        picture(found).savefig(folder / f"{file_name(name, free)}.png", dpi=110, bbox_inches="tight")
         for words in releases(found, name, rod):
             print(f"  lets go at {words}")
 
