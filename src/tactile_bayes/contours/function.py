@@ -104,7 +104,7 @@ def from_function(
     if (slope is None) != (curvature is None):
         raise ContourError("from_function: give both slope and curvature, or none of them")
     if slope is None or curvature is None:
-        interpolant = _resolved(_Named(g, named), lo, hi)
+        interpolant = _resolved(_NamedFunction(g, named), lo, hi)
         contour = FunctionContour(interpolant, interpolant.deriv(), interpolant.deriv(2), lo, hi, named)
     else:
         contour = FunctionContour(g, slope, curvature, lo, hi, named)
@@ -114,7 +114,7 @@ def from_function(
 
 
 @dataclass(frozen=True)
-class _Named:
+class _NamedFunction:
     """A function with finite values, and its name for messages."""
 
     function: Function
@@ -141,7 +141,7 @@ class _Named:
         return values
 
 
-def _resolved(g: _Named, lo: float, hi: float) -> Chebyshev:
+def _resolved(g: _NamedFunction, lo: float, hi: float) -> Chebyshev:
     interpolant = _interpolant(g, lo, hi)
     if interpolant is not None:
         return interpolant
@@ -165,7 +165,7 @@ def _resolved(g: _Named, lo: float, hi: float) -> Chebyshev:
     )
 
 
-def _interpolant(g: _Named, lo: float, hi: float) -> Chebyshev | None:
+def _interpolant(g: _NamedFunction, lo: float, hi: float) -> Chebyshev | None:
     """Interpolant that equals g up to rounding, at its nodes and between them; None if there is none."""
     between = _probes(lo, hi, _MANY_PROBES)
     heights = g(between)
@@ -181,7 +181,7 @@ def _interpolant(g: _Named, lo: float, hi: float) -> Chebyshev | None:
     return None
 
 
-def _may_be_joined(g: _Named, lo: float, at: float, hi: float) -> bool:
+def _may_be_joined(g: _NamedFunction, lo: float, at: float, hi: float) -> bool:
     """Return whether both sides of a point are smooth up to it, and the slope does not fall there."""
     if not lo < at < hi:
         return False
@@ -189,7 +189,7 @@ def _may_be_joined(g: _Named, lo: float, at: float, hi: float) -> bool:
     return left is not None and right is not None and bool(left.deriv()(at) <= right.deriv()(at) + SAME_SLOPE)
 
 
-def _rough_place(g: _Named, lo: float, hi: float, near: float) -> float:
+def _rough_place(g: _NamedFunction, lo: float, hi: float, near: float) -> float:
     """Find a point where a function is not smooth, by descent into the worst of left, middle and right half."""
     size, width = np.abs(g(_probes(lo, hi))).max(), hi - lo
     lo, hi = max(lo, near - 0.02 * width), min(hi, near + 0.02 * width)
@@ -203,7 +203,7 @@ def _rough_place(g: _Named, lo: float, hi: float, near: float) -> float:
     return float(np.round(0.5 * (lo + hi), -int(np.ceil(np.log10(0.5 * (hi - lo)))))) + 0.0
 
 
-def _patch_miss(g: _Named, lo: float, hi: float) -> float:
+def _patch_miss(g: _NamedFunction, lo: float, hi: float) -> float:
     patch = Chebyshev.interpolate(g, _PATCH, domain=[lo, hi])
     x = _probes(lo, hi, 2 * _PATCH)
     return float(np.abs(patch(x) - g(x)).max())
@@ -218,8 +218,8 @@ def _refuse_other_derivatives(contour: FunctionContour) -> None:
     """Refuse derivatives whose integrals miss the function, or that jump."""
     width = contour.right - contour.left
     x = _probes(contour.left, contour.right)
-    g, slope = _Named(contour.g, "the function"), _Named(contour.slope, "the slope")
-    for rate, of in ((slope, g), (_Named(contour.curvature, "the curvature"), slope)):
+    g, slope = _NamedFunction(contour.g, "the function"), _NamedFunction(contour.slope, "the slope")
+    for rate, of in ((slope, g), (_NamedFunction(contour.curvature, "the curvature"), slope)):
         found = mismatch(rate, of, x)
         if found is not None and np.isnan(found.miss):
             at = float(np.round(found.right / width, 12) * width) + 0.0
@@ -249,7 +249,7 @@ def _refuse_dents(x: Floats, heights: Floats) -> None:
 
 def _refuse_unless_convex(contour: FunctionContour) -> None:
     x = _probes(contour.left, contour.right)
-    bend = _Named(contour.curvature, "the curvature")(x)
+    bend = _NamedFunction(contour.curvature, "the curvature")(x)
     concave = bend < -_CONVEX * np.abs(bend).max()
     straight = (bend[1:] <= 0.0) & (bend[:-1] <= 0.0)
     if np.any(concave):
