@@ -194,10 +194,10 @@ def releases(found: xr.DataTree, name: str, rod: tb.Rod) -> list[str]:
     rig = unknowns.rig({one: draws[one].values for one in inferred})
     record = record_of(name, rod, whole=True)
     contours = contours_of(draws, found.attrs["family"])
-    ways = 1e3 * events_of(RecordLikelihood(record, SENSOR), contours, rig)["snap_off_travel"]
     words = []
-    for number, predicted in zip(np.unique(record.sweep), ways.T, strict=True):
+    for number in np.unique(record.sweep):
         own = record.isel(sample=record.sweep.values == number)
+        predicted = 1e3 * events_of(RecordLikelihood(own, SENSOR), contours, rig)["snap_off_travel"]
         counts = own.holding_moment.values - own.holding_moment.values[:UNTOUCHED].mean()
         loaded = np.flatnonzero(counts > 0.1 * counts.max())[-1]
         if loaded + 1 < counts.size:
