@@ -173,7 +173,9 @@ def calibrated(family: str, noise: str, replicates: int | None) -> xr.Dataset:
 def main(*chosen: str) -> None:
     count = next((int(word) for word in chosen if word.isdigit()), None)
     families = list(STICKING) if "sticking" in chosen else [name for name in EVERY if name in chosen] or list(FAMILIES)
-    noises = ["usual"] if set(families) & set(STICKING) else [name for name in NOISES if name in chosen] or list(NOISES)
+    if "traced" in families and "published" not in chosen:
+        raise SystemExit("python -m benchmarks.traced records makes the replicates of traced rods")
+    noises = ["usual"] if set(families) - set(FAMILIES) else [name for name in NOISES if name in chosen] or list(NOISES)
     for noise in noises:
         if "published" in chosen:
             made = published(families, noise)

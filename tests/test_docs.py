@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import pytest
 import typer
-from benchmarks.calibration import FAMILIES, STICKING, Family, published, table
+from benchmarks.calibration import FAMILIES, STICKING, TRACED, Family, published, table
 
 import tactile_bayes as tb
 from helpers.commands import call
@@ -143,6 +143,7 @@ def test_commands_and_options_that_are_shown_exist(path: Path) -> None:
         pytest.param(FAMILIES, "tenth", DOCS / "trust.md", marks=pytest.mark.slow),
         (FAMILIES, "threefold", DOCS / "trust.md"),
         (STICKING, "usual", DOCS / "trust.md"),
+        (TRACED, "usual", DOCS / "trust.md"),
     ],
 )
 def test_a_table_of_calibrations_is_that_of_the_published_replicates(
