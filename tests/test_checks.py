@@ -60,8 +60,8 @@ def posterior():
     groups = {
         "posterior": xr.Dataset({k: (("chain", "draw"), np.full((2, 3), v)) for k, v in draws.items()}),
         "events": xr.Dataset(
-            {k: (("chain", "draw", "stroke"), np.broadcast_to(v, (2, 3, 2))) for k, v in ends.items()},
-            coords={"stroke": ["forward", "backward"]},
+            {k: (("chain", "draw", "segment"), np.broadcast_to(v, (2, 3, 2))) for k, v in ends.items()},
+            coords={"segment": ["forward", "backward"]},
         ),
         "posterior_predictive": xr.Dataset({"force_x": (("chain", "draw", "sample"), np.zeros((2, 3, 4)))}),
     }

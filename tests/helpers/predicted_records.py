@@ -48,8 +48,8 @@ def predicted(cell: LoadCell = CELL, *, chains: int = 4, draws: int = 250, seed:
             "sample_stats": xr.Dataset({"lp": (dims[:2], np.zeros(shape[:2]))}, coords=coords),
             "posterior_predictive": xr.Dataset(predictive, coords=coords),
             "events": xr.Dataset(
-                {name: ((*dims[:2], "stroke"), np.broadcast_to(pair, shape)) for name, pair in events.items()},
-                coords={"stroke": ["forward", "backward"]},
+                {name: ((*dims[:2], "segment"), np.broadcast_to(pair, shape)) for name, pair in events.items()},
+                coords={"segment": ["forward", "backward"]},
             ),
             "observed_data": record[list(CHANNELS)].drop_attrs(deep=False),
             "constant_data": record.drop_vars(CHANNELS).drop_attrs(deep=False),

@@ -117,7 +117,7 @@ def test_layout():
     kept = result["events"].sizes["draw"]
     assert dict(result["log_likelihood"].sizes) == {"chain": chains, "draw": kept, "sample": samples}
     assert dict(result["posterior_predictive"].sizes) == {"chain": chains, "draw": kept, "sample": samples}
-    assert result["events"].stroke.values.tolist() == ["forward", "backward"]
+    assert result["events"].segment.values.tolist() == ["forward", "backward"]
     assert dict(result["prior"].sizes) == {"chain": 1, "draw": 1000}
     assert 0.0 < result["prior"].attrs["share_within_reach"] < 1.0
     assert result.attrs["data_sha256"] == record_hash(measured())
@@ -158,7 +158,7 @@ def test_events_are_those_of_the_drawn_contours():
     contour = Parabola(*(float(draw[name]) for name in TRUTH))
     events = scan(contour).events
     for segment, direction in enumerate(("forward", "backward")):
-        found = result["events"].isel(chain=0, draw=3, stroke=segment)
+        found = result["events"].isel(chain=0, draw=3, segment=segment)
         for label, event in (("first", events[direction].first_contact), ("snap_off", events[direction].snap_off)):
             for name in ("drive_angle", "contact_x", "contact_y"):
                 off = 1e-6 if name == "drive_angle" else 1e-5
@@ -243,7 +243,7 @@ def test_moment_only_in_brief():
 def test_several_pivots():
     record = coarse(bases=((0.0, 0.0), (0.3, 0.1)))
     result = infer_as_stated(record, rng=1, settings=BRIEF)
-    assert sorted(result["events"].stroke.values) == ["backward", "backward", "forward", "forward"]
+    assert sorted(result["events"].segment.values) == ["backward", "backward", "forward", "forward"]
     assert float(abs(result["posterior"].a - 0.5).max()) < 0.05
 
 

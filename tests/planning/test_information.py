@@ -374,15 +374,15 @@ def test_more_is_never_less():
 def test_leverage_sums_to_what_is_told():
     found = told(DOUBLE)
     assert np.all((found.leverage.values >= 0.0) & (found.leverage.values <= 1.0))
-    assert float(found.leverage.sum()) == pytest.approx(found.attrs["told"])
+    assert float(found.leverage.sum()) == pytest.approx(found.attrs["leverage_sum"])
     parameters = found.sizes["parameter"] - 1  # what is said of the noise is not in the readings' slopes
-    assert found.attrs["told"] <= parameters
+    assert found.attrs["leverage_sum"] <= parameters
     # The trace of M (M + P)⁻¹, of another route.
     matrix = record_information(DOUBLE.model, DOUBLE.point).matrix[:-1, :-1]
     prior = np.diag(prior_precision(DOUBLE.model))[:-1]
     scale = np.sqrt(prior)
     values = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
-    assert found.attrs["told"] == pytest.approx(np.sum(values / (values + 1.0)), rel=1e-6)
+    assert found.attrs["leverage_sum"] == pytest.approx(np.sum(values / (values + 1.0)), rel=1e-6)
     assert found.attrs["readings"] == found.leverage.size
 
 

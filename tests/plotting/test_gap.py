@@ -15,7 +15,7 @@ TRUTH = Parabola(5.0, q=0.03)
 def posterior(left, right, share=0.01):
     """Draws about the true contour; the gap is from `left` to `right`, in metres."""
     rng = np.random.default_rng(1)
-    dims, size = ("chain", "draw", "stroke"), (2, 200)
+    dims, size = ("chain", "draw", "segment"), (2, 200)
     parameters = {"a": 5.0, "q": 0.03, "x_c": 0.0}
     noise = {"a": share * 5.0, "q": share * 1e-3, "x_c": share * 0.01}
     ends = {"snap_off_contact_x": (right, left), "first_contact_x": (0.09, -0.09), "snap_off_drive_angle": (3.2, -0.1)}
@@ -24,7 +24,7 @@ def posterior(left, right, share=0.01):
             "posterior": xr.Dataset({k: (dims[:2], rng.normal(v, noise[k], size)) for k, v in parameters.items()}),
             "events": xr.Dataset(
                 {k: (dims, rng.normal(v, 1e-4, (*size, 2))) for k, v in ends.items()},
-                coords={"stroke": ["forward", "backward"]},
+                coords={"segment": ["forward", "backward"]},
             ),
         }
     )

@@ -199,7 +199,7 @@ def test_leverage_is_drawn_by_channel_and_direction(found):
     moment = float(told.leverage.sel(channel="holding_moment").sum())
     assert labels(ax)[0] == f"holding moment $m_0$: {moment:.3g}"
     assert labels(ax)[3:] == ["forward", "backward"]
-    assert ax.get_legend().get_title().get_text().endswith(f"readings together: {told.attrs['told']:.3g}")
+    assert ax.get_legend().get_title().get_text().endswith(f"readings together: {told.attrs['leverage_sum']:.3g}")
 
 
 # --- Shares ---------------------------------------------------------------------------------------------------------

@@ -17,12 +17,12 @@ A, Q, X_C = 0.5, 0.3, 0.05
 
 
 def tree(last, segments=BOTH, *, first=None, a=A, q=Q, x_c=X_C, units="SI"):
-    """Parabolas whose sweeps end at `last`, of shape (chain, draw, stroke)."""
+    """Parabolas whose sweeps end at `last`, of shape (chain, draw, segment)."""
     last = np.asarray(last, dtype=float)
     first = np.where(np.array(segments) == "forward", 1.0, -1.0) if first is None else first
     angles = np.where(np.array(segments) == "forward", 3.2, -0.1)
     events = {"snap_off_contact_x": last, "first_contact_x": first, "snap_off_drive_angle": angles}
-    dims = ("chain", "draw", "stroke")
+    dims = ("chain", "draw", "segment")
     shape = last.shape[:2]
     out = xr.DataTree.from_dict(
         {
@@ -30,7 +30,7 @@ def tree(last, segments=BOTH, *, first=None, a=A, q=Q, x_c=X_C, units="SI"):
                 {k: (dims[:2], np.broadcast_to(v, shape)) for k, v in {"a": a, "q": q, "x_c": x_c}.items()}
             ),
             "events": xr.Dataset(
-                {k: (dims, np.broadcast_to(v, last.shape)) for k, v in events.items()}, coords={"stroke": segments}
+                {k: (dims, np.broadcast_to(v, last.shape)) for k, v in events.items()}, coords={"segment": segments}
             ),
         }
     )
@@ -64,7 +64,7 @@ def test_bounds_are_quantiles():
     for name, values in expected.items():
         np.testing.assert_allclose(found[name], np.quantile(values, [0.05, 0.5, 0.95]), rtol=1e-9, err_msg=name)
         assert found[name].attrs["units"] == ("rad" if name.endswith("_angle") else "m")
-    np.testing.assert_allclose(found.snap_off_drive_angle.sel(stroke="forward"), 3.2, rtol=1e-15)
+    np.testing.assert_allclose(found.snap_off_drive_angle.sel(segment="forward"), 3.2, rtol=1e-15)
     assert found.bound.values.tolist() == ["lower", "median", "upper"]
     assert (found.attrs["probability"], found.attrs["gaps"]) == (0.9, 1)
     assert (found.status.item(), found.share_open.item()) == ("ok", 1.0)
@@ -117,7 +117,7 @@ def test_several_pivots_leave_open_what_none_has_reached():
     found = gap(tree([[[0.3, -0.2, 0.1, -0.4]]], segments)).sel(bound="median")
     assert (float(found.left), float(found.right)) == (-0.2, 0.1)
     assert float(found.width) == pytest.approx(0.3)
-    assert found.snap_off_drive_angle.sizes == {"stroke": 4}
+    assert found.snap_off_drive_angle.sizes == {"segment": 4}
 
 
 def test_arcs_of_several_pivots_are_merged():
@@ -169,9 +169,9 @@ def test_of_an_inferred_contour():
     for name, value in true.items():
         lower, _, upper = found[name].values
         assert lower < value < upper, name
-    for stroke in BOTH:
-        lower, _, upper = found.snap_off_drive_angle.sel(stroke=stroke).values
-        assert lower < events[stroke].snap_off.drive_angle < upper
+    for segment in BOTH:
+        lower, _, upper = found.snap_off_drive_angle.sel(segment=segment).values
+        assert lower < events[segment].snap_off.drive_angle < upper
     y = truth.height(found.x.values)
     assert np.all((found.triangle_lower < y) & (y < found.triangle_upper))
     assert found.status.item() == "ok"
@@ -185,11 +185,11 @@ def test_one_direction_leaves_no_gap(there):
 
 
 def with_events(made, **there):
-    """The same with events only in some of the draws, which are said for one stroke."""
+    """The same with events only in some of the draws, which are said for one segment."""
     events = made["events"].to_dataset()
-    for name, (draws, stroke) in there.items():
-        gone = ~draws[:, None] & (np.arange(2) == stroke)
-        events[name] = events[name].where(~xr.DataArray(gone, dims=("draw", "stroke")))
+    for name, (draws, segment) in there.items():
+        gone = ~draws[:, None] & (np.arange(2) == segment)
+        events[name] = events[name].where(~xr.DataArray(gone, dims=("draw", "segment")))
     out = made.copy()
     out["events"] = xr.DataTree(events)
     return out

@@ -176,9 +176,9 @@ def test_contact_begins_and_ends_with_the_events_of_the_same_draw():
     np.testing.assert_array_equal(tree["posterior"].draw, events.draw)
     angle, direction = measured().drive_angle.values, measured().direction.values
     first, snap = (events[f"{name}_drive_angle"] for name in ("first", "snap_off"))
-    for stroke in ("forward", "backward"):
-        on = direction == stroke
-        low, high = (x.sel(stroke=stroke) for x in ((first, snap) if stroke == "forward" else (snap, first)))
+    for segment in ("forward", "backward"):
+        on = direction == segment
+        low, high = (x.sel(segment=segment) for x in ((first, snap) if segment == "forward" else (snap, first)))
         within = (angle[on] >= low.values[..., None]) & (angle[on] <= high.values[..., None])
         np.testing.assert_array_equal(np.isfinite(tree["posterior"].contact_x.values[..., on]), within)
 

@@ -194,7 +194,7 @@ def _travels(events: Any) -> Any:
 
 def _segment_names(events: xr.Dataset) -> list[str]:
     """Return a distinct name for each sweep segment: its direction, with a number if there are several."""
-    directions = [str(direction) for direction in events.stroke.values]
+    directions = [str(direction) for direction in events.segment.values]
     counted = dict.fromkeys(directions, 0)
     names = []
     for direction in directions:

@@ -157,7 +157,7 @@ class StreamComparison:
         for name, log in logs.items():
             if log < logs[best] - GIVEN_UP:
                 samples_so_far = streams[name].latest().samples.item()
-                lost[name] = f"given up: {best} explains the first {samples_so_far} samples far better"
+                lost[name] = f"dropped: {best} explains the first {samples_so_far} samples far better"
         self._streams, self._lost = streams, lost
 
     def latest(self) -> xr.Dataset:

@@ -110,9 +110,9 @@ def _labelled_events(model: ContourModel, events: Mapping[str, Floats], coords: 
     for name, values in events.items():
         what = name.removeprefix("first_").removeprefix("snap_off_")
         column = COLUMNS["base_x" if what == "travel" else what]
-        variables[name] = (("chain", "draw", "stroke"), values, {"units": column.unit_in(units)})
+        variables[name] = (("chain", "draw", "segment"), values, {"units": column.unit_in(units)})
     sides = np.where(model.likelihood.segments.backward, "backward", "forward")
-    return xr.Dataset(variables, coords={**coords, "stroke": sides})
+    return xr.Dataset(variables, coords={**coords, "segment": sides})
 
 
 def prior_draws(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> xr.Dataset:

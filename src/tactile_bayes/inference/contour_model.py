@@ -219,7 +219,7 @@ class ContourModel:
         return self.log_likelihood_of(points, *self.felt(points), pointwise=pointwise)
 
     def log_likelihood_of(self, points: Floats, felt: Floats, usable: Flags, *, pointwise: bool = False) -> Floats:
-        """Return the `log_likelihood` of points from the results of `felt`, whose loads are lost."""
+        """Return the `log_likelihood` of points from the results of `felt`, whose loads are modified in place."""
         loads, discrepancy = self.sensed(points, felt)
         scale = self.noise_scale(points)
         return self.likelihood.score(loads, usable, scale, pointwise=pointwise, discrepancy=discrepancy)

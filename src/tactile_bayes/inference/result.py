@@ -26,7 +26,7 @@ STREAMED = "sequential Monte Carlo"  # sampler of a stream, as the attribute of 
 # Libraries by which a posterior is computed and stored, besides Python.
 _SOFTWARE = ("tactile-bayes", "numpy", "scipy", "emcee", "numba", "xarray", "arviz-stats", "h5netcdf")
 _EVENTS = ("first_contact_x", "snap_off_contact_x", "snap_off_drive_angle")
-_NO_CONTOUR = "this is no result of infer_contour: give the tree that it returned, or that read_result reads"
+_NO_CONTOUR = "expected the DataTree from infer_contour, or from read_result"
 
 
 def sample_stats(draws: Draws) -> xr.Dataset:
@@ -147,7 +147,7 @@ def contour_events(result: xr.DataTree) -> xr.Dataset:
     """Return the group of first contacts and snap-offs of a result of `infer_contour`."""
     refuse_no_contour(result, "events")
     events = result["events"].to_dataset()
-    _refuse_absent(events, _EVENTS, ("chain", "draw", "stroke"))
+    _refuse_absent(events, _EVENTS, ("chain", "draw", "segment"))
     return events
 
 

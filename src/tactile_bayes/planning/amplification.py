@@ -103,14 +103,14 @@ def amplification(plan: Plan) -> xr.Dataset:
             "sd_along": (dims, sd[:, 0], unit),
             "sd_across": (dims, sd[:, 1], unit),
             "holds": (dims, np.array([_holds(refined, method)[loaded] for method in METHODS])),
-            "growth_along": (("reconstruction", "stroke", "event"), growth[:, 0]),
-            "growth_across": (("reconstruction", "stroke", "event"), growth[:, 1]),
+            "growth_along": (("reconstruction", "segment", "event"), growth[:, 0]),
+            "growth_across": (("reconstruction", "segment", "event"), growth[:, 1]),
         },
         coords={
             "reconstruction": list(METHODS),
             "source": list(SOURCES),
             "event": ["first contact", "snap-off"],
-            "stroke": [
+            "segment": [
                 f"{sweep.direction} from ({sweep.base[0]:g}, {sweep.base[1]:g})" for sweep in refined.scan.sweeps
             ],
         },

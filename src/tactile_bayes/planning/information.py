@@ -77,7 +77,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
             "family": plan.experiment.own_family.name,
             "probability": probability,
             "readings": int(rows.shape[0]),
-            "told": float(leverage.sum()),
+            "leverage_sum": float(leverage.sum()),
         },
     )
 

@@ -205,8 +205,8 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     >>> draws = {"a": 0.5, "q": 0.3, "x_c": 0.0}
     >>> ends = {"first_contact_x": [0.9, -0.9], "snap_off_contact_x": [0.1, -0.1], "snap_off_drive_angle": [3.2, -0.1]}
     >>> posterior = xr.Dataset({k: (("chain", "draw"), [[v]]) for k, v in draws.items()})
-    >>> events = xr.Dataset({k: (("chain", "draw", "stroke"), [[v]]) for k, v in ends.items()})
-    >>> events = events.assign_coords(stroke=["forward", "backward"])
+    >>> events = xr.Dataset({k: (("chain", "draw", "segment"), [[v]]) for k, v in ends.items()})
+    >>> events = events.assign_coords(segment=["forward", "backward"])
     >>> tree = xr.DataTree.from_dict({"posterior": posterior, "events": events})
     >>> tree.attrs = {"family": "parabola", "units": "dimensionless"}
     >>> gap(gap_of(tree)).get_ylabel()

@@ -151,25 +151,25 @@ def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> A
     >>> information(found, ax=Figure().subplots()).get_ylabel()
     'leverage of a reading'
     """
-    told = group_of(found, "information", {"leverage", "channel", "sweep", "direction", "drive_angle"})
+    known = group_of(found, "information", {"leverage", "channel", "sweep", "direction", "drive_angle"})
     check_drawing(ax)
     ax = single_axes() if ax is None else ax
-    for sweep in np.unique(told["sweep"].values):
-        of = _of_sweep(told, sweep)
+    for sweep in np.unique(known["sweep"].values):
+        of = _of_sweep(known, sweep)
         angle, style = np.degrees(of["drive_angle"].values), SWEEP_LINES[str(of["direction"].values[0])]
-        for name in map(str, told["channel"].values):
+        for name in map(str, known["channel"].values):
             leverage = of["leverage"].sel(channel=name).values
             ax.plot(angle, leverage, style, color=READING_COLOURS[name], linewidth=1.3)
-    for name in map(str, told["channel"].values):
-        whole = number(float(told["leverage"].sel(channel=name).sum()), digits=3)
+    for name in map(str, known["channel"].values):
+        whole = number(float(known["leverage"].sel(channel=name).sum()), digits=3)
         legend_entry(ax, f"{LABELS[name]}: {whole}", color=READING_COLOURS[name], linewidth=2.5)
-    for direction in dict.fromkeys(map(str, told["direction"].values)):
+    for direction in dict.fromkeys(map(str, known["direction"].values)):
         legend_entry(ax, direction, color="0.35", linestyle=SWEEP_LINES[direction], linewidth=1.3)
     ax.set_ylim(bottom=0.0)
     ax.set_xlabel(DRIVE_ANGLE)
     ax.set_ylabel("leverage of a reading")
-    whole = number(float(told["leverage"].sum()), digits=3)
-    title = f"leverage of all {told['leverage'].size:,} readings together: {whole}"
+    whole = number(float(known["leverage"].sum()), digits=3)
+    title = f"leverage of all {known['leverage'].size:,} readings together: {whole}"
     legend_above(ax, 5, title=title, handlelength=1.6, columnspacing=1.3)
     return ax
 

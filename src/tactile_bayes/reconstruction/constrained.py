@@ -66,8 +66,8 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
         twice = rivalled & (fit.other_phase == fit.phase)
         kinds = (~found, fit.misfit > _MISFIT, twice, fit.clearance < _CLEARANCE, rivalled, bent)
         status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AMBIGUOUS, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
-        told = rivalled & ((status[where] == AMBIGUOUS) | (status[where] == EITHER_PHASE))
-        other[where] = np.where(told[:, None], contact_states(fit.other, *given).place.T, np.nan)
+        has_other = rivalled & ((status[where] == AMBIGUOUS) | (status[where] == EITHER_PHASE))
+        other[where] = np.where(has_other[:, None], contact_states(fit.other, *given).place.T, np.nan)
     return Estimate(place, covariance, phase, status, other, misfit, distance)
 
 

@@ -265,7 +265,7 @@ class _Figures:
 
     @cached_property
     def directions(self) -> list[Literal["forward", "backward"]]:
-        swept = self.result["events"].stroke.values if "events" in self.result.children else []
+        swept = self.result["events"].segment.values if "events" in self.result.children else []
         return [direction for direction in ("forward", "backward") if direction in swept]
 
     @cached_property

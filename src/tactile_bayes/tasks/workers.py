@@ -181,7 +181,7 @@ def _refuse_hopeless(process: _Process, code: int | None, deaths: Counter[int | 
     if deaths[process.task] > _RETRIES + (count if process.task is None else 0):
         what = "before their first task" if process.task is None else f"over task {process.task}"
         raise TaskError(
-            f"processes died {deaths[process.task]} times {what}: is there memory enough for {count} of them? Try "
+            f"processes died {deaths[process.task]} times {what}: out of memory, with {count} of them? Try "
             "fewer workers"
         ) from None
 

@@ -43,7 +43,7 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
         - left (the backward sweep's last contact), right (the forward sweep's) and width = right − left, negative where
           the two overlap [length];
         - left_y, right_y [length] and left_slope_angle, right_slope_angle [rad], of the same contacts;
-        - snap_off_drive_angle [rad], over "stroke" too;
+        - snap_off_drive_angle [rad], over "segment" too;
         - vertex_x, vertex_y, the contour's lowest point [length];
         - apex_x, apex_y of the triangle, triangle_height, its distance from the chord, and triangle_width, its largest
           extent in y [length], all of the contours that leave a gap.
@@ -81,8 +81,8 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     >>> draws = {"a": 0.5, "q": 0.3, "x_c": 0.0}
     >>> ends = {"first_contact_x": [0.9, -0.9], "snap_off_contact_x": [0.2, -0.1], "snap_off_drive_angle": [3.2, -0.1]}
     >>> posterior = xr.Dataset({k: (("chain", "draw"), [[v]]) for k, v in draws.items()})
-    >>> events = xr.Dataset({k: (("chain", "draw", "stroke"), [[v]]) for k, v in ends.items()})
-    >>> events = events.assign_coords(stroke=["forward", "backward"])
+    >>> events = xr.Dataset({k: (("chain", "draw", "segment"), [[v]]) for k, v in ends.items()})
+    >>> events = events.assign_coords(segment=["forward", "backward"])
     >>> tree = xr.DataTree.from_dict({"posterior": posterior, "events": events})
     >>> tree.attrs = {"family": "parabola", "units": "dimensionless"}
     >>> found = gap(tree).sel(bound="median")
@@ -91,7 +91,7 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     """
     levels = central_levels(probability)
     draws = contour_draws(posterior)
-    events = contour_events(posterior).transpose("chain", "draw", "stroke", ...)
+    events = contour_events(posterior).transpose("chain", "draw", "segment", ...)
     _refuse_no_gap(events)
     ends = np.stack([_rows(events["first_contact_x"]), _rows(events["snap_off_contact_x"])])
     touched = np.flatnonzero(np.isfinite(ends).all(axis=(0, 2)))
@@ -122,7 +122,7 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
         "snap_off_drive_angle": (_rows(events["snap_off_drive_angle"])[touched], angle),
     }
     variables: dict[str, Any] = {
-        name: (("bound", "stroke")[: values.ndim], np.quantile(values, levels, axis=0), unit)
+        name: (("bound", "segment")[: values.ndim], np.quantile(values, levels, axis=0), unit)
         for name, (values, unit) in of_draws.items()
     }
     begin, end = (float(np.median(x)) for x in (left_x, right_x))
@@ -136,7 +136,7 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     share = float(is_open.mean())
     variables["share_open"] = ((), share, {"units": "1"})
     variables["status"] = ((), _status(share, known, cut_short, touched.size < ends.shape[1]))
-    coords = {"bound": ["lower", "median", "upper"], "x": ("x", x, length), "stroke": events.stroke.values}
+    coords = {"bound": ["lower", "median", "upper"], "x": ("x", x, length), "segment": events.segment.values}
     return xr.Dataset(variables, coords=coords, attrs={"probability": probability, "gaps": gaps})
 
 
@@ -151,7 +151,7 @@ def _refuse_no_gap(events: xr.Dataset) -> None:
             f"x = {last:.4g}: what lies beyond these ends no sweep has touched, and contour_band gives there what "
             "family and prior imply"
         )
-    missing = [name for name in ("forward", "backward") if name not in events.stroke.values]
+    missing = [name for name in ("forward", "backward") if name not in events.segment.values]
     raise InferenceError(f"a gap lies between sweeps of both directions, and there is no {missing[0]} one here")
 
 
@@ -181,8 +181,8 @@ def has_gap(events: xr.Dataset) -> bool:
 
     Those that turn the rod must be of both directions; where the base is carried, any two may.
     """
-    both = {"forward", "backward"} <= set(events.stroke.values.tolist())
-    return both or ("first_travel" in events and events.sizes["stroke"] > 1)
+    both = {"forward", "backward"} <= set(events.segment.values.tolist())
+    return both or ("first_travel" in events and events.sizes["segment"] > 1)
 
 
 def _ends(ends: Floats) -> tuple[Floats, Floats, int]:
@@ -202,7 +202,7 @@ def _ends(ends: Floats) -> tuple[Floats, Floats, int]:
 
 def _rows(values: xr.DataArray) -> Floats:
     """Return the values of all draws, shape (draws, sweep segments)."""
-    return np.asarray(values.values, dtype=float).reshape(-1, values.sizes["stroke"])
+    return np.asarray(values.values, dtype=float).reshape(-1, values.sizes["segment"])
 
 
 def _status(share_open: float, known: bool, cut_short: bool, untouched: bool) -> str:

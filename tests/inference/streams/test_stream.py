@@ -94,7 +94,7 @@ def test_the_posterior_is_one_of_a_contour(streamed, measured):
     assert tree["posterior"].sizes == {"chain": 1, "draw": 500}
     assert tree.attrs["converged"] == 1
     assert tb.contour_band(tree, [0.0])["median"].values == pytest.approx([0.5], abs=0.005)
-    assert tb.gap(tree).sizes["stroke"] == 2
+    assert tb.gap(tree).sizes["segment"] == 2
     tb.to_arviz(tree)
 
 

@@ -240,7 +240,7 @@ class _Run:
             message += f"; {modes_message(modes)}"
         of_walkers = f"of {chains * walkers} walkers"
         if lost:
-            message += f"; {lost} {of_walkers} are lost in improbable regions: do not use the results"
+            message += f"; {lost} {of_walkers} are where the posterior is improbable: do not use the results"
         if stuck:
             message += f"; {stuck} {of_walkers} did not move in the steps kept: look at their positions"
         return Draws(

@@ -209,7 +209,7 @@ class Particles:
         self.log_weights, self.log_integral = weighted - total, self.log_integral + total
 
     def _move(self, power: float) -> None:
-        """Move the particles by the steps of an ensemble, after the last stage until they have lost their places."""
+        """Move the particles by the steps of an ensemble, after the last stage until they have decorrelated."""
         coordinates, last = self._coordinates, power == 1.0
 
         def target(points: Floats) -> Floats:

@@ -202,7 +202,7 @@ class Stream:
         """Return the posterior of the record so far, as `infer_contour` does, with equally weighted particles as draws.
 
         There is one chain, whose convergence is not judged by R̂: `converged` is 0 if the last moves of the particles
-        ended before they had lost their places, or they had lost the posterior (`log_density_rise`), and the message
+        ended before they had decorrelated, or they had left the posterior (`log_density_rise`), and the message
         states their effective number. Where that is less than their number, some draws are repeated.
 
         Raises
