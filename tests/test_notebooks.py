@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 
-NOTEBOOKS = sorted(
-    (Path(__file__).parents[1] / "notebooks").glob("*.ipynb"), key=lambda path: int(path.name.split("_")[0])
-)
+NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
 
 
 def test_there_are_twelve_in_order():
@@ -30,4 +28,4 @@ def test_a_notebook_is_kept_without_outputs(path):
 def test_a_notebook_begins_with_its_number_and_title(path):
     first = json.loads(path.read_text(encoding="utf-8"))["cells"][0]
     assert first["cell_type"] == "markdown"
-    assert first["source"][0].startswith(f"# {path.name.split('_')[0]} · ")
+    assert first["source"][0].startswith(f"# {int(path.name.split('_')[0])} · ")
