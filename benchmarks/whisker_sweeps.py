@@ -7,12 +7,11 @@ the peak, over some 6 mm. Taken from that README are the direction of the whiske
 coordinates, and 4.1 mm between the hinge of the sensor and the first traced point. From that point the rod is 51 mm
 long: there it lets go of the smaller cylinder. Its rigidity is that of a wire of 0.24 mm, and scales the gain.
 
-    python -m benchmarks.whisker_sweeps [--length] FOLDER [SWEEP ...]
+    python -m benchmarks.whisker_sweeps FOLDER [SWEEP ...]
 
 keeps the rig, every posterior and its figure in FOLDER, and goes on from there. SWEEP is like cylinder_may25/trial0, or
-cylinder_may25, the sweeps of a session in one record, which have one hysteresis if they repeat each other. With
---length the length of the rod is inferred from the sweeps, with a prior of ± 1.5 mm. Where a table shows that the rod
-lets go, after its record has ended, that is compared with what the posterior predicts.
+cylinder_may25, the sweeps of a session in one record, which have one hysteresis if they repeat each other. Where a
+table shows that the rod lets go, after its record has ended, that is compared with what the posterior predicts.
 """
 
 from __future__ import annotations
@@ -44,7 +43,6 @@ ORIGIN = np.array([64.3045, 98.0687])  # place of the sensor in the coordinates 
 # Direction of the whisker at the clamp. The object rests and the sensor moves, in a frame that is turned by half.
 DRIVE_ANGLE = np.radians(180.0 - 115.3)
 HINGE, LENGTH, DIAMETER, RIGIDITY = 4.1, 51.0, 0.24e-3, 1e-5
-FREE = 1.5e-3  # standard deviation of the rod's length where it is inferred [m]
 ON_SWEEPS = 0.01  # hysteresis over the peak
 COUNTS = 5e6  # roughly, counts to N m; the calibration finds them
 SENSOR = tb.LoadCell(moment_noise=3.0, gain=((COUNTS, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
@@ -159,23 +157,16 @@ def calibrated(folder: Path, rod: tb.Rod) -> tuple[tb.Rig, xr.DataTree]:
     return tb.Rig.read(file), tb.read_result(path)
 
 
-def measured(folder: Path, name: str, rod: tb.Rod, rig: tb.Rig, of_any_length: bool = False) -> xr.DataTree:
+def measured(folder: Path, name: str, rod: tb.Rod, rig: tb.Rig) -> xr.DataTree:
     """Return the posterior of the cylinder of a sweep, or of all sweeps of a session."""
-    path = folder / f"{file_name(name, of_any_length)}.nc"
+    path = folder / f"{name.replace('/', '-')}.nc"
     if not path.exists():
         unknown: dict[str, Any] = dict.fromkeys(("moment_bias", "friction", "noise_scale"), "default")
         unknown |= {"rigidity_scale": stats.lognorm(s=0.02), **hysteresis(rod)}
-        if of_any_length:
-            unknown["length"] = stats.norm(rod.length, FREE)
         record, rig = record_of(name, rod), rig.with_unknown(**unknown)
         found = tb.infer_contour(record, family="circle", rig=rig, rng=1, settings=ENOUGH)
         tb.write_result(found, path)
     return tb.read_result(path)
-
-
-def file_name(name: str, of_any_length: bool) -> str:
-    """Return the name of a posterior's files, without an ending."""
-    return f"{name.replace('/', '-')}{'-length' if of_any_length else ''}"
 
 
 def radius(found: xr.DataTree) -> str:
@@ -238,17 +229,16 @@ def picture(posterior: xr.DataTree) -> Figure:
 
 
 def main() -> None:
-    arguments = [argument for argument in sys.argv[1:] if argument != "--length"]
-    folder, names = Path(arguments[0]), arguments[1:] or SWEEPS
+    folder, names = Path(sys.argv[1]), sys.argv[2:] or SWEEPS
     folder.mkdir(parents=True, exist_ok=True)
-    rod, began, free = whisker(), perf_counter(), "--length" in sys.argv
+    rod, began = whisker(), perf_counter()
     rig, of_rig = calibrated(folder, rod)
     print(f"rig: {of_rig.attrs['message']} ({perf_counter() - began:.0f} s)")
     for name, draws in of_rig["posterior"].mean().items():
         print(f"  {name:24s} {float(draws):12.5g} ± {float(of_rig['posterior'][name].std()):.2g}")
     for name in names:
         began = perf_counter()
-        found = measured(folder, name, rod, rig, free)
+        found = measured(folder, name, rod, rig)
         friction = found["posterior"].friction.values.ravel()
         off = found["observed_data"].holding_moment
         off = off - found["posterior_predictive"].holding_moment.mean(("chain", "draw"))
@@ -258,10 +248,7 @@ def main() -> None:
             f"{perf_counter() - began:.0f} s; {found.attrs['message']}",
             flush=True,
         )
-        if "length" in found["posterior"]:
-            length = 1e3 * found["posterior"].length
-            print(f"  length {float(length.mean()):.1f} ± {float(length.std()):.1f} mm of {1e3 * rod.length:.1f} mm")
-        picture(found).savefig(folder / f"{file_name(name, free)}.png", dpi=110, bbox_inches="tight")
+        picture(found).savefig(folder / f"{name.replace('/', '-')}.png", dpi=110, bbox_inches="tight")
         for words in releases(found, name, rod):
             print(f"  lets go at {words}")
 
