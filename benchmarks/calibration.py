@@ -2,12 +2,13 @@
 
 Truths are drawn from the default priors of a family and of the unknowns of the rig, at the usual noise, a tenth of
 it and three times as much; see `tactile_bayes.calibrate`. Results are kept in results/calibration, so that a run that
-was stopped goes on; a number stands for that of replicates. With the argument "published", the tables are those of the
-replicates in benchmarks/replicates, where "publish" writes what they need of the results.
+was stopped goes on; a number stands for that of replicates. "published" prints the tables of the replicates in
+benchmarks/replicates and makes none; "publish" writes those there that were made.
 
 By name, all as "sticking", and at the usual noise only, there are also drives on which a rod may stick: "stage" and
 "stage-both", an upright whisker that is carried past one way, or both, and "turned", a rotation that turns back in
 contact. In "stage-0.3" and the like the true coefficient of friction is this one, and inference has its default prior.
+"published traced" prints the table of `benchmarks.traced`.
 """
 
 from __future__ import annotations
@@ -56,10 +57,10 @@ FORTH = tb.Translation((0.75, 0.0), np.pi, 0.5 * np.pi, 1.5)
 BACK = tb.Translation((-0.75, 0.0), 0.0, 0.5 * np.pi, 1.5)
 # Parabolas, past which the drive goes in another way.
 STICKING = {
-    "stage": Family("upright, one way", 200, (FORTH,)),
+    "stage": Family("upright, one way", 100, (FORTH,)),
     "stage-0": Family("upright, one way, no friction", 200, (FORTH,), 0.0),
     "stage-0.3": Family("upright, one way, μ = 0.3", 200, (FORTH,), 0.3),
-    "stage-both": Family("upright, both ways", 200, (FORTH, BACK)),
+    "stage-both": Family("upright, both ways", 100, (FORTH, BACK)),
     "stage-both-0": Family("upright, both ways, no friction", 200, (FORTH, BACK), 0.0),
     "stage-both-0.3": Family("upright, both ways, μ = 0.3", 200, (FORTH, BACK), 0.3),
     "turned": Family("rotations that turn back", 200, (tb.Motion(0.0, 0.0, np.radians([-30.0, 100.0, 60.0, 210.0])),)),
@@ -181,8 +182,9 @@ def main(*chosen: str) -> None:
             made = published(families, noise)
         else:
             made = {name: calibrated(name, noise, count) for name in families}
-        for name, one in made.items() if "publish" in chosen else ():
-            publish(name, noise, one)
+        if "publish" in chosen:
+            for name, one in made.items():
+                publish(name, noise, one)
         print(f"\n{table(noise, made)}\n", flush=True)
 
 

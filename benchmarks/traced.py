@@ -6,8 +6,7 @@ the errors over the standard deviations.
 
 With the argument "records" it prints how often intervals of 90 % hold in posteriors of records, each swept with a rod
 of its own, of which 25 points were traced with a scatter of a thousandth of the length; a number stands for that of
-records, and "tenth" for a tenth of the usual noise. Results are kept in results/traced, and with "publish" what their
-table needs in benchmarks/replicates.
+records. Results are kept in results/traced; "publish" also writes what the table needs to benchmarks/replicates.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from tactile_bayes.mechanics.rods.traced import traced_rod
 PLACES, FINE = np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 2001)
 POINTS, SCATTERS = (8, 12, 30, 80), (1e-4, 1e-3, 5e-3)
 QUANTILE = 1.645
-OUT, SWEPT = Path("results/traced"), ("linear", "quadratic", "smooth over 0.5", "smooth over 1.0")
+OUT, NOISE, SWEPT = Path("results/traced"), "usual", ("linear", "quadratic", "smooth over 0.5", "smooth over 1.0")
 
 Curvature = Callable[[Floats], Floats]
 
@@ -118,14 +117,13 @@ def swept_rods(number: int) -> tuple[tb.Rod, tb.Rod]:
         return rod, tb.Rod.from_shape(*points(curvature, 25, 1e-3, rng)[:2])
 
 
-def records(count: int, noise: str) -> xr.Dataset:
-    true_and_traced = map(swept_rods, range(count))
-    return pooled("traced", noise, (record(number, *rods, noise) for number, rods in enumerate(true_and_traced)))
+def records(count: int) -> xr.Dataset:
+    return pooled("traced", NOISE, (record(number, *swept_rods(number)) for number in range(count)))
 
 
-def record(number: int, true: tb.Rod, traced: tb.Rod, noise: str) -> xr.Dataset:
+def record(number: int, true: tb.Rod, traced: tb.Rod) -> xr.Dataset:
     """Calibrate by one replicate, or read it."""
-    cell, out = load_cell(noise), OUT / noise / str(number)
+    cell, out = load_cell(NOISE), OUT / str(number)
     rig, truth = tb.Rig(traced, cell), tb.Rig(true, cell)
     one = tb.calibrate("parabola", rig, truth=truth, replicates=1, rng=number, out=out)
     print(f"record {number}: {str(one.message.values[0]).partition(':')[0]}", flush=True)
@@ -135,10 +133,9 @@ def record(number: int, true: tb.Rod, traced: tb.Rod, noise: str) -> xr.Dataset:
 if __name__ == "__main__":
     numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
     if "records" in sys.argv:
-        noise = "tenth" if "tenth" in sys.argv else "usual"
-        calibration = records(*(numbers or [TRACED["traced"].replicates]), noise)
-        print(f"{table(noise, {'traced': calibration})}\n\n{calibration.attrs['verdict']}")
+        calibration = records(*(numbers or [TRACED["traced"].replicates]))
+        print(f"{table(NOISE, {'traced': calibration})}\n\n{calibration.attrs['verdict']}")
         if "publish" in sys.argv:
-            publish("traced", noise, calibration)
+            publish("traced", NOISE, calibration)
     else:
         main(*numbers)

@@ -115,7 +115,7 @@ def _end(counts: Floats) -> int:
 
 
 def hysteresis(rod: tb.Rod) -> dict[str, Any]:
-    """Return the priors of the discrepancy of a sweep, which is 6 mm long.
+    """Return the priors of a sweep's discrepancy, whose length is 6 mm.
 
     Other parameters follow a smooth deviation, so that residuals do not tell its size: it is given.
     """
@@ -214,8 +214,8 @@ def picture(posterior: xr.DataTree) -> Figure:
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     r, x_c, q, friction = (draws[name].values.ravel() for name in ("r", "x_c", "q", "friction"))
     some = slice(None, None, r.size // 40)
-    for radius, middle, lowest in zip(r[some], x_c[some], q[some], strict=True):
-        circle = 1e3 * (middle + radius * np.cos(turn)), 1e3 * (lowest + radius + radius * np.sin(turn))
+    for size, middle, lowest in zip(r[some], x_c[some], q[some], strict=True):
+        circle = 1e3 * (middle + size * np.cos(turn)), 1e3 * (lowest + size + size * np.sin(turn))
         plane.plot(*circle, color="#0072B2", linewidth=0.6, alpha=0.4)
     touched = tb.uncertainty.implied_contacts(posterior, draws=20)["posterior"]
     at = (1e3 * touched[name].values.ravel() for name in ("contact_x", "contact_y"))

@@ -58,7 +58,7 @@ def test_readings_at_known_points_are_explained(whisker):
 
 @pytest.mark.parametrize("trial", [0, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_cylinder_of_15_mm_is_found(whisker, trial):
-    """With the rig of the points, and a coefficient of friction of its own; 0.3 more is a radius of 1 mm less."""
+    """With the rig of the points, and a coefficient of friction of its own; 0.3 more is a radius of 0.7 mm less."""
     record = whisker_sweeps.record_of(f"cylinder_may25/trial{trial}", whisker)
     rig = {name: v for name, v in RIG.items() if not name.startswith("gauge")} | {"friction": 0.2}
     model = model_of(record, [*rig, "moment_bias"], family="circle")
