@@ -26,6 +26,7 @@ import tactile_bayes as tb
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.calibration.summary import CLAIMS, summary
+from tactile_bayes.tasks import write_atomically
 
 OUT, PUBLISHED = Path("results/calibration"), Path(__file__).parent / "replicates"
 NUMBERS = (*CLAIMS, "converged", "check_passed")  # that the tables need, beside the ranks
@@ -127,7 +128,8 @@ def publish(family: str, noise: str, made: xr.Dataset) -> None:
     columns = {str(name): made["ranks"].sel(quantity=name).values for name in made.quantity.values}
     columns = {name: [rank if rank >= 0 else "" for rank in ranks] for name, ranks in columns.items()}
     columns |= {name: [str(v) if np.isfinite(v) else "" for v in made[name].values.tolist()] for name in names}
-    with (PUBLISHED / f"{folder_of(family, noise)}.csv").open("w", encoding="utf-8", newline="") as file:
+    path = PUBLISHED / f"{folder_of(family, noise)}.csv"
+    with write_atomically(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file).writerows([columns, *zip(*columns.values(), strict=True)])
 
 

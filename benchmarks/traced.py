@@ -29,7 +29,8 @@ from tactile_bayes.mechanics.rods.traced import traced_rod
 PLACES, FINE = np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 2001)
 POINTS, SCATTERS = (8, 12, 30, 80), (1e-4, 1e-3, 5e-3)
 QUANTILE = 1.645
-OUT, NOISE, SWEPT = Path("results/traced"), "usual", ("linear", "quadratic", "smooth over 0.5", "smooth over 1.0")
+OUT, NOISE = Path("results/traced"), "usual"
+SWEPT = ("linear", "quadratic", "smooth over 0.5", "smooth over 1.0")
 
 Curvature = Callable[[Floats], Floats]
 

@@ -26,7 +26,7 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
     known = {**simulated.own_family.known, **simulated.unknowns.known, **drawn}
     rod, stated = rod_of(simulated.record), rod_of(assumed.record)
     cell, stated_cell = simulated.noise.cell, assumed.noise.cell
-    values = {
+    values: dict[str, float | None] = {
         "rest_curvature": rod_with(rod, known).mean_rest_curvature,
         "taper": rod.taper,
         "stem": rod.stem,
@@ -34,12 +34,12 @@ def true_values(simulated: Experiment, assumed: Experiment, drawn: Mapping[str, 
         **dict(zip(GROUPS["moment_curve"], cell.moment_curve, strict=True)),
         **known,
     }
+    if rod.rest_curvature != stated.rest_curvature:
+        values |= dict.fromkeys(GROUPS["rest_shape"])
     more = _differences(cell, stated_cell)
     times = {**_ratios(cell, stated_cell), "rigidity_scale": rod.flexural_rigidity / stated.flexural_rigidity}
-    found, of_trace = {}, () if rod.rest_curvature == stated.rest_curvature else GROUPS["rest_shape"]
+    found = {}
     for name in dict.fromkeys((*drawn, *assumed.priors)):
-        if name in of_trace:
-            continue
         value = values.get(name, _neutral(name))
         if value is not None and math.isfinite(times.get(name, 1.0)):
             found[name] = times.get(name, 1.0) * (value + more.get(name, 0.0))

@@ -132,7 +132,7 @@ def expected_of(task: tuple[Question, int]) -> Expected:
             except ReachError:
                 gained = np.zeros_like(known.precision)
         precision = known.precision + gained
-        rows["width"].append(wide * float(mean_of_known(deviation_of_heights(slopes, precision))))
+        rows["width"].append(wide * mean_of_known(deviation_of_heights(slopes, precision)))
         rows["information"].append(0.5 * (_logdet(precision) - _logdet(known.precision)))
         if question.nested and usable[k]:
             found = _nested(of_draw, model, point, precision, rng)
@@ -188,7 +188,7 @@ def _nested(
     likely = weights > 0.0
     contours = model.family.build(*points[likely, : len(model.family.parameters)].T)
     heights = np.asarray(contours.take(np.arange(contours.shape[0])[:, None]).height(question.x))
-    width = float(mean_of_known(_band_widths(heights, weights[likely], question.probability)))
+    width = mean_of_known(_band_widths(heights, weights[likely], question.probability))
     own = float(densities(point[None]).sum())
     return width, own - float(evidence), float(effective_number(weights))
 

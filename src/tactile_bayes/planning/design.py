@@ -266,7 +266,7 @@ def _present_width(question: Question) -> float:
     wide = band_factor(question.probability)
     slopes = [height_slopes(known.experiment.model, point, question.x) for point in known.points]
     widths = [mean_of_known(deviation_of_heights(of, known.precision)) for of in slopes]
-    return wide * float(mean_of_known(np.array(widths)))
+    return wide * mean_of_known(np.array(widths))
 
 
 def _identity(question: Question) -> dict[str, str]:

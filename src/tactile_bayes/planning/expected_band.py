@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -76,8 +77,7 @@ def deviation_of_heights(slopes: Floats, precision: Floats) -> Floats:
     return np.asarray(np.sqrt(np.sum(half**2, axis=0)))
 
 
-def mean_of_known(widths: Floats, axis: int | None = None) -> Floats:
-    """Return the mean of the widths that are known: a circle has no height beyond its sides. NaN where none is."""
-    known = ~np.isnan(widths)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.sum(widths, axis=axis, where=known) / np.sum(known, axis=axis))
+def mean_of_known(widths: Floats) -> float:
+    """Return the mean of the widths that are known: a circle has no height beyond its sides. NaN if none is."""
+    known = widths[~np.isnan(widths)]
+    return float(known.mean()) if known.size else math.nan

@@ -1,5 +1,7 @@
 """Modes of posteriors, and which optimum belongs to one that is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,7 +28,7 @@ def test_an_optimum_is_known_that_lies_near_that_of_a_mode(searched):
     """Even if the mode's proposal has moved away from it, as along a bent ridge."""
     (mode,) = searched.found_by_search()
     spread = mode.proposal.root.diagonal()
-    away = mode.proposal.__class__(mode.proposal.mean + 100.0 * spread, mode.proposal.root)
+    away = replace(mode.proposal, mean=mode.proposal.mean + 100.0 * spread)
     searched.found[:] = [mode._replace(proposal=away)]
     own = searched.model.coordinates
     deviations = np.sqrt(mode.optimum.covariance.diagonal())

@@ -91,10 +91,10 @@ class Modes:
     def _is_known(self, optimum: ContourOptimum) -> bool:
         """Return True if an optimum belongs to a mode that was found before: it is near its own, or in its proposal."""
         point = optimum.point[None]
-        far = _MODE_RADIUS * np.sqrt(point.size)
+        own, far = self._own.of(point)[0], _MODE_RADIUS * np.sqrt(point.size)
         for mode in self.found:
             # Along a bent ridge a proposal may leave out the optimum that it was made around.
-            off = (self._own.of(point) - self._own.of(mode.optimum.point[None]))[0]
+            off = own - self._own.of(mode.optimum.point[None])[0]
             steps = np.linalg.solve(square_root(mode.optimum.covariance), off)
             if min(np.linalg.norm(steps), np.linalg.norm(mode.proposal.steps(mode.coordinates.of(point)))) < far:
                 return True
