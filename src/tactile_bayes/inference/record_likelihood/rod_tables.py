@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # default priors. Few draws are beyond them, and integrated. For thin tips the second range of the taper is taken, and
 # for uneven curvature that of the rest curvature.
 _TAPERS, _BENDS = (0.15, 0.1), (0.2, 0.15)
-_SHAPES = 4.0, 2.5  # amplitudes of the modes of a traced rod: one of 900, and one of 10 draws from the prior is beyond
+_SHAPES = 4.0, 3.0  # amplitudes of the modes of a traced rod: one of 150, and one of 9 draws from the prior is beyond
 _LENGTHS = 0.9, 1.1  # over the stated one, in tables of a cone: ten deviations of the default prior
 # Angles of friction in the two tables of a likelihood; the first, in either sense, is the only one where a drive
 # has a history, along which a rod may slide back.

@@ -16,7 +16,7 @@ is of second order, and an error in it would be one of its square root in the fo
 from __future__ import annotations
 
 import math
-from itertools import product
+from itertools import combinations, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,19 +48,23 @@ from tactile_bayes.tasks import in_parts
 _WORST = 1e-5  # largest error of the pose with which a table is of use
 # Nodes in a taper, bend and friction angle that vary, also for friction of either sense: angles of a wider range.
 _OUTER, _OUTER_OF_BOTH, _BOTH = (5, 5, 7), (5, 5, 12), 0.7
-# Powers of the amplitudes of modes, over the largest: the first mode deflects a rod ten times as far as the others.
+# Powers of the amplitudes of modes, along `ForwardTable.axes` and over the largest: up to four of the first, and two of
+# the others.
 _POWERS = np.array(
-    [(i, j, k) for i in range(5) for j in range(3) for k in range(3 - j) if i <= (4, 2, 0)[j + k]], dtype=np.intp
+    [(i, *others) for others in product(range(3), repeat=4) if sum(others) <= 2 for i in range(5 - 2 * sum(others))],
+    dtype=np.intp,
 )
 # Amplitudes, over the largest, at which poses are calculated for least squares.
+_OTHERS = 0.7 * np.eye(MOST_MODES)[1:]
 _SHAPES = np.array(
-    [(x, 0.0, 0.0) for x in (-1.0, -0.6, 0.0, 0.6, 1.0)]
-    + [(x, *yz) for x in (-0.7, 0.0, 0.7) for yz in ((0.7, 0.0), (-0.7, 0.0), (0.0, 0.7), (0.0, -0.7))]
-    + [(0.0, y, z) for y in (-0.7, 0.7) for z in (-0.7, 0.7)]
+    [x * np.eye(MOST_MODES)[0] for x in (-1.0, -0.6, 0.0, 0.6, 1.0)]
+    + [x * np.eye(MOST_MODES)[0] + sign * other for x in (-0.7, 0.0, 0.7) for other in _OTHERS for sign in (1.0, -1.0)]
+    + [sign * one + other for one, other in combinations(_OTHERS, 2) for sign in (1.0, -1.0)]
 )
 _NEGLIGIBLE, _AT_ONSET = 2e-7, 100.0  # size of terms that are left out, and how much smaller it is without a force
 _THRUST = 20.0  # f Λ² before which sweeps end with a thrust through the pivot; their last series may go on
 _ROUNDING = 1e-12  # distance from the end of a range that counts as zero
+_ALONG = np.linspace(0.0, 1.0, 201)  # points along a rod at which means over it are taken
 _CHECKS = 400  # points at which the error is measured
 
 
@@ -103,6 +107,8 @@ class ForwardTable(NamedTuple):
     chord: Terms  # arc length, bearing and slope of the rod at rest at a distance, in one row
     box: Floats  # least and largest taper, bend and friction angle, shape (3, 2)
     shape: float  # largest amplitudes of modes, as in `Box`
+    # Axes of the amplitudes, along which a rod seen from its tip turns most, second most, …: shape (modes, modes).
+    axes: Floats
     slenderness: float  # Λ(1) without the taper
     psi1: tuple[float, float]  # range of ψ1 in tip contact
     span: float  # logarithm of 1 + f Λ²/10 at the largest force
@@ -111,7 +117,9 @@ class ForwardTable(NamedTuple):
 _NONE = Terms(np.zeros((0, 4), dtype=np.intp), np.zeros((2, 0, 0, 0)))
 
 # Table without any rod.
-NO_TABLE = ForwardTable(_NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 0.0, 1.0, (0.0, 1.0), 1.0)
+NO_TABLE = ForwardTable(
+    _NONE, _NONE, _NONE, _NONE, np.array([[1.0, 0.0]] * 3), 0.0, np.eye(MOST_MODES), 1.0, (0.0, 1.0), 1.0
+)
 Tables = tuple[ForwardTable, ForwardTable]  # tables of which the first that holds a rod serves it
 NO_TABLES: Tables = (NO_TABLE, NO_TABLE)  # no tables
 
@@ -140,7 +148,8 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
     counts = _OUTER_OF_BOTH if wide else _OUTER
     shares = [chebyshev.nodes(n if end > begin else 1) for n, (begin, end) in zip(counts, box[:3], strict=True)]
     tapers, bends, deltas = (begin + (end - begin) * z for z, (begin, end) in zip(shares, box[:3], strict=True))
-    shapes = box.shape * (_SHAPES if box.shape else _SHAPES[:1])
+    axes = _axes(profile)
+    shapes = box.shape * (_SHAPES if box.shape else _SHAPES[:1]) @ axes
     outer = tapers.size, bends.size, len(shapes), deltas.size
     slenderness = _slenderness(profile)
     ways, loading = chebyshev.nodes(rows), np.concatenate([[0.0], chebyshev.nodes(TERMS - 1)])
@@ -167,6 +176,7 @@ def _tabulated(profile: Profile, box: Box, grade: int) -> ForwardTable:
         _terms(chord[:, None, :, :, None, None], _AT_ONSET, (-1, distances)),
         np.array(box[:3], dtype=float),
         box.shape,
+        axes,
         slenderness,
         (low, high),
         span,
@@ -202,12 +212,23 @@ def _phase(values: Floats, relevance: Floats, loading: Floats) -> Terms:
 
 def _slenderness(profile: Profile) -> float:
     """Λ(1) without the taper, to a few digits: it scales the force, no more."""
-    s = np.linspace(0.0, 1.0, 201)
-    cell = np.searchsorted(profile.edges[1:-1], s, side="right")
-    rigidity = np.array(
-        [np.polyval(profile.rigidity[c, ::-1], at - profile.edges[c]) for c, at in zip(cell, s, strict=True)]
+    return float(np.mean(_along(profile, profile.rigidity) ** -0.5))
+
+
+def _axes(profile: Profile) -> Floats:
+    """The principal axes of the turns between points along the rod and its tip."""
+    turns = np.zeros((_ALONG.size, MOST_MODES))
+    for k, mode in enumerate(profile.modes[1:]):
+        turns[:, k] = np.cumsum(_along(profile, mode)[::-1])
+    return np.asarray(np.linalg.svd(turns)[2])
+
+
+def _along(profile: Profile, coefficients: Floats) -> Floats:
+    """Values of piecewise polynomials along a rod."""
+    cells = np.searchsorted(profile.edges[1:-1], _ALONG, side="right")
+    return np.array(
+        [np.polyval(coefficients[c, ::-1], s - profile.edges[c]) for c, s in zip(cells, _ALONG, strict=True)]
     )
-    return float(np.mean(rigidity**-0.5))
 
 
 @cached
@@ -282,11 +303,14 @@ def _write_outer(table: ForwardTable, values: tuple[float, float, float], shape:
         outer[c, 0], outer[c, 1] = 1.0, x
         for k in range(2, MOST_NODES):
             outer[c, k] = 2.0 * x * outer[c, k - 1] - outer[c, k - 2]
-    for r in range(_POWERS.shape[0]):
-        outer[3, r] = 1.0
-        for k in range(MOST_MODES):
-            for _ in range(_POWERS[r, k] if table.shape > 0.0 else 0):
-                outer[3, r] *= shape[k] / table.shape
+    outer[3] = 1.0
+    for k in range(MOST_MODES if table.shape > 0.0 else 0):
+        amplitude = 0.0
+        for j in range(MOST_MODES):
+            amplitude += table.axes[k, j] * shape[j] / table.shape
+        for r in range(_POWERS.shape[0]):
+            for _ in range(_POWERS[r, k]):
+                outer[3, r] *= amplitude
 
 
 @compiled

@@ -15,9 +15,9 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.pose import ACROSS, Chord, Pose, scaled
 from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
-# Most terms in ψ1 or s1, terms in the force and in the distance of the rod at rest, and most nodes in what differs
+# Most terms in ψ1 or s1, terms in the force and in the distance of the rod at rest, and most polynomials in what differs
 # between rods.
-MOST_ROWS, TERMS, MOST_NODES = 28, 24, 14
+MOST_ROWS, TERMS, MOST_NODES = 28, 24, 27
 COLUMNS = 3 * TERMS
 
 GROUP = 4  # terms in ψ1 or s1 that are summed at a time
