@@ -161,7 +161,7 @@ def test_the_modes_of_a_trace_have_no_true_value_if_the_rod_is_not_what_it_says(
     s = np.linspace(0.0, 1.0, 25)
     shaken = 1e-3 * np.random.default_rng(1).normal(size=(2, s.size))
     traced = Rod.from_shape(s + shaken[0], shaken[1])
-    of_trace = {"rest_shape_1", "rest_shape_2", "rest_shape_3"}
+    of_trace = set(GROUPS["rest_shape"])
     unknown = {**NOTHING, "rest_shape": "default"}
     made = simulated(rod=traced, unknown=unknown, truth=replace(real(), rod=Rod()))
     assert not of_trace & set(made.truth)

@@ -21,7 +21,11 @@ from tactile_bayes.rig import Rig
 from tactile_bayes.rig.parameters import GROUPS, PARAMETERS
 from tactile_bayes.uncertainty.implied_contacts import implied_contacts
 
-MODES = [lambda s: 3.0 - 30.0 * s, lambda s: 20.0 * s, lambda s: np.cos(60.0 * s)]
+MODES = [
+    lambda s: 3.0 - 30.0 * s,
+    lambda s: 20.0 * s,
+    *(lambda s, k=k: np.cos(30.0 * k * s) for k in (2, 3, 4)),
+]
 ROD = Rod(0.1, 2e-4, rest_curvature=2.0, taper=0.2, stem=0.004, rest_shape_modes=MODES, taper_deviation=0.04)
 CELL = LoadCell(
     force_noise=0.05 * ROD.force_unit,
@@ -57,6 +61,8 @@ KNOWN = {
     "rest_shape_1": 0.7,
     "rest_shape_2": -0.4,
     "rest_shape_3": 1.2,
+    "rest_shape_4": 0.5,
+    "rest_shape_5": -0.8,
     "taper": 0.25,
     "taper_error": 0.9,
     "stem": 0.0055,

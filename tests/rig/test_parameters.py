@@ -8,11 +8,12 @@ from tactile_bayes.contours import Circle
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Gauge
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rods.profile import MOST_MODES
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.rig import NOTHING, Rig
 from tactile_bayes.rig.parameters import GROUPS, MAY_VANISH, PARAMETERS, STANDARD, members, parameter_named
 
-MODES = (lambda s: 1.0 - 2.0 * s, lambda s: 0.5 + 5.0 * s**2, lambda s: np.cos(20.0 * s))
+MODES = [lambda s, k=k: np.cos(5.0 * k * s) for k in range(MOST_MODES)]
 ROD = Rod(0.2, 3e-4, rest_curvature=1.5, taper=0.3, stem=0.01, rest_shape_modes=MODES, taper_deviation=0.05)
 STATED = {"rest_curvature": 1.5, "taper": 0.3, "stem": 0.01, "length": 0.2}
 CELL = LoadCell(force_noise=0.05 * ROD.force_unit, moment_noise=0.02 * ROD.moment_unit, moment_curve=(2.0, 3.0))

@@ -43,6 +43,8 @@ KNOWN = {
     "rest_shape_1": 0.7,
     "rest_shape_2": -0.4,
     "rest_shape_3": 1.2,
+    "rest_shape_4": 0.5,
+    "rest_shape_5": -0.8,
     "taper": 0.25,
     "taper_error": 0.9,
     "stem": 0.055,
@@ -52,7 +54,11 @@ KNOWN = {
     "base_2_y": -0.004,
 }
 PIN = Circle(0.3, 0.5, 0.02)
-MODES = (lambda s: 0.3 * (1.0 - s) ** 2, lambda s: 0.2 * s, lambda s: 0.1 * np.cos(6.0 * s))
+MODES = (
+    lambda s: 0.3 * (1.0 - s) ** 2,
+    lambda s: 0.2 * s,
+    *(lambda s, k=k: 0.1 * np.cos(3.0 * k * s) for k in (2, 4, 6)),
+)
 ROD = Rod(rest_curvature=0.2, taper=0.2, stem=0.04, rest_shape_modes=MODES, taper_deviation=0.04)
 CELL = LoadCell(gain=((1.02, 0, 0.03), (0, 0.97, 0.01), (0, 0, 1)), lever=(0.01, 0.02), moment_curve=(0.02, 0.001))
 BASES = ((0.0, 0.0), (0.1, 0.03))

@@ -500,11 +500,15 @@ def test_loads_of_rods_that_vary_are_within_1e_5_of_the_largest(name):
 
 def test_a_rod_with_amplitudes_of_its_modes_is_the_rod_that_has_this_curvature():
     """Exactly, and by a table to what the noise allows; also where the mean of the curvature is another."""
-    modes = (lambda s: 0.05 * (1.0 - s) ** 3, lambda s: 0.02 * s, lambda s: 0.01 * np.cos(6.0 * s))
+    modes = (
+        lambda s: 0.05 * (1.0 - s) ** 3,
+        lambda s: 0.02 * s,
+        *(lambda s, k=k: 0.01 * np.cos(3.0 * k * s) for k in (2, 4, 6)),
+    )
     rod, rng, count = Rod(rest_curvature=0.2, rest_shape_modes=modes), np.random.default_rng(3), 6
     record = CELL.measure(with_rod(swept(Parabola(0.5, 0.6), step=0.05), rod), rng=1)
     drawn = Parabola(*rng.uniform([0.4, 0.5, -0.05], [0.6, 0.7, 0.05], (count, 3)).T)
-    rig = RigValues(friction=rng.uniform(0.0, 0.3, count), rest_shape=rng.normal(size=(count, 3)))
+    rig = RigValues(friction=rng.uniform(0.0, 0.3, count), rest_shape=rng.normal(size=(count, len(modes))))
     by_table, exactly = (RecordLikelihood(record, CELL, exact=exact) for exact in (False, True))
     found, exact = (of.log_likelihood(drawn, rig=rig) for of in (by_table, exactly))
     assert all(table is not NO_TABLE for table in by_table._tables.made.values())

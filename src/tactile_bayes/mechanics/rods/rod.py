@@ -66,7 +66,7 @@ class Rod:
     rest_shape_modes : sequence of callable or (s, curvature)
         What is uncertain of the course of the rest curvature, if it was measured (`from_shape`): at most three
         independent deviations from it, each as large as its standard deviation [1/m]. Their amplitudes are the unknowns
-        `rest_shape_1` to `rest_shape_3` of a rig.
+        `rest_shape_1` to `rest_shape_5` of a rig.
     taper_deviation : float
         Standard deviation of the taper, if it was measured (`from_shape`): that of the unknown `taper` in its default
         prior. In these deviations `taper_error` is unknown.
