@@ -11,6 +11,7 @@ from scipy.interpolate import PchipInterpolator
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.rods.profile import STEEPEST_TAPER, profile_of
+from tactile_bayes.mechanics.rods.rod import Rod
 
 S = np.linspace(0.0, 1.0, 1009)
 
@@ -81,6 +82,16 @@ def test_both_are_on_common_cells():
     np.testing.assert_allclose(
         curvature(profile, S), PchipInterpolator([0.0, 0.3, 1.0], [0.0, 1.0, 0.5])(S), atol=1e-13
     )
+
+
+def test_rods_of_every_length_have_the_profile_of_one_in_its_own_units():
+    """Of one length in six the product L · (1/L) is not 1, so that ends of cells differ by rounding."""
+    for length in np.random.default_rng(0).uniform(0.01, 0.2, 60):
+        profile = Rod(
+            length, rest_curvature=lambda s, k=1.0 / length: k * (0.2 + 0.3 * np.cos(30.0 * k * s)), taper=0.2
+        ).profile
+        assert np.diff(profile.edges).min() > 1e-3
+        np.testing.assert_allclose(curvature(profile, S), 0.2 + 0.3 * np.cos(30.0 * S), atol=1e-8)
 
 
 def test_beyond_the_tip_values_are_those_of_the_tip():

@@ -15,8 +15,8 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.poses.pose import ACROSS, Chord, Pose, scaled
 from tactile_bayes.mechanics.rods.profile import MOST_MODES
 
-# Most terms in ψ1 or s1, terms in the force and in the distance of the rod at rest, and most polynomials in what differs
-# between rods.
+# Most terms in ψ1 or s1, terms in the force and in the distance of the rod at rest, most polynomials in what
+# differs between rods.
 MOST_ROWS, TERMS, MOST_NODES = 28, 24, 27
 COLUMNS = 3 * TERMS
 

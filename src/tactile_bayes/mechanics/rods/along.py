@@ -68,7 +68,7 @@ class Along:
         """Return the property with a number, or another property, added to all values."""
         if not isinstance(value, Along):
             return Along(self.edges, tuple((row[0] + value, *row[1:]) for row in self.coefficients))
-        edges = np.union1d(self.edges, value.edges)
+        edges = united(self.edges, value.edges)
         one, other = (each.on(edges) for each in (self, value))
         terms = max(one.shape[1], other.shape[1])
         rows = sum(np.pad(each, ((0, 0), (0, terms - each.shape[1]))) for each in (one, other))
@@ -87,6 +87,12 @@ class Along:
     def text(self) -> str:
         """The polynomials as JSON, for an attribute; `along` reads it."""
         return json.dumps({"edges": self.edges, "coefficients": self.coefficients})
+
+
+def united(*edges: ArrayLike) -> Floats:
+    """Return the edges of all properties; of those that differ by rounding the last."""
+    every = np.unique(np.concatenate([np.asarray(each, dtype=float) for each in edges]))
+    return every[np.append(np.diff(every) > _SAME * every[-1], True)]
 
 
 # A property of a rod as users give it: a number, a function of s, or arrays (s, values).

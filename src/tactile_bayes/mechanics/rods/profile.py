@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import check_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.rods.along import Along, GivenAlong, along
+from tactile_bayes.mechanics.rods.along import Along, GivenAlong, along, united
 
 STEEPEST_TAPER = 0.95  # largest taper: the rod bends 1.6e5 times as easily at its tip as at its base
 # Modes of the rest curvature. The first is nearly a turn of the base, and has 99 % of the variance of a traced rod's
@@ -88,7 +88,7 @@ def profile_of(
             f"rigidity_profile is {base:.6g} at the base: divide it by this value, since it is relative to the base"
         )
     bends = [bent, *modes]
-    edges = np.unique(np.concatenate([each.edges for each in (*bends, rigid)]))
+    edges = united(*(each.edges for each in (*bends, rigid)))
     terms = max(len(each.coefficients[0]) for each in bends)
     rows = [np.pad(_on(edges, each), ((0, 0), (0, terms - len(each.coefficients[0])))) for each in bends]
     return Profile(edges, rows[0], _on(edges, rigid), taper, 0.0, 1.0, np.array(rows), np.zeros(MOST_MODES))
