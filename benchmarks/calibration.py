@@ -98,12 +98,19 @@ def published(families: Iterable[str], noise: str) -> dict[str, xr.Dataset]:
     """Return the calibrations whose replicates are published, by family."""
     found = {}
     for family in families:
-        path = PUBLISHED / f"{folder_of(family, noise)}.csv"
-        if path.exists():
-            with path.open(encoding="utf-8", newline="") as file:
-                outcomes = {number: _outcome(row) for number, row in enumerate(csv.DictReader(file))}
+        if _path(family, noise).exists():
+            outcomes = {number: _outcome(row) for number, row in enumerate(_rows(family, noise))}
             found[family] = summary(experiment_of(**conditions(family, noise)), outcomes)
     return found
+
+
+def _path(family: str, noise: str) -> Path:
+    return PUBLISHED / f"{folder_of(family, noise)}.csv"
+
+
+def _rows(family: str, noise: str) -> list[dict[str, str]]:
+    with _path(family, noise).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def _outcome(row: dict[str, str]) -> Outcome:
@@ -123,12 +130,16 @@ def pooled(family: str, noise: str, each: Iterable[xr.Dataset]) -> xr.Dataset:
 
 
 def publish(family: str, noise: str, made: xr.Dataset) -> None:
-    """Write ranks and claims of a calibration, a row for each replicate."""
+    """Write ranks and claims of a calibration, a row for each replicate, in place of one with no more of them."""
+    path = _path(family, noise)
+    if path.exists() and len(_rows(family, noise)) > made.sizes["replicate"]:
+        raise SystemExit(
+            f"{path} holds more replicates than the {made.sizes['replicate']} made: remove it to publish these"
+        )
     names = [name for name in NUMBERS if name in made]
     columns = {str(name): made["ranks"].sel(quantity=name).values for name in made.quantity.values}
     columns = {name: [rank if rank >= 0 else "" for rank in ranks] for name, ranks in columns.items()}
     columns |= {name: [str(v) if np.isfinite(v) else "" for v in made[name].values.tolist()] for name in names}
-    path = PUBLISHED / f"{folder_of(family, noise)}.csv"
     with write_atomically(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file).writerows([columns, *zip(*columns.values(), strict=True)])
 
@@ -182,6 +193,9 @@ def main(*chosen: str) -> None:
     for noise in noises:
         if "published" in chosen:
             made = published(families, noise)
+            if not made:
+                print(f"no replicates of {', '.join(families)} at {NOISES[noise].title} are published", flush=True)
+                continue
         else:
             made = {name: calibrated(name, noise, count) for name in families}
         if "publish" in chosen:
