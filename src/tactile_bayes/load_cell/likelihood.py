@@ -62,17 +62,6 @@ def log_likelihood(
     return np.asarray(by_sample if pointwise else by_sample.sum(axis=-1))
 
 
-def log_density_left_out(
-    sheet: DataSheet,
-    measured: ArrayLike,
-    predicted: ArrayLike,
-    noise_scale: ArrayLike = 1.0,
-    discrepancy: Discrepancy | None = None,
-) -> Floats:
-    """Log-density of each sample given all the others; see `LoadCell.log_density_left_out`."""
-    return log_likelihood(sheet, measured, predicted, noise_scale, True, discrepancy, left_out=True)
-
-
 def _is_plain(sheet: DataSheet) -> bool:
     """Return whether noise is normal and white and readings are continuous, the case of inner loops."""
     limits = sheet.force_range, sheet.moment_range, sheet.degrees_of_freedom
