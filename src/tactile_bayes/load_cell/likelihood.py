@@ -74,15 +74,6 @@ def _is_plain(sheet: DataSheet) -> bool:
     )
 
 
-def approximations(sheet: DataSheet) -> tuple[str, ...]:
-    """Descriptions of the approximations in the likelihood of a sensor's readings."""
-    wanders = bool(np.any(_wandering_sizes(sheet)))
-    if np.any(sheet.resolution) and (wanders or any(sheet.correlation)):
-        beside = "drift or an unknown bias" if wanders else "correlated noise"
-        return (f"beside {beside}, the steps of the reading are taken for white noise of a twelfth of their square",)
-    return ()
-
-
 def checked_noise_scale(noise_scale: ArrayLike, loads: tuple[int, ...]) -> Floats:
     """Return factors on the white noise for loads of a shape, or refuse them."""
     scale = check_array("noise_scale", noise_scale, "give a positive factor, or one for each channel")
@@ -196,7 +187,7 @@ def _log_between(place: Floats, half: Floats, degrees_of_freedom: float) -> Floa
 # ---- dependent samples
 
 
-def _wandering_sizes(sheet: DataSheet) -> Floats:
+def wandering_sizes(sheet: DataSheet) -> Floats:
     """Standard deviations of the unknown zero: bias and drift, shape (3,)."""
     bias = np.array(sheet.bias_uncertainty)
     return bias if sheet.drift is None else np.hypot(bias, sheet.drift.sizes)
@@ -212,7 +203,7 @@ def _dependent(
     left_out: bool,
 ) -> Floats | None:
     """Log-density of each sample given others; None if samples and channels are independent."""
-    wanders = bool(np.any(_wandering_sizes(sheet)[present]))
+    wanders = bool(np.any(wandering_sizes(sheet)[present]))
     correlation = sheet.correlation_matrix[np.ix_(present, present)]
     correlated = bool(np.any(correlation != np.eye(present.size)))
     if discrepancy is not None:
@@ -257,7 +248,7 @@ def _wandering_together(
     deviation = deviation[..., 0, :] if deviation.ndim > 1 else deviation
     root = np.linalg.cholesky(_covariance(deviation, steps, correlation))
     inverse = np.linalg.inv(root)
-    share, axes = np.linalg.eigh(inverse * _wandering_sizes(sheet)[present] ** 2 @ np.swapaxes(inverse, -1, -2))
+    share, axes = np.linalg.eigh(inverse * wandering_sizes(sheet)[present] ** 2 @ np.swapaxes(inverse, -1, -2))
     residual = residual @ np.swapaxes(np.swapaxes(axes, -1, -2) @ inverse, -1, -2)
     volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)[..., None]
     none = np.zeros(present.size)

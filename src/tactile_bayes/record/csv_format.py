@@ -83,7 +83,7 @@ def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
 
 
 def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) -> Table:
-    """Read a table from an open file, which is called so in messages."""
+    """Read a table from an open file, which has a name for messages."""
     source = Source(called)
     refuse_other_kinds(file.read(8), source)
     file.seek(0)
@@ -115,15 +115,8 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     }
     for name, unit in units.items():
         attrs[name]["units"] = unit
-    source = Source(
-        called,
-        lines,
-        source.heads,
-        names=names,
-        stated=header.stated,
-        remarks=header.remarks,
-        notes=[note] if note else [],
-    )
+    notes = [note] if note else []
+    source = replace(source, lines=lines, names=names, stated=header.stated, remarks=header.remarks, notes=notes)
     return Table({name: (array, attrs[name]) for name, array in values.items()}, header.attrs, source)
 
 
