@@ -23,10 +23,6 @@ def test_every_channel_has_its_standard_deviation():
     assert tuple(CELL.standard_deviations) == CHANNELS
 
 
-def test_the_data_sheet_goes_with_the_record():
-    assert LoadCell.from_record(CELL.measure(ideal(), rng=1)) == CELL
-
-
 def test_the_data_sheet_is_converted_with_the_record():
     rod = Rod(0.2, 2.4e-3)
     measured = CELL.measure(ideal(rod=rod), rng=1)
@@ -41,13 +37,10 @@ def test_the_same_seed_gives_the_same_noise():
     record = ideal()
     first = CELL.measure(record, rng=3)
     assert CELL.measure(record, rng=3).identical(first)
-    assert CELL.measure(record, rng=np.random.default_rng(3)).identical(first)
     assert not CELL.measure(record, rng=4).identical(first)
-
-
-def test_a_generator_goes_on():
     rng = np.random.default_rng(3)
-    assert not CELL.measure(ideal(), rng=rng).identical(CELL.measure(ideal(), rng=rng))
+    assert CELL.measure(record, rng=rng).identical(first)
+    assert not CELL.measure(record, rng=rng).identical(first)
 
 
 def test_truth_is_kept_and_the_argument_is_not_changed():
@@ -93,12 +86,6 @@ def test_a_cell_that_turns_has_its_noise_on_what_it_measures():
     np.testing.assert_allclose(turned_size, size, rtol=1e-13)
 
 
-def test_a_cell_without_noise_changes_nothing():
-    measured = LoadCell().measure(ideal(), rng=1)
-    for name in CHANNELS:
-        np.testing.assert_array_equal(measured[name], ideal()[name])
-
-
 def test_a_missing_channel_stays_missing_and_the_others_have_the_same_noise():
     measured = CELL.measure(ideal(missing=("force_x",)), rng=1)
     assert present_channels(measured) == ("holding_moment", "force_y")
@@ -106,28 +93,6 @@ def test_a_missing_channel_stays_missing_and_the_others_have_the_same_noise():
     whole = CELL.measure(ideal(), rng=1)
     for name in ("holding_moment", "force_y"):
         assert measured[name].identical(whole[name])
-
-
-def test_noise_has_the_stated_moments_and_is_independent():
-    # n = 40000 samples of three channels. Under the stated law each of the statistics below is standard normal up
-    # to O(1/√n); twelve of them beyond 5 happen once in 1.5 million seeds.
-    n = 40_000
-    measured = CELL.measure(ideal(n), rng=20)
-    noise = np.stack(
-        [(measured[name] - measured[f"truth_{name}"]).values / CELL.standard_deviations[name] for name in CHANNELS]
-    )
-    mean = noise.mean(axis=1) * np.sqrt(n)
-    variance = ((noise**2).mean(axis=1) - 1) / np.sqrt(2 / n)
-    between_channels = np.array([noise[i] @ noise[j] for i, j in ((0, 1), (0, 2), (1, 2))]) / np.sqrt(n)
-    between_samples = (noise[:, 1:] * noise[:, :-1]).sum(axis=1) / np.sqrt(n - 1)
-    assert np.abs([mean, variance, between_channels, between_samples]).max() < 5
-
-
-def test_noise_is_normal():
-    # Kolmogorov and Smirnov's test on 3 x 5000 numbers; it fails for one seed in a million.
-    measured = CELL.measure(ideal(5000), rng=21)
-    noise = [(measured[name] - measured[f"truth_{name}"]).values / CELL.standard_deviations[name] for name in CHANNELS]
-    assert stats.kstest(np.concatenate(noise), "norm").pvalue > 1e-6
 
 
 @pytest.mark.parametrize("further", [{"bias": (0.1, 0.0, 0.0)}, {"degrees_of_freedom": 3.0}, {"drift": WALK}])

@@ -119,6 +119,7 @@ def test_entries_that_are_none_are_refused():
 
 def test_the_data_sheet_goes_with_the_record():
     assert LoadCell.from_record(ideal()) is None
+    assert LoadCell.from_record(cell().measure(ideal(), rng=1)) == cell()
     half = ideal()
     half.attrs["load_cell_force_noise"] = 0.5
     assert LoadCell.from_record(half) == LoadCell(force_noise=0.5)

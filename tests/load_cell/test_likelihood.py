@@ -61,30 +61,6 @@ def test_the_log_likelihood_is_the_sum_of_normal_log_densities(arrays, missing, 
     assert (np.abs(pointwise.sum(axis=-1) - result) <= 2 * tolerance).all()
 
 
-def test_one_prediction_or_a_batch_give_the_same():
-    rng = np.random.default_rng(5)
-    measured, predicted = rng.normal(size=(9, 3)), rng.normal(size=(4, 9, 3))
-    batch = CELL.log_likelihood(measured, predicted)
-    single = [CELL.log_likelihood(measured, one) for one in predicted]
-    assert np.shape(single[0]) == ()
-    np.testing.assert_allclose(batch, single, rtol=1e-14)
-    scales = np.array([0.5, 1.0, 2.0, 4.0])
-    one_by_one = [CELL.log_likelihood(measured, predicted[0], noise_scale=scale) for scale in scales]
-    result = CELL.log_likelihood(measured, predicted[0], noise_scale=scales[:, None])
-    np.testing.assert_allclose(result, one_by_one, rtol=1e-14)
-
-
-def test_one_prediction_takes_many_factors_for_each_channel():
-    rng = np.random.default_rng(7)
-    measured, predicted = rng.normal(size=(2, 9, 3))
-    scales = rng.uniform(0.5, 2.0, (4, 3))
-    expected = log_densities(measured, predicted, scales).sum(axis=-1)
-    pointwise = CELL.log_likelihood(measured, predicted, noise_scale=scales, pointwise=True)
-    np.testing.assert_allclose(pointwise, expected, rtol=1e-13)
-    total = CELL.log_likelihood(measured, predicted, noise_scale=scales)
-    np.testing.assert_allclose(total, expected.sum(axis=-1), rtol=1e-13)
-
-
 @pytest.mark.parametrize("pointwise", [False, True])
 @pytest.mark.parametrize("missing", [[0], [1], [0, 2]])
 def test_the_factor_of_a_missing_channel_does_not_matter(missing, pointwise):

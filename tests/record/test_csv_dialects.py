@@ -125,11 +125,6 @@ def test_what_is_wrong_in_or_below_a_row_of_units_has_its_line(tmp_path, lines, 
         read(tmp_path, *lines)
 
 
-def test_a_unit_that_is_given_beside_another_in_the_row_is_refused(tmp_path):
-    with refused(RecordError, "line 2, column 'force_x' ('Fx' as given) is in [mN], but [N] is given for it"):
-        read(tmp_path, NAMES, "°;mN m;mN;mN", *ROWS, columns={**COLUMNS, "force_x": "Fx[N]"})
-
-
 def test_a_first_sample_of_ones_is_no_row_of_units(tmp_path):
     """1 is a unit too, and N may be a remark."""
     record = read(tmp_path, NAMES + ";note", "1;1;1;1;N", "1,5;1;1;1;N", rod=None)

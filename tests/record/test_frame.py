@@ -244,18 +244,6 @@ def test_the_hash_sees_the_frame():
 # --- Files ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".nc"])
-@pytest.mark.parametrize("frame", FRAMES)
-def test_files_carry_the_frame(tmp_path, suffix, frame):
-    path = tmp_path / f"record{suffix}"
-    record = make_record(columns(truth_force_x=np.ones(6)), Rig(rod=WIRE, load_cell=LoadCell(frame=frame)))
-    write_record(record, path)
-    assert read_record(path).identical(record)
-    assert read_record(path, Rig(load_cell=LoadCell(frame=frame))).identical(record)
-    with refused(RecordError, f"{path}: the record states load_cell_frame '{frame}', but "):
-        read_record(path, Rig(load_cell=LoadCell(frame=next(other for other in FRAMES if other != frame))))
-
-
 def test_a_csv_file_states_the_frame_in_its_header(tmp_path):
     path = tmp_path / "lab.csv"
     write_record(make_record(columns(), Rig(load_cell=LoadCell(frame="turning"))), path)

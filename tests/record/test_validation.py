@@ -107,11 +107,6 @@ def test_what_cannot_be_a_record_is_refused(table, message):
         ({"rig": [1, 2]}, "attribute 'rig' is [1, 2]: attributes of a record are strings or numbers"),
         ({"good": True}, "attribute 'good' is True: attributes of a record are strings or numbers"),
         ({"load_cell_force_noise": True}, "attribute 'load_cell_force_noise' is True"),
-        (
-            {"load_cell_bias_fx": 0.01},
-            "attribute 'load_cell_bias_fx' is 0.01, but a load cell has no entry 'bias_fx': did",
-        ),
-        ({"load_cell_bias_fx": "3 [mN]"}, "attribute 'load_cell_bias_fx' is '3 [mN]', but a load cell has no entry"),
     ],
 )
 def test_impossible_attributes_are_refused(attrs, message):

@@ -103,7 +103,7 @@ def _translation(text: str, step: float | None) -> Carried:
 
 
 def _motion(path: Path, step: float | None) -> Carried:
-    from tactile_bayes.record.plain_csv import columns_in
+    from tactile_bayes.record.points import columns_in
     from tactile_bayes.sweep import Motion
 
     x, y, angles = columns_in(path, ("x", "y", "drive_angle"), "pose")

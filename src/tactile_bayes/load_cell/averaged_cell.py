@@ -18,19 +18,12 @@ class AveragedCell(LoadCell):
 
     The noise of the entries is that of a single reading. Its steps count as noise, since a mean has none.
 
-    Parameters
-    ----------
-    readings : ndarray, shape (samples,)
-        Number of readings of each sample.
-
-    Examples
-    --------
     >>> AveragedCell(force_noise=0.04, moment_noise=0.02, readings=np.array([1, 4])).deviation(np.zeros((2, 3)))
     array([[0.02, 0.04, 0.04],
            [0.01, 0.02, 0.02]])
     """
 
-    readings: Floats = field(default_factory=lambda: np.ones(1), compare=False)
+    readings: Floats = field(default_factory=lambda: np.ones(1), compare=False)  # shape (samples,)
 
     @classmethod
     def of(cls, cell: DataSheet, readings: Floats) -> AveragedCell:

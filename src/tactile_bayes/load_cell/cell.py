@@ -18,7 +18,7 @@ from tactile_bayes.load_cell.corruption import corrupted_loads
 from tactile_bayes.load_cell.covariance import covariance, squared_mahalanobis_distance
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.discrepancy import Discrepancy
-from tactile_bayes.load_cell.likelihood import approximations, checked_noise_scale, log_density_left_out, log_likelihood
+from tactile_bayes.load_cell.likelihood import checked_noise_scale, log_likelihood, wandering_sizes
 from tactile_bayes.load_cell.measurement import corrected, measured, stated_entries
 from tactile_bayes.load_cell.zero_load import found_cell
 from tactile_bayes.numerics.random_numbers import Rng, generator
@@ -201,7 +201,13 @@ class LoadCell(DataSheet):
         >>> LoadCell(force_noise=0.05, force_resolution=0.05, correlation=(0.0, 0.0, 0.5)).approximations
         ('beside correlated noise, the steps of the reading are taken for white noise of a twelfth of their square',)
         """
-        return approximations(self)
+        wanders = bool(np.any(wandering_sizes(self)))
+        if np.any(self.resolution) and (wanders or any(self.correlation)):
+            beside = "drift or an unknown bias" if wanders else "correlated noise"
+            return (
+                f"beside {beside}, the steps of the reading are taken for white noise of a twelfth of their square",
+            )
+        return ()
 
     def measure(self, record: xr.Dataset, *, rng: Rng) -> xr.Dataset:
         """Measure a record with this load cell.
@@ -470,13 +476,7 @@ class LoadCell(DataSheet):
 
         Parameters
         ----------
-        measured : array, shape (n_samples, 3)
-            As in `log_likelihood`.
-        predicted : array, shape (..., n_samples, 3)
-            As in `log_likelihood`.
-        noise_scale : array, broadcastable to shape (..., 3)
-            As in `log_likelihood`.
-        discrepancy : Discrepancy, optional
+        measured, predicted, noise_scale, discrepancy
             As in `log_likelihood`.
 
         Returns
@@ -497,7 +497,7 @@ class LoadCell(DataSheet):
         >>> cell.log_density_left_out(moment_only, np.zeros((3, 3))).round(1)  # the last is off by 0.1
         array([ 0.7,  0.7, -5.6])
         """
-        return log_density_left_out(self, measured, predicted, noise_scale, discrepancy)
+        return log_likelihood(self, measured, predicted, noise_scale, True, discrepancy, left_out=True)
 
 
 def _by_sample(name: str, values: ArrayLike) -> Floats:

@@ -25,26 +25,15 @@ _TINY = 1e-290
 
 @dataclass(frozen=True)
 class ContactBounds:
-    """Bounds of contact in one sweep of the samples [0, n).
+    """Bounds of contact in one sweep of the samples [0, n)."""
 
-    Attributes
-    ----------
-    p_value : float
-        Upper bound of the p-value of the hypothesis of no contact.
-    found : bool
-        Whether contact is significant.
-    onset, snap_off : (int, int)
-        Last sample before the event and first sample after it that are certain; -1 where there is none.
-    before, after : int
-        Numbers of unloaded samples at the start and at the end of the sweep.
-    """
-
-    p_value: float
-    found: bool
+    p_value: float  # upper bound of the p-value of the hypothesis of no contact
+    found: bool  # whether contact is significant
+    # Last sample before the event and first sample after it that are certain; -1 where there is none.
     onset: tuple[int, int]
     snap_off: tuple[int, int]
-    before: int
-    after: int
+    before: int  # number of unloaded samples at the start of the sweep
+    after: int  # and at its end
 
 
 def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> ContactBounds:

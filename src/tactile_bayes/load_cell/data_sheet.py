@@ -36,20 +36,6 @@ CERTAIN = ("bias", "gain", "lever", "moment_curve", "drive_angle_offset", "drive
 _LOADS = f"give an array of shape (..., 3), with the channels {', '.join(CHANNELS)}"
 
 _IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_SCALARS = (
-    "force_noise",
-    "moment_noise",
-    "degrees_of_freedom",
-    "relative_noise",
-    "force_range",
-    "moment_range",
-    "force_resolution",
-    "moment_resolution",
-    "drive_angle_offset",
-    "drive_angle_backlash",
-    "drive_angle_noise",
-    "drive_angle_resolution",
-)
 _DRIFTS: dict[type[Drift], str] = {RandomWalk: "random_walk", OrnsteinUhlenbeck: "ornstein_uhlenbeck"}
 _PAIRS = tuple(combinations(CHANNELS, 2))
 # Names of the numbers of each entry with several numbers.
@@ -78,6 +64,7 @@ _CORRECTIONS = {
     **dict.fromkeys(("drive_angle_offset", "drive_angle_backlash"), "give an angle [rad]"),
     **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), "give a positive number, inf for none"),
 }
+_SCALARS = tuple(name for name in LOAD_CELL_UNITS if name in _CORRECTIONS)
 
 
 @dataclass(frozen=True)

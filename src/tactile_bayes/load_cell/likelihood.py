@@ -62,17 +62,6 @@ def log_likelihood(
     return np.asarray(by_sample if pointwise else by_sample.sum(axis=-1))
 
 
-def log_density_left_out(
-    sheet: DataSheet,
-    measured: ArrayLike,
-    predicted: ArrayLike,
-    noise_scale: ArrayLike = 1.0,
-    discrepancy: Discrepancy | None = None,
-) -> Floats:
-    """Log-density of each sample given all the others; see `LoadCell.log_density_left_out`."""
-    return log_likelihood(sheet, measured, predicted, noise_scale, True, discrepancy, left_out=True)
-
-
 def _is_plain(sheet: DataSheet) -> bool:
     """Return whether noise is normal and white and readings are continuous, the case of inner loops."""
     limits = sheet.force_range, sheet.moment_range, sheet.degrees_of_freedom
@@ -83,15 +72,6 @@ def _is_plain(sheet: DataSheet) -> bool:
         or any(sheet.bias_uncertainty)
         or any(sheet.correlation)
     )
-
-
-def approximations(sheet: DataSheet) -> tuple[str, ...]:
-    """Descriptions of the approximations in the likelihood of a sensor's readings."""
-    wanders = bool(np.any(_wandering_sizes(sheet)))
-    if np.any(sheet.resolution) and (wanders or any(sheet.correlation)):
-        beside = "drift or an unknown bias" if wanders else "correlated noise"
-        return (f"beside {beside}, the steps of the reading are taken for white noise of a twelfth of their square",)
-    return ()
 
 
 def checked_noise_scale(noise_scale: ArrayLike, loads: tuple[int, ...]) -> Floats:
@@ -207,7 +187,7 @@ def _log_between(place: Floats, half: Floats, degrees_of_freedom: float) -> Floa
 # ---- dependent samples
 
 
-def _wandering_sizes(sheet: DataSheet) -> Floats:
+def wandering_sizes(sheet: DataSheet) -> Floats:
     """Standard deviations of the unknown zero: bias and drift, shape (3,)."""
     bias = np.array(sheet.bias_uncertainty)
     return bias if sheet.drift is None else np.hypot(bias, sheet.drift.sizes)
@@ -223,7 +203,7 @@ def _dependent(
     left_out: bool,
 ) -> Floats | None:
     """Log-density of each sample given others; None if samples and channels are independent."""
-    wanders = bool(np.any(_wandering_sizes(sheet)[present]))
+    wanders = bool(np.any(wandering_sizes(sheet)[present]))
     correlation = sheet.correlation_matrix[np.ix_(present, present)]
     correlated = bool(np.any(correlation != np.eye(present.size)))
     if discrepancy is not None:
@@ -268,7 +248,7 @@ def _wandering_together(
     deviation = deviation[..., 0, :] if deviation.ndim > 1 else deviation
     root = np.linalg.cholesky(_covariance(deviation, steps, correlation))
     inverse = np.linalg.inv(root)
-    share, axes = np.linalg.eigh(inverse * _wandering_sizes(sheet)[present] ** 2 @ np.swapaxes(inverse, -1, -2))
+    share, axes = np.linalg.eigh(inverse * wandering_sizes(sheet)[present] ** 2 @ np.swapaxes(inverse, -1, -2))
     residual = residual @ np.swapaxes(np.swapaxes(axes, -1, -2) @ inverse, -1, -2)
     volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)[..., None]
     none = np.zeros(present.size)

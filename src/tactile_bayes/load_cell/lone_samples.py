@@ -18,22 +18,9 @@ from tactile_bayes.record import CHANNELS
 
 
 class LoneSamples:
-    """Readings, each of which is judged by itself.
+    """Readings, each of which is judged by itself: unknown bias and drift count as noise of that sample.
 
-    For white noise this is exact. Samples share an unknown bias and drift; for a single sample these are noise, with
-    their standard deviation at its position in the record.
-
-    Parameters
-    ----------
-    sheet : DataSheet
-    readings : ndarray, shape (n, 3)
-        Readings in the sheet's units and frame, from the first sample of a record, without missing channels.
-
-    Raises
-    ------
-    ParameterError
-        If a channel has no noise; if drift or an unknown bias is combined with outliers, or with a reading at the end
-        of the range.
+    The readings, shape (n, 3), are in the sheet's units and frame, from the first sample of a record on, and complete.
     """
 
     def __init__(self, sheet: DataSheet, readings: Floats) -> None:

@@ -229,7 +229,9 @@ def _positions(travel: Floats) -> Index:
 def _bounds(readings: Floats, positions: Index, false_alarm: float, floor: Floats) -> ContactBounds:
     """Return the bounds of contact of one sweep, from the means of its positions: their noise may be correlated."""
     means = means_of_positions(readings, positions)
-    bounds = _if_long_enough(contact_bounds(means, false_alarm, floor * len(means) / len(readings)), len(means))
+    bounds = contact_bounds(means, false_alarm, floor * len(means) / len(readings))
+    if not bounds.found and len(means) < _MIN_SAMPLES:
+        bounds = replace(bounds, before=0, after=0)
     if len(means) == len(readings):
         return bounds
     firsts = np.searchsorted(positions, np.arange(len(means) + 1))  # the first sample of each position, and the end
@@ -245,13 +247,6 @@ def _bounds(readings: Floats, positions: Index, false_alarm: float, floor: Float
         before=int(firsts[bounds.before]),
         after=len(readings) - int(firsts[len(means) - bounds.after]),
     )
-
-
-def _if_long_enough(bounds: ContactBounds, samples: int) -> ContactBounds:
-    """Return the bounds; a sweep without contact has no unloaded samples if it is too short."""
-    if bounds.found or samples >= _MIN_SAMPLES:
-        return bounds
-    return ContactBounds(bounds.p_value, False, bounds.onset, bounds.snap_off, 0, 0)
 
 
 class _Stretch(NamedTuple):

@@ -23,6 +23,11 @@ def number_in(cell: Any) -> float | None:
         return None
 
 
+def number_with_comma(text: str) -> float | None:
+    """Parse the number in a cell whose decimals may have a comma, None for an empty cell too."""
+    return number_in(text.replace(",", ".")) if text else None
+
+
 def integer_in(cell: Any) -> int | None:
     """Parse the integer in a cell, None for other content; 2.0 is accepted, since tables often contain it."""
     if isinstance(cell, int):

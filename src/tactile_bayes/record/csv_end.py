@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Sequence
 from itertools import pairwise
@@ -10,7 +11,7 @@ from statistics import mean, median
 from typing import BinaryIO
 
 from tactile_bayes.numerics.scatter import DEVIATION_OVER_MEDIAN
-from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.cell import number_with_comma
 from tactile_bayes.record.csv_header import Header, cells_in
 
 _TAIL = 1 << 16  # bytes of the end of a file in which rows are compared with the last one
@@ -51,22 +52,16 @@ def without_cut_row(file: BinaryIO, header: Header, line: int) -> tuple[BinaryIO
 
 def _stands_out(text: str, above: Sequence[str]) -> bool:
     """Return whether a number differs from those above it in its notation, or by much more than they from another."""
-    numbers = [(_number_in(cell), cell) for cell in above]
-    values = [value for value, _ in numbers if value is not None]
-    number = _number_in(text)
-    if number is None or len(values) < max(_FEWEST, len(above)):  # a column of text
+    numbers = [number_with_comma(cell) for cell in (*above, text)]
+    *values, number = [math.nan if value is None else value for value in numbers]
+    if math.isnan(sum(map(abs, (*values, number)))) or len(values) < _FEWEST:  # a column of text
         return False
-    notations = {_notation(cell) for _, cell in numbers}
+    notations = set(map(_notation, above))
     if len(values) >= _ENOUGH and len(notations) == 1 and notations != {_INTEGER}:
         return _notation(text) not in notations
     steps = [abs(b - a) for a, b in pairwise(values)]
     usual = DEVIATION_OVER_MEDIAN * median(steps) or mean(steps)
     return abs(number - values[-1]) > _WIDTHS * usual
-
-
-def _number_in(text: str) -> float | None:
-    number = number_in(text.replace(",", ".")) if text else None
-    return None if number is None or number != number else number
 
 
 def _notation(text: str) -> tuple[int | None, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.cell import number_with_comma
 from tactile_bayes.record.csv_end import without_cut_row
 from tactile_bayes.record.csv_header import (
     FORMAT,
@@ -83,7 +83,7 @@ def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
 
 
 def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) -> Table:
-    """Read a table from an open file, which is called so in messages."""
+    """Read a table from an open file, which has a name for messages."""
     source = Source(called)
     refuse_other_kinds(file.read(8), source)
     file.seek(0)
@@ -115,15 +115,8 @@ def read_csv_content(file: BinaryIO, called: str, columns: Mapping[str, str]) ->
     }
     for name, unit in units.items():
         attrs[name]["units"] = unit
-    source = Source(
-        called,
-        lines,
-        source.heads,
-        names=names,
-        stated=header.stated,
-        remarks=header.remarks,
-        notes=[note] if note else [],
-    )
+    notes = [note] if note else []
+    source = replace(source, lines=lines, names=names, stated=header.stated, remarks=header.remarks, notes=notes)
     return Table({name: (array, attrs[name]) for name, array in values.items()}, header.attrs, source)
 
 
@@ -192,7 +185,7 @@ def _units_below(file: BinaryIO, header: Header, meant: Mapping[str, Kind], sour
     cells = cells_in(next(iter(lines_below(file)), ""), header.delimiter)
     texts = [_without_brackets(cell) for cell in cells]
     units = [unit_of(text) if cell else None for cell, text in zip(cells, texts, strict=True)]
-    is_number = [unit is None and _number_in(text) is not None for unit, text in zip(units, texts, strict=True)]
+    is_number = [unit is None and number_with_comma(text) is not None for unit, text in zip(units, texts, strict=True)]
     is_measured = [
         unit is not None and not unit.is_number and meant.get(name) == "number"
         for name, unit in zip(header.names, units, strict=False)
@@ -230,10 +223,6 @@ def _refuse_unit(
             f"column {name!r} is in [{text}] here, and in [{stated}] in line {header.heads[name]}: leave out the one "
             "that is wrong",
         )
-
-
-def _number_in(text: str) -> float | None:
-    return number_in(text.replace(",", ".")) if text else None
 
 
 def _without_brackets(cell: str) -> str:

@@ -1,16 +1,15 @@
-"""The rows of a CSV file: a fast reader, or a careful one that reports positions, converts chunks to columns."""
+"""The rows of a CSV file, read in chunks that become columns."""
 
 from __future__ import annotations
 
 import csv
 import io
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
@@ -18,17 +17,9 @@ from tactile_bayes.record.encoding import CUT_BY_NUL, WITH_NUL, not_utf8
 from tactile_bayes.record.parsing import text_array
 from tactile_bayes.record.schema import Kind
 from tactile_bayes.record.spelling import look_alikes, plain_number
-from tactile_bayes.record.storable import LONGEST_CELL
 from tactile_bayes.record.table import Source
 
-# Bytes that are read at once: first a small chunk, from which the kinds of columns are inferred.
-_FIRST, _CHUNK = 1 << 16, 1 << 21
-# Last cell of each line for the fast reader, which shows whether cells are in the right columns.
-_MARK = 5_790_842_613_117
-# Options for rounding to the nearest double, the only behaviour since pandas 3.1.
-_ROUNDING: dict[str, Any] = (
-    {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
-)
+_CHUNK = 1 << 16  # bytes that become columns at once; larger ones take longer, as cells do not stay in the cache
 
 
 @dataclass
@@ -85,12 +76,7 @@ def _read_once(
     lines.append(np.empty(0, np.int64))
     above = layout.line
     for chunk in chunks:
-        cells = _read_fast(chunk, layout)
-        if cells is None:
-            cells, here, above = _read_carefully(chunk, chunks, layout, above, source)
-        else:
-            rows = len(cells[layout.names[0]])
-            here, above = np.arange(above + 1, above + 1 + rows), above + rows
+        cells, here, above = _read_cells(chunk, chunks, layout, above, source)
         lines.append(here)
         for name, values in cells.items():
             columns[name].append(values)
@@ -99,13 +85,12 @@ def _read_once(
 
 def _chunks(file: BinaryIO) -> Iterator[bytes]:
     """Yield the rest of a file in pieces that end with a line, except the last."""
-    size, rest = _FIRST, b""
-    while block := file.read(size):
+    rest = b""
+    while block := file.read(_CHUNK):
         end = block.rfind(b"\n") + 1
         if end:
             yield rest + block[:end]
         rest = block[end:] if end else rest + block
-        size = _CHUNK
     if rest:
         yield rest
 
@@ -139,84 +124,7 @@ class _Values:
         return self._numbers
 
 
-# --- The fast reader --------------------------------------------------------------------------------------------
-
-
-def _read_fast(chunk: bytes, layout: Layout) -> dict[str, NDArray[Any]] | None:
-    """Read the columns of a chunk; None if anything is unusual, for the careful reader."""
-    kinds = {name: layout.kind(name) for name in layout.names}
-    if None in kinds.values() or layout.decimal is None or b"\0" in chunk:
-        return None
-    chunk = chunk.replace(b"\r\n", b"\n")
-    if b"\r" in chunk or not chunk.endswith(b"\n"):
-        return None
-    if _begins_with_truth(chunk, kinds, layout):
-        return None
-    rows = chunk.count(b"\n")
-    chunk = chunk.replace(b"\n", f"{layout.delimiter}{_MARK}\n".encode())
-    dtypes: dict[int, Any] = {len(layout.names): np.int64}
-    for index, (name, kind) in enumerate(kinds.items()):
-        if kind != "integer" or name not in layout.guessed:  # in an inferred column 2.0 is not an integer
-            dtypes[index] = {"integer": np.int64, "number": np.float64, "text": object}[kind or "text"]
-    try:
-        with warnings.catch_warnings(action="error"), np.errstate(invalid="raise"):
-            frame = pd.read_csv(
-                io.BytesIO(chunk),
-                sep=layout.delimiter,
-                decimal=layout.decimal,
-                header=None,
-                names=list(range(len(layout.names) + 1)),
-                index_col=False,
-                dtype=dtypes,
-                keep_default_na=False,
-                na_values={
-                    index: ["", "nan", "NaN", "NAN"] for index, kind in enumerate(kinds.values()) if kind == "number"
-                },
-                skip_blank_lines=False,
-                low_memory=False,
-                engine="c",
-                **_ROUNDING,
-            )
-    except (ValueError, OverflowError, ArithmeticError, Warning):  # ParserError and UnicodeError are ValueErrors
-        return None
-    if len(frame) != rows or not (frame[len(layout.names)] == _MARK).all():
-        return None
-    columns: dict[str, NDArray[Any]] = {}
-    for index, (name, kind) in enumerate(kinds.items()):
-        values = frame[index].to_numpy()
-        if kind == "text":
-            texts = values.tolist()
-            if max(map(len, texts)) > LONGEST_CELL:
-                return None
-            values = _text_array(texts, name in layout.meant)
-        elif values.dtype != (np.int64 if kind == "integer" else np.float64):
-            return None
-        columns[name] = values
-    return columns
-
-
-def _begins_with_truth(chunk: bytes, kinds: Mapping[str, Kind | None], layout: Layout) -> bool:
-    """Return whether a number in the first line may be the word true or false, which pandas converts to 1 and 0."""
-    line = chunk[: chunk.index(b"\n")].lower()
-    if b"true" not in line and b"false" not in line:
-        return False
-    cells = line.split(layout.delimiter.encode())
-    return b'"' in line or any(
-        b"e" in cell for cell, kind in zip(cells, kinds.values(), strict=False) if kind != "text"
-    )
-
-
-def _text_array(texts: Sequence[str], stripped: bool) -> NDArray[Any]:
-    words = set(texts)
-    if stripped and any(word != word.strip() for word in words):
-        texts = [text.strip() for text in texts]
-    return text_array(texts)
-
-
-# --- The careful reader -----------------------------------------------------------------------------------------
-
-
-def _read_carefully(
+def _read_cells(
     chunk: bytes, chunks: Iterator[bytes], layout: Layout, above: int, source: Source
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64], int]:
     """Read the columns of a chunk, the lines of its samples, and its last line; an error states the position."""
@@ -232,19 +140,19 @@ def _read_carefully(
     rows: list[list[str]] = []
     begins: list[int] = []
     reader = csv.reader(fed(), delimiter=layout.delimiter)
-    begin = above + 1
+    begin, width = above + 1, len(layout.names)
     try:
         for row in reader:
-            if row and len(row) != len(layout.names):
+            if len(row) == width:
+                rows.append(row)
+                begins.append(begin)
+            elif row:
                 raise source.row_error(
                     begin,
-                    f"there are {len(row)} cells in {len(layout.names)} columns "
+                    f"there are {len(row)} cells in {width} columns "
                     f"({', '.join(map(str.strip, layout.names))}): write one per column, with a point in decimals"
                     + ("" if layout.delimiter == "," else " or a comma, but none between thousands"),
                 )
-            if row:
-                rows.append(row)
-                begins.append(begin)
             begin = above + 1 + reader.line_num
             if reader.line_num == len(lines):
                 break
@@ -254,9 +162,9 @@ def _read_carefully(
             f"the line cannot be read ({error}): correct it; a quotation mark that is not closed takes in what follows",
         ) from error
     here = Source(source.name, begins, aliases=source.aliases)
+    texts = dict(zip(layout.names, zip(*rows, strict=True) if rows else [()] * width, strict=True))
     order = sorted(layout.names, key=lambda name: name not in layout.meant)  # these show the decimal separator
-    places = {name: index for index, name in enumerate(layout.names)}
-    columns = {name: _column_values(name, [row[places[name]] for row in rows], layout, here) for name in order}
+    columns = {name: _column_values(name, texts[name], layout, here) for name in order}
     return columns, np.array(begins, dtype=np.int64), begin - 1
 
 
@@ -273,24 +181,48 @@ def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:
     return io.StringIO(text, newline="").readlines()
 
 
-def _column_values(name: str, texts: list[str], layout: Layout, source: Source) -> NDArray[Any]:
+def _column_values(name: str, texts: Sequence[str], layout: Layout, source: Source) -> NDArray[Any]:
     """Convert the cells of a column to its known kind, or to the kind of their content."""
     kind = layout.kind(name)
     if kind == "text":
-        return _text_array(texts, name in layout.meant)
-    if name not in layout.meant and name not in layout.described:
-        looks = _kind_of(texts, layout)
-        if looks == "text":
-            layout.guessed[name] = "text"
-            if kind is None:
-                return text_array(texts)
-            raise _WrongGuessError
-        if kind != "number":
-            kind = layout.guessed[name] = looks
-    parsed = [integer_in(text) if kind == "integer" else _number_in(text, layout) for text in texts]
-    if None in parsed:
-        _refuse_cell(name, kind, texts, [i for i, value in enumerate(parsed) if value is None], layout, source)
-    return np.array(parsed, dtype=np.int64 if kind == "integer" else np.float64)
+        return text_array([text.strip() for text in texts] if name in layout.meant else texts)
+    is_known, decimal = name in layout.meant or name in layout.described, layout.decimal
+    found: Kind = "number" if kind == "number" else "integer"
+    parsed: Sequence[float | None] = _numbers(texts, layout) if kind == "number" else _integers(texts, is_known)
+    if None in parsed and not (is_known or kind == "number"):
+        found, parsed = "number", _numbers(texts, layout)
+    if None not in parsed:
+        if not is_known:
+            layout.guessed[name] = found
+        return np.array(parsed, dtype=np.int64 if found == "integer" else np.float64)
+    if is_known:
+        _refuse_cell(name, found, texts, [i for i, value in enumerate(parsed) if value is None], layout, source)
+    layout.guessed[name], layout.decimal = "text", decimal
+    if kind is not None:
+        raise _WrongGuessError
+    return text_array(texts)
+
+
+def _integers(texts: Sequence[str], is_known: bool) -> Sequence[int | None]:
+    """Parse integers, None for other content; in a column that is not known to hold integers 2.0 is none."""
+    together = "".join(texts)
+    if together.isascii() and "_" not in together:  # which Python reads otherwise
+        with suppress(ValueError):
+            integers = list(map(int, texts))
+            if min(integers, default=0) >= -(2**63) and max(integers, default=0) < 2**63:
+                return integers
+    return [integer_in(text) if is_known or is_integer_text(text) else None for text in texts]
+
+
+def _numbers(texts: Sequence[str], layout: Layout) -> Sequence[float | None]:
+    """Parse numbers, NaN for empty cells and None for other content."""
+    together = "".join(texts)
+    with suppress(ValueError):
+        if "_" not in together and layout.decimal == ".":
+            return [float(text or "nan") for text in texts]
+        if "_" not in together and layout.decimal == "," and "." not in together:
+            return [float(text.replace(",", ".") or "nan") for text in texts]
+    return [_number_in(text, layout) for text in texts]
 
 
 def _number_in(text: str, layout: Layout) -> float | None:
@@ -305,19 +237,8 @@ def _number_in(text: str, layout: Layout) -> float | None:
     return number_in(text)
 
 
-def _kind_of(texts: list[str], layout: Layout) -> Kind:
-    """Infer the kind of a column from its cells."""
-    if all(is_integer_text(text) and integer_in(text) is not None for text in texts):
-        return "integer"
-    decimal = layout.decimal
-    if all(_number_in(text, layout) is not None for text in texts):
-        return "number"
-    layout.decimal = decimal
-    return "text"
-
-
 def _refuse_cell(
-    name: str, kind: Kind | None, texts: list[str], samples: list[int], layout: Layout, source: Source
+    name: str, kind: Kind, texts: Sequence[str], samples: list[int], layout: Layout, source: Source
 ) -> NoReturn:
     sample = samples[0]
     if name in layout.described:

@@ -1,10 +1,11 @@
-"""Files of points: polylines in CSV or DXF, and their unit of length."""
+"""Files of points and of poses: polylines in CSV or DXF with their unit of length, and plain columns of numbers."""
 
 from __future__ import annotations
 
 import csv
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -77,6 +78,26 @@ def read_points(path: str | os.PathLike[str], *, beside: str = "") -> Points:
     if len({unit for _, unit in scales}) > 1:
         raise ParameterError(f"{path}: {', '.join(map(repr, names))} state different units: write x [mm],y [mm]")
     return Points([rows * [scale for scale, _ in scales]], scales[0][1])
+
+
+def columns_in(path: Path, names: Sequence[str], what: str) -> list[Floats]:
+    """Return columns of numbers of a CSV file, a line for each of what they are, or refuse it."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ParameterError(f"{path}: the {what}s cannot be read ({error})") from error
+    columns = []
+    for name in names:
+        values = [number_in(row.get(name) or "") for row in rows]
+        if not values or None in values:
+            at = values.index(None) + 1 if values else 0
+            raise ParameterError(
+                f"{path}: {what} {at} has no number in column {name!r}: write a line '{','.join(names)}', then a "
+                f"{what} in each line, with decimal points"
+            )
+        columns.append(np.array(values, dtype=float))
+    return columns
 
 
 def _scale(unit: str, path: object) -> tuple[float, str]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations, product
@@ -13,8 +11,6 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-
-from tactile_bayes.record.spelling import plain
 
 Frame = Literal["fixed", "turning"]
 Kind = Literal["integer", "number", "text"]
@@ -147,15 +143,6 @@ def column_of(name: str) -> Column | None:
 def column_attributes(name: str, units: str) -> dict[str, str]:
     """Return the attributes of a column of `COLUMNS` among data of the given units, "SI" or "dimensionless"."""
     return {"units": COLUMNS[name].unit_in(units), "long_name": COLUMNS[name].long_name}
-
-
-def same_unit(one: str, other: str) -> bool:
-    """Return whether two texts mean the same unit up to notation, like N m², N·m^2 and Nm2."""
-    return _plain(one) == _plain(other)
-
-
-def _plain(unit: str) -> str:
-    return re.sub(r"[\s^·*]", "", unicodedata.normalize("NFKC", plain(unit)))
 
 
 def present_channels(record: xr.Dataset) -> tuple[str, ...]:

@@ -180,10 +180,10 @@ def _runs_backwards(angle: Floats, sense: int) -> bool:
     """Return whether a sequence runs against its sense by more than the noise of the encoder (see `validate`)."""
     if angle.size < 2:
         return False
-    angle = angle - angle[0]  # so that a drive at rest has exactly no trend
+    angle = angle - angle[0]
     time = np.arange(angle.size) - (angle.size - 1) / 2
     squares = _product(time, time)
-    slope = sense * _product(time, angle) / squares
+    slope = sense * trend(angle) / squares
     if slope >= 0:
         return False
     if (sense * angle[1:] < sense * angle[:-1]).all():
@@ -191,6 +191,11 @@ def _runs_backwards(angle: Floats, sense: int) -> bool:
     residual = angle - angle.mean() - sense * slope * time
     variance_of_slope = _product(residual, residual) / max(angle.size - 2, 1) / squares
     return slope < -6 * math.sqrt(variance_of_slope)
+
+
+def trend(angle: Floats) -> float:
+    """Slope of a straight line fitted to a sequence, times a positive factor; exactly 0 for a drive at rest."""
+    return _product(np.arange(angle.size) - (angle.size - 1) / 2, angle - angle[0])
 
 
 def _product(one: NDArray[np.floating[Any]], other: NDArray[np.floating[Any]]) -> float:

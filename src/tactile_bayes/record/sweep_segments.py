@@ -12,6 +12,7 @@ from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.positions import end_of_rest
 from tactile_bayes.record.schema import LARGEST_DRIVE_ANGLE
+from tactile_bayes.record.sweep import trend
 from tactile_bayes.record.table import Source, Table
 
 _ROUNDING = 1e-9  # share of the motion that must be across the rod for a side of it to lead
@@ -119,8 +120,8 @@ def _turned_sweeps(stretch: slice, angle: Floats, moved: Flags, source: Source) 
             starts.append(end_of_rest(angle[:end], starts[-1], begin + turn))
     sweeps = []
     for begin, end in pairwise([*starts, stretch.stop]):
-        trend = _trend(angle[begin:end])
-        if trend == 0.0:
+        slope = trend(angle[begin:end])
+        if slope == 0.0:
             if end - begin == 1:
                 what = "there is one sample" if angle.size == 1 else "a sweep has one sample"
                 what += f", {source.row(begin)}, so that it has no direction: give more samples"
@@ -130,7 +131,7 @@ def _turned_sweeps(stretch: slice, angle: Floats, moved: Flags, source: Source) 
                     "sweep has no direction: remove these samples"
                 )
             raise source.error(f"{what}, or give columns 'sweep' and 'direction'")
-        sweeps.append((begin, end, trend > 0.0))
+        sweeps.append((begin, end, slope > 0.0))
     return sweeps
 
 
@@ -197,8 +198,3 @@ def _left_extreme(angle: Floats, begin: int, sense: int, least: float) -> tuple[
             return place, begin + stop
         begin, size = begin + size, min(2 * size, 1 << 20)
     return None
-
-
-def _trend(angle: Floats) -> float:
-    """Slope of a straight line fitted to a sequence, times a positive factor."""
-    return float(np.einsum("i,i->", np.arange(angle.size) - (angle.size - 1) / 2, angle - angle[0]))

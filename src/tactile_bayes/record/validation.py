@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from tactile_bayes.record.attributes import checked_attributes, stated_frame
 from tactile_bayes.record.origin import ORIGIN
 from tactile_bayes.record.parsing import parsed_column
+from tactile_bayes.record.quantity import units_disagree
 from tactile_bayes.record.rig_entry import file_entry
-from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, column_of, same_unit
+from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, column_of
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.record.storable import is_storable, is_storable_attribute, not_storable, storable
 from tactile_bayes.record.sweep import refuse_impossible_sweeps
@@ -87,7 +88,7 @@ def _checked_column_attributes(
     units = of_record["units"]
     expected = column.unit_in(units)
     stated = str(attrs.get("units", expected))
-    if not same_unit(stated, expected):
+    if units_disagree(stated, expected):
         raise source.error(
             f"column {name!r} is in [{stated}], but the record is {units}: convert the column to [{expected}], or "
             "state the units that the record is in, and for SI the rod"
