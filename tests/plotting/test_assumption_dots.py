@@ -25,7 +25,6 @@ def test_marks_lie_at_their_distances_and_rejected_ones_say_so():
     assert drawn["in the gap"][0] == 0.1
     assert drawn["beside it"].tolist() == [0.05, 0.2]
     assert [text.get_text() for text in ax.get_yticklabels()][1] == "family circle (rejected)"
-    plt.close(ax.figure)
 
 
 def test_other_results_are_refused():

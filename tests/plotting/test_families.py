@@ -142,12 +142,6 @@ def test_contours_of_the_prior_are_drawn_within_the_rods_reach(posterior):
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
 
 
-def test_the_same_contours_are_drawn_again(posterior):
-    first, second = ([line.get_ydata() for line in plotting.prior_contours(posterior).lines] for _ in range(2))
-    for one, other in zip(first, second, strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
 @pytest.mark.slow
 def test_the_median_is_drawn_where_the_rod_touched(posterior):
     drawn = line(plotting.prior_contours(posterior, truth=CONTOUR), "posterior median, where touched")

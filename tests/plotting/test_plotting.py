@@ -583,10 +583,6 @@ def test_contacts_without_phase_or_status_are_drawn_all(contacts):
     assert labels(ax) == ["contact"]
 
 
-def test_contour_says_whether_there_is_a_gap_or_an_overlap():
-    assert plotting.contour((-1.0, 1.0), gap=(0.1, -0.1)).texts[0].get_text() == "overlap"
-
-
 def test_contour_takes_units_from_what_it_is_given(contacts, band):
     for name in ("contact_x", "contact_y"):
         contacts = contacts.assign({name: (0.1 * contacts[name]).assign_attrs(units="m")})
@@ -673,13 +669,14 @@ def test_unknown_names_are_refused(posterior):
     plotting.pairs(posterior, names=["a"], truth={"a": 0.5, "x_c": 0.1})
 
 
-def test_a_gap_is_taken_as_it_comes():
+def test_a_gap_is_taken_as_it_comes_and_an_overlap_is_called_so():
     bounds = xr.Dataset(
         {"left": ("bound", [-0.12, -0.1, -0.08]), "right": ("bound", [0.08, 0.1, 0.12])},
         coords={"bound": ["lower", "median", "upper"]},
     )
     patch = plotting.contour((-1.0, 1.0), gap=bounds).patches[0]
     assert (patch.get_x(), patch.get_width()) == (-0.1, pytest.approx(0.2))
+    assert plotting.contour((-1.0, 1.0), gap=(0.1, -0.1)).texts[0].get_text() == "overlap"
 
 
 def test_the_way_of_a_base_that_is_carried_is_drawn_to_the_end_of_contact():

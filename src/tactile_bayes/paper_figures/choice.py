@@ -32,33 +32,15 @@ Limits = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Choice:
-    """Options of a figure.
+    """Options of a figure."""
 
-    Attributes
-    ----------
-    distances : tuple of float
-        Distances of the vertex above the origin, increasing [L].
-    drive : Carried or None
-        Drive that carries the base; None for rotations about the origin.
-    drive_step : float or None
-        Step of rotations [rad]; None for that of `scan`.
-    rods : int
-        Largest number of rods drawn in one sweep.
-    load_cell : LoadCell or None
-        Load cell that measures the records of reconstructed points.
-    seed : SeedSequence or None
-        Seed of its noise.
-    width : float
-        Width of the figure [inches].
-    """
-
-    distances: tuple[float, ...]
-    drive: Carried | None
-    drive_step: float | None
-    rods: int
-    load_cell: LoadCell | None
-    seed: np.random.SeedSequence | None
-    width: float
+    distances: tuple[float, ...]  # of the vertex above the origin, increasing [L]
+    drive: Carried | None  # that carries the base; None for rotations about the origin
+    drive_step: float | None  # of rotations [rad]; None for that of `scan`
+    rods: int  # largest number drawn in one sweep
+    load_cell: LoadCell | None  # that measures the records of reconstructed points
+    seed: np.random.SeedSequence | None  # of its noise
+    width: float  # of the figure [inches]
 
     @property
     def is_column(self) -> bool:

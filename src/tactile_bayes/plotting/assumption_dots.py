@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import check_dataset, check_drawing, new_panels
+from tactile_bayes.plotting.axes import axes_for, check_dataset, label_rows
 from tactile_bayes.plotting.labels import show_numbers
 from tactile_bayes.plotting.legends import legend
 from tactile_bayes.plotting.marks import PALETTE
@@ -54,10 +54,8 @@ def assumptions(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     'distance of the medians [widths of the band]'
     """
     check_dataset(found, {"moved_in_gap", "moved_beside", "fits"}, "result with assumptions", "trust")
-    check_drawing(ax)
     count = found.sizes["assumption"]
-    if ax is None:
-        ax = new_panels(1, 1, 1.2 + 0.28 * count)[0, 0]
+    ax = axes_for(ax, height=1.2 + 0.28 * count)
     places, fits = np.arange(count, dtype=float), found["fits"].values.astype(bool)
     ax.axvspan(0.0, 0.5, color="0.92", linewidth=0.0, zorder=0)
     for region, (label, marker, beside) in _REGIONS.items():
@@ -71,11 +69,8 @@ def assumptions(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ax.set_xlim(0.0, end)
     ax.set_xticks([tick for tick in _TICKS if tick <= end])
     show_numbers(ax.xaxis)
-    ax.set_ylim(count - 0.5, -0.5)
     names = found["assumption"].values
-    ax.set_yticks(places, [str(name) if ok else f"{name} (rejected)" for name, ok in zip(names, fits, strict=True)])
-    ax.tick_params(axis="y", length=0.0)
-    ax.spines[["top", "right"]].set_visible(False)
+    label_rows(ax, [str(name) if ok else f"{name} (rejected)" for name, ok in zip(names, fits, strict=True)])
     ax.set_xlabel("distance of the medians [widths of the band]")
     legend(ax, loc="best")
     return ax

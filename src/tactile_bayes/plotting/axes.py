@@ -23,10 +23,24 @@ _MOST_SAMPLES = 10**9
 AxesArray = NDArray[np.object_]
 
 
-def single_axes() -> Axes:
+def axes_for(ax: Axes | None, truth: Any = None, *, height: float | None = None) -> Axes:
+    """Return the given Axes, or those of a new figure, after `check_drawing`; a height is that of rows of labels."""
+    check_drawing(ax, truth)
+    if ax is not None:
+        return ax
+    if height is not None:
+        return new_panels(1, 1, height).item()
     from matplotlib import pyplot as plt
 
     return plt.subplots(figsize=(7.0, 4.0), layout="compressed")[1]
+
+
+def label_rows(ax: Axes, labels: Sequence[str], above: float = 0.5, below: float = 0.5) -> None:
+    """Label rows at 0, 1, …, from top to bottom, without a frame at the top and at the right."""
+    ax.set_ylim(len(labels) - 1 + below, -above)
+    ax.set_yticks(np.arange(len(labels)), labels)
+    ax.tick_params(axis="y", length=0.0)
+    ax.spines[["top", "right"]].set_visible(False)
 
 
 def new_panels(rows: int, columns: int, height: float, width: float = 7.0, **options: Any) -> AxesArray:
@@ -78,6 +92,21 @@ def check_dataset(found: Any, names: set[str], kind: str, source: str, attrs: Se
     is_one = isinstance(found, xr.Dataset) and names <= set(found.variables) and set(attrs) <= set(found.attrs)
     if not is_one:
         raise ParameterError(f"this is no {kind}: give what {source} returned")
+
+
+def group_of(found: Any, name: str, variables: set[str]) -> xr.Dataset:
+    """Return the dataset of a figure, given as a dataset, as a group, or in a whole result of `sensitivity`."""
+    if isinstance(found, xr.DataTree):
+        found = (found[name] if name in found.children else found).to_dataset()
+    if not isinstance(found, xr.Dataset) or not variables <= set(found.variables):
+        raise ParameterError(f"there is no {name} in this: give what sensitivity returned, or its group {name!r}")
+    return found
+
+
+def check_among(name: str, value: str, found: xr.Dataset) -> None:
+    """Refuse a value that is not a label along a dimension."""
+    if not isinstance(value, str) or value not in found[name].values:
+        raise ParameterError(f"{name} is {value!r}: there are {', '.join(map(str, found[name].values))}")
 
 
 def write_instead(ax: Axes, words: str) -> Axes:

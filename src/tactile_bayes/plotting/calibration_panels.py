@@ -10,7 +10,15 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, check_dataset, check_drawing, check_panels, new_panels, write_instead
+from tactile_bayes.plotting.axes import (
+    AxesArray,
+    axes_for,
+    check_dataset,
+    check_panels,
+    label_rows,
+    new_panels,
+    write_instead,
+)
 from tactile_bayes.plotting.labels import number, percent
 from tactile_bayes.plotting.marks import PALETTE
 
@@ -111,7 +119,6 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     calibration : xr.Dataset
         From `tactile_bayes.calibrate`.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -141,7 +148,6 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     names = {"coverage", "coverage_error", "coverage_replicates", "claim"}
     check_dataset(calibration, names, "calibration", "calibrate", ["probability"])
-    check_drawing(ax)
     is_enough = calibration["coverage_replicates"].values >= _FEWEST
     is_shown = is_enough & np.isfinite(calibration["coverage"].values)
     shown = calibration.isel(claim=is_shown)
@@ -149,16 +155,12 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         [CLAIMS.get(str(name), str(name)) for name in calibration["claim"].values[chosen]]
         for chosen in (is_shown, ~is_shown)
     )
-    if ax is None:
-        ax = new_panels(1, 1, 1.4 + 0.36 * max(len(labels), 2)).item()
+    ax = axes_for(ax, height=1.4 + 0.36 * max(len(labels), 2))
     if not labels:
         return write_instead(ax, f"no claim was judged in {_FEWEST} replicates or more")
     probability = float(calibration.attrs["probability"])
-    ax.set_ylim(len(labels) - 0.1, -0.6)
-    ax.set_yticks(np.arange(len(labels)), labels)
+    label_rows(ax, labels, above=0.6, below=0.9)
     _draw_shares(ax, shown, probability)
-    ax.tick_params(axis="y", length=0.0)
-    ax.spines[["top", "right"]].set_visible(False)
     ax.locator_params(axis="x", nbins=7, steps=[1, 2, 5, 10])
     ax.xaxis.set_major_formatter(lambda share, _: percent(share))
     ax.set_xlabel("share in which it holds ± 2 standard errors")

@@ -12,7 +12,7 @@ from scipy.special import chdtri
 from tactile_bayes.arrays import Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import check_drawing, checked_samples, single_axes
+from tactile_bayes.plotting.axes import axes_for, checked_samples
 from tactile_bayes.plotting.labels import percent
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import finish_map, fit_height, outline
@@ -50,7 +50,6 @@ def contact_ellipses(
     truth : Contour, optional
         The true contour, in the units of the contacts.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -62,7 +61,6 @@ def contact_ellipses(
         If no sample has an ellipse, or the probability is not in (0, 1).
     """
     check_probability("probability", probability)
-    check_drawing(ax, truth)
     numbers = checked_samples(samples)
     if not (isinstance(contacts, xr.Dataset) and "contact_x_sd" in contacts):
         raise ParameterError(
@@ -72,14 +70,13 @@ def contact_ellipses(
         raise ParameterError(f"samples are numbered from 0 to {contacts.sizes['sample'] - 1}: give some of these")
     spread_x, spread_y = contacts["contact_x_sd"].values, contacts["contact_y_sd"].values
     has = np.isfinite(spread_x) & np.isfinite(spread_y)
-    certain = contacts["status"] == "ok" if "status" in contacts else contacts["contact_probability"] == 1.0
-    chosen = _spread(has, has & certain.values, numbers)
+    chosen = _spread(has, has & is_certain(contacts), numbers)
     if not chosen:
         raise ParameterError(
             "no contact here has a standard deviation: reconstruct with a load cell that states its noise, and choose "
             "samples that are in contact"
         )
-    own, ax = ax is None, single_axes() if ax is None else ax
+    own, ax = ax is None, axes_for(ax, truth)
     radius, phase = radius_of(probability), contacts["contact_phase"].values
     x, y = contacts["contact_x"].values, contacts["contact_y"].values
     for i in chosen:
@@ -111,7 +108,6 @@ def contact_regions(
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -127,7 +123,6 @@ def contact_regions(
     from tactile_bayes.uncertainty.contact_region import contact_region
 
     check_probability("probability", probability)
-    check_drawing(ax, truth)
     numbers = checked_samples(samples)
     draws = contact_draws(posterior)
     x, y = (draws[name].median(("chain", "draw")).values for name in ("contact_x", "contact_y"))
@@ -142,7 +137,7 @@ def contact_regions(
     chosen = _spread(has, has, numbers)
     if not chosen:
         raise ParameterError("no sample here has a contact: choose others")
-    own, ax = ax is None, single_axes() if ax is None else ax
+    own, ax = ax is None, axes_for(ax, truth)
     phase = np.where(tangential > 0.5, "tangential", "tip")
     corners: list[Any] = []
     for i in chosen:
@@ -169,6 +164,12 @@ def ellipse_of(
     across, along = 2.0 * radius * np.sqrt(np.maximum(variances, 0.0))
     angle = float(np.degrees(np.arctan2(axes[1, 1], axes[0, 1])))
     return Ellipse(centre or (float(at["contact_x"]), float(at["contact_y"])), along, across, angle=angle, **style)
+
+
+def is_certain(contacts: xr.Dataset) -> Any:
+    """Return True for samples with the status "ok", or whose draws are all in contact, shape (samples,)."""
+    known = contacts["status"] == "ok" if "status" in contacts else contacts["contact_probability"] == 1.0
+    return known.values
 
 
 def radius_of(probability: float) -> float:

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_array, check_numbers
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import check_dataset, check_drawing, single_axes, write_instead
+from tactile_bayes.plotting.axes import axes_for, check_dataset, write_instead
 from tactile_bayes.plotting.labels import LABELS, number, percent, set_unit, shown_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entries, legend_entry
-from tactile_bayes.plotting.maps import draw_gap, draw_pivot, finish_map, outline
+from tactile_bayes.plotting.maps import contacts_within, draw_gap, draw_pivot, finish_map, outline
 from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES, TRUTH
 
 if TYPE_CHECKING:
@@ -71,7 +71,6 @@ def contour(
     base : (float, float), optional
         The pivot, in the record's unit of length.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -88,7 +87,6 @@ def contour(
     >>> contour([-0.6, 0.6], truth=paper_profile("II", q=0.5), gap=(-0.1, 0.1), base=(0.0, 0.0)).get_ylabel()
     '$y$ [$L$]'
     """
-    check_drawing(ax, truth)
     if band is not None:
         check_dataset(band, {"x", "lower", "upper"}, *_BAND)
     if contacts is not None:
@@ -100,7 +98,7 @@ def contour(
     if not (drawn.size >= 2 and np.all(np.isfinite(drawn)) and np.ptp(drawn) > 0.0):
         raise ParameterError("x must span the range to be drawn: at least two different finite numbers")
     low, high = float(drawn.min()), float(drawn.max())
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax, truth)
 
     if ends is not None:
         _draw_gap(ax, *ends)
@@ -146,7 +144,6 @@ def band_detail(
     gap : (float, float) or xr.Dataset, optional
         As in `contour`.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -159,10 +156,9 @@ def band_detail(
     >>> band_detail(xr.Dataset(flat, coords={"x": [0.0, 1.0]})).get_ylabel()
     '$y$ − median [$L$]'
     """
-    check_drawing(ax, truth)
     check_dataset(band, {"x", "lower", "median", "upper"}, *_BAND)
     ends = None if gap is None else _ends_of_gap(gap)
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax, truth)
     x, median = band["x"].values, band["median"].values
     lower, upper = band["lower"].values - median, band["upper"].values - median
     if ends is not None:
@@ -192,7 +188,6 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -212,9 +207,8 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     >>> gap(gap_of(tree)).get_ylabel()
     '$y$ − chord [$L$]'
     """
-    check_drawing(ax, truth)
     check_dataset(found, _GAP, "gap", "gap", ["probability"])
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax, truth)
     attrs = found["left"].attrs
     middle = {name: float(found[name].sel(bound="median")) for name, v in found.items() if v.dims == ("bound",)}
     if not middle["left"] < middle["right"]:
@@ -284,9 +278,7 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
 
 def _draw_contacts(ax: Axes, contacts: xr.Dataset, low: float, high: float) -> None:
     x, y = contacts["contact_x"].values, contacts["contact_y"].values
-    drawn = np.isfinite(x) & np.isfinite(y) & (x >= low) & (x <= high)
-    if "status" in contacts:
-        drawn &= contacts["status"].values == "ok"
+    drawn = contacts_within(contacts, low, high)
     phase = contacts["contact_phase"].values if "contact_phase" in contacts else np.full(x.shape, "none")
     for name, label in (*PHASES.items(), ("none", "contact")):
         chosen = drawn & (phase == name)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.plotting.axes import check_dataset, check_drawing, new_panels, single_axes, tile_edges
+from tactile_bayes.plotting.axes import axes_for, check_dataset, label_rows, tile_edges
 from tactile_bayes.plotting.labels import number, shown_unit
 from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, label_map
@@ -43,7 +43,6 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     found : xr.Dataset
         From `tactile_bayes.design`.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -72,8 +71,7 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     if not found["is_pivot"].values.all():
         return _draw_rows(ax, found)
     pivots = np.stack([found["present_base_x"].values, found["present_base_y"].values], axis=-1)
-    check_drawing(ax)
-    own, ax = ax is None, single_axes() if ax is None else ax
+    own, ax = ax is None, axes_for(ax)
     grid = _grid_of(found)
     if grid is None:
         _draw_lines(ax, found, pivots)
@@ -137,8 +135,7 @@ def _draw_rows(ax: Axes | None, found: xr.Dataset) -> Axes:
     name, label, is_length = _kind_of(found)
     si = found["base_x"].attrs.get("units") == "m"
     count, best, scale = found.sizes["candidate"], int(found["best"]), 1e3 if si and is_length else 1.0
-    if ax is None:
-        ax = new_panels(1, 1, 1.2 + 0.4 * count)[0, 0]
+    ax = axes_for(ax, height=1.2 + 0.4 * count)
     values, errors = scale * found[name].values, scale * found[f"{name}_error"].values
     rows = np.arange(count)
     bars: dict[str, Any] = {
@@ -156,12 +153,9 @@ def _draw_rows(ax: Axes | None, found: xr.Dataset) -> Axes:
     ends, steps = [f"{drive}" for drive in found["drive"].values], np.degrees(found["drive_step"].values)
     if np.ptp(steps) > 0.0:
         ends = [f"{drive}, {step:.3g}° or as many" for drive, step in zip(ends, steps, strict=True)]
-    ax.set_yticks(rows, [textwrap.fill(words, _ROW_WIDTH) for words in ends])
-    ax.set_ylim(count - 0.5, -0.5)
-    ax.tick_params(axis="y", length=0.0)
+    label_rows(ax, [textwrap.fill(words, _ROW_WIDTH) for words in ends])
     ax.set_xlim(left=0.0 if is_length else None)
     ax.set_xlabel(f"{label} [{'mm' if si else '$L$'}]" if is_length else label)
-    ax.spines[["top", "right"]].set_visible(False)
     legend_above(ax, 3)
     return ax
 

@@ -9,11 +9,10 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice
-from tactile_bayes.plotting.axes import check_dataset, check_drawing, single_axes, write_instead
-from tactile_bayes.plotting.labels import number, percent, shown_unit
+from tactile_bayes.plotting.axes import axes_for, check_among, check_dataset, write_instead
+from tactile_bayes.plotting.labels import number, percent, set_log_scale, shown_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entry
 from tactile_bayes.plotting.marks import BASES
-from tactile_bayes.plotting.planning_groups import check_among, set_log_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +48,6 @@ def error_map(
     reconstruction : {"raw", "constrained"}
         Method of Step 2 that made the contacts.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -72,8 +70,7 @@ def error_map(
     check_dataset(found, {"rms_across", "contour", "distance", "noise_factor"}, "error map", "error_map")
     check_choice("quantity", quantity, ("across", "along", *_BANDS))
     check_among("reconstruction", reconstruction, found)
-    check_drawing(ax)
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax)
     found = found.isel(noise_factor=np.argsort(found["noise_factor"].values))
     observed, predicted = _observed_and_predicted(found, quantity, reconstruction)
     factor = found["noise_factor"].values

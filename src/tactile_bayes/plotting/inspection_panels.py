@@ -16,10 +16,8 @@ from tactile_bayes.plotting.sweep_lines import finish_channels, reading_style
 from tactile_bayes.record import CHANNELS, present_channels
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
 
-    from tactile_bayes.arrays import Index
     from tactile_bayes.diagnostics.inspection import Inspection
 
 _COLOURS = {"forward": "#0072B2", "backward": "#D55E00"}
@@ -99,9 +97,7 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
 def _draw_readings(ax: Axes, inspected: Inspection, index: int, along: DriveAxis) -> None:
     record, sweeps = inspected.record, inspected.sweeps
     places, reading = along.values, record[CHANNELS[index]].values
-    ax.axhline(0.0, color="0.85", linewidth=0.8, zorder=0)
-    for start in along.starts:
-        ax.axvline(start, color="0.6", linewidth=0.8, zorder=0)
+    along.draw_below(ax)
     for place, number in enumerate(sweeps.sweep.values):
         direction = str(sweeps.direction.values[place])
         rows = record.sweep.values == number
@@ -109,25 +105,13 @@ def _draw_readings(ax: Axes, inspected: Inspection, index: int, along: DriveAxis
         ax.plot(places[rows], reading[rows], **style)
         legend_entry(ax, direction, **style)
         for event, label, line in (("onset", "first contact", ":"), ("snap_off", "snap-off", "--")):
-            between = _between(sweeps.isel(sweep=place), event, along, np.flatnonzero(rows))
+            between = along.place_of(sweeps.isel(sweep=place), event, np.flatnonzero(rows))
             if np.isfinite(between):
                 ax.axvline(between, color=_COLOURS[direction], linestyle=line, linewidth=1.0, zorder=0.5)
                 legend_entry(ax, label, color="0.35", linestyle=line, linewidth=1.0)
     for name, flags in _wrong(inspected, index):
         label, special = _WRONG[name]
         ax.plot(places[flags], reading[flags], label=label, **_MARKS, **special)
-
-
-def _between(sweep: xr.Dataset, event: str, along: DriveAxis, rows: Index) -> float:
-    """Return the place midway between the samples beside an event of a sweep; NaN where there is none."""
-    if along.kind == "angle":
-        return float(np.degrees(sweep[f"{event}_drive_angle"].values.mean()))
-    travel = float(sweep[f"{event}_travel"].values.mean())
-    if along.kind == "travel" or not np.isfinite(travel):
-        return travel
-    travels = along.travels[rows]
-    order = np.argsort(travels, kind="stable")
-    return float(np.interp(travel, travels[order], along.values[rows][order]))
 
 
 def _draw_unloaded(ax: Axes, inspected: Inspection, index: int) -> None:

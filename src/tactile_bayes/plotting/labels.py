@@ -23,6 +23,8 @@ LABELS = {
 }
 DRIVE_ANGLE = f"{LABELS['drive_angle']} [°]"
 _DIMENSIONLESS = {"length_unit": "$L$", "moment_unit": "$EI$/$L$", "force_unit": "$EI$/$L^2$"}
+# Ticks in a decade of a logarithmic axis, by the largest number of decades.
+_TICKS = {0.9: (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0), 2.2: (1.0, 2.0, 5.0), np.inf: (1.0,)}
 _PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n"}
 
 
@@ -32,6 +34,30 @@ def set_unit(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values
     axis.set_label_text(f"{label}[{unit}]" if unit else label.strip())
     if power:
         show_numbers(axis, power)
+
+
+def set_log_scale(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values: Floats) -> None:
+    """Make an axis logarithmic, with limits around the positive values of a column and its unit in the label.
+
+    Unlike `set_unit` it leaves minor ticks without labels, which Matplotlib would write in another unit.
+    """
+    from matplotlib.ticker import LogFormatterMathtext, LogLocator, NullFormatter
+
+    good = values[np.isfinite(values) & (values > 0.0)]
+    power, unit = shown_unit(name, attrs, good)
+    low, high = (float(good.min()), float(good.max())) if good.size else (1.0, 1.0)
+    margin = (high / low) ** 0.05 * 1.1
+    limits = low / margin, high * margin
+    name_of_axis = axis.axis_name  # type: ignore[attr-defined]
+    axis.axes.set(**{f"{name_of_axis}scale": "log", f"{name_of_axis}lim": limits})
+    decades = np.log10(high / low * margin**2)
+    axis.set_major_locator(LogLocator(subs=next(ticks for most, ticks in _TICKS.items() if decades < most)))
+    axis.set_minor_formatter(NullFormatter())
+    if power or low > 1e-4:
+        show_numbers(axis, power)
+    else:
+        axis.set_major_formatter(LogFormatterMathtext())
+    axis.set_label_text(f"{label} [{unit}]" if unit else label)
 
 
 def show_numbers(axis: Axis, power: int = 0) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.plotting.labels import LABELS, set_unit
@@ -13,6 +14,7 @@ from tactile_bayes.plotting.legends import legend, legend_above, legend_entries
 from tactile_bayes.plotting.marks import PALETTE
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.text import Text
 
@@ -70,6 +72,13 @@ def outline(contour: Contour, low: float, high: float) -> tuple[Floats, Floats]:
     low, high = max(low, ends[0]), min(high, ends[1])
     x = low + 0.5 * (high - low) * (1.0 - np.cos(np.linspace(0.0, np.pi, 801)))
     return x, np.asarray(contour.height(x))
+
+
+def contacts_within(contacts: xr.Dataset, low: float, high: float) -> NDArray[np.bool_]:
+    """Return True for contacts between two values of x, if there is a status only for those with "ok"."""
+    x, y = contacts["contact_x"].values, contacts["contact_y"].values
+    is_good = contacts["status"].values == "ok" if "status" in contacts else np.isfinite(x)
+    return np.asarray(is_good & np.isfinite(y) & (x >= low) & (x <= high))
 
 
 def draw_object(ax: Axes, contour: Contour, x: Floats, y: Floats, room: float) -> None:

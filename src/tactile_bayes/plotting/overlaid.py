@@ -12,16 +12,25 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_mapping, check_optional, check_switch
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import check_dataset, check_drawing, single_axes
+from tactile_bayes.plotting.axes import axes_for, check_dataset
 from tactile_bayes.plotting.labels import LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entries
-from tactile_bayes.plotting.maps import finish_map
+from tactile_bayes.plotting.maps import contacts_within, finish_map
 from tactile_bayes.plotting.marks import BASES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from tactile_bayes.uncertainty.overlay import Overlay
+
+_CONTACTS: dict[str, Any] = {
+    "marker": "o",
+    "markersize": 2.2,
+    "markeredgewidth": 0.0,
+    "linestyle": "none",
+    "alpha": 0.6,
+    "zorder": 3,
+}
 
 
 def overlaid(
@@ -46,7 +55,6 @@ def overlaid(
         If True, y is measured from `overlay`, or without it from the median of the first run, so that narrow bands are
         visible; contacts are then left out.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -66,7 +74,6 @@ def overlaid(
     """
     from tactile_bayes.uncertainty.overlay import Overlay  # loads the sampler
 
-    check_drawing(ax)
     check_switch("enlarged", enlarged)
     check_optional("overlay", overlay, Overlay, "give what read_overlay returned")
     for name, found in (("bands", bands), ("contacts", contacts)):
@@ -77,7 +84,7 @@ def overlaid(
         check_dataset(band, {"x", "lower", "median", "upper"}, "band", "contour_band")
     for points in (contacts or {}).values():
         check_dataset(points, {"contact_x", "contact_y"}, "dataset of contact points", "reconstruct")
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax)
     first = next(iter(bands))
     reference = (overlay or Overlay.of_band(first, bands[first])) if enlarged else None
     for (name, band), colour in zip(bands.items(), cycle(BASES), strict=False):
@@ -86,7 +93,8 @@ def overlaid(
         ax.fill_between(x, lower, upper, color=colour, alpha=0.3, linewidth=0.5, zorder=1.5)
         ax.plot(x, band["median"].values - base, color=colour, linewidth=1.0, label=name)
         if contacts and name in contacts and not enlarged:
-            _draw_contacts(ax, contacts[name], x, colour)
+            points = contacts[name].isel(sample=contacts_within(contacts[name], x.min(), x.max()))
+            ax.plot(points["contact_x"].values, points["contact_y"].values, color=colour, **_CONTACTS)
     attrs: Mapping[Any, Any] = bands[first]["lower"].attrs or bands[first]["x"].attrs
     limits = [*ax.get_xlim(), *ax.get_ylim()]
     if overlay is not None:
@@ -107,12 +115,3 @@ def _height(reference: Overlay | None, band: xr.Dataset) -> Floats:
     if reference is None:
         return np.zeros(band.sizes["x"])
     return reference.polyline.height(band["x"].values, band["median"].values)
-
-
-def _draw_contacts(ax: Axes, contacts: xr.Dataset, x: Floats, colour: str) -> None:
-    at_x, at_y = contacts["contact_x"].values, contacts["contact_y"].values
-    drawn = (at_x >= x.min()) & (at_x <= x.max())
-    if "status" in contacts:
-        drawn &= contacts["status"].values == "ok"
-    style: dict[str, Any] = {"color": colour, "marker": "o", "linestyle": "none", "markeredgewidth": 0.0}
-    ax.plot(at_x[drawn], at_y[drawn], markersize=2.2, alpha=0.6, zorder=3, **style)

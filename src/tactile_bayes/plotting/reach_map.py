@@ -11,7 +11,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_switch, check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.plotting.axes import check_drawing, single_axes
+from tactile_bayes.plotting.axes import axes_for
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, finish_map, outline
 from tactile_bayes.plotting.marks import PALETTE, TRUTH
@@ -54,7 +54,6 @@ def prior_contours(
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -77,7 +76,6 @@ def prior_contours(
     """
     from tactile_bayes.inference.contour import contours_of
 
-    check_drawing(ax, truth)
     check_switch("median", median)
     if not _has(posterior, "prior", "constant_data"):
         raise ParameterError("there are no draws from a prior here: give the tree that infer_contour returned")
@@ -107,7 +105,6 @@ def posterior_contours(
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -131,7 +128,6 @@ def posterior_contours(
     from tactile_bayes.inference.contour import contours_of
     from tactile_bayes.uncertainty.band import contours_drawn
 
-    check_drawing(ax, truth)
     if not _has(posterior, "posterior", "constant_data"):
         raise ParameterError("this is no posterior of a contour: give the tree that infer_contour returned")
     check_whole_number("contours", contours, 1, _COUNT)
@@ -168,7 +164,7 @@ def _draw(
 
     from tactile_bayes.uncertainty.band import length_unit
 
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax, truth)
     record, length = posterior["constant_data"].to_dataset(), float(posterior.attrs["rod_length"])
     pivots = np.unique(np.stack([record["base_x"].values, record["base_y"].values], axis=1), axis=0)
     beside, room = (1.0 + _ROOM) * length, _ROOM * length

@@ -236,9 +236,7 @@ def _draw_observables(
         if np.isnan(record[channel].values).all():
             write_not_measured(panel, f"{labels[channel]}\n")
             continue
-        panel.axhline(0.0, color="0.85", linewidth=0.8, zorder=0)
-        for start in along.starts:
-            panel.axvline(start, color="0.6", linewidth=0.8, zorder=0)
+        along.draw_below(panel)
         for sweep in _sweeps(record, along):
             direction = str(sweep["direction"].values[0])
             of_sweep = events.get(direction) if events is not None and along.kind != "sample" else None

@@ -9,11 +9,10 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.plotting.axes import check_dataset, check_drawing, single_axes, tile_edges, write_instead
-from tactile_bayes.plotting.labels import number, percent, set_unit, show_numbers, shown_unit
+from tactile_bayes.plotting.axes import axes_for, check_dataset, group_of, tile_edges, write_instead
+from tactile_bayes.plotting.labels import number, percent, set_log_scale, set_unit, show_numbers, shown_unit
 from tactile_bayes.plotting.legends import legend, legend_above
 from tactile_bayes.plotting.marks import BEST, PALETTE
-from tactile_bayes.plotting.planning_groups import group_of, set_log_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +38,6 @@ def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -
     found : xr.Dataset or xr.DataTree
         Result of `tactile_bayes.sensitivity`, or its group "required_noise".
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -61,8 +59,7 @@ def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -
     """
     names = {"band_width", "noise_factor", "force_noise", "moment_noise", "present_width", "prior_width"}
     needed = group_of(found, "required_noise", names)
-    check_drawing(ax)
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax)
     needed = needed.isel(band_width=np.argsort(needed["band_width"].values))
     is_had = np.isfinite(needed["noise_factor"].values)
     if not is_had.any():
@@ -107,7 +104,6 @@ def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     found : xr.Dataset
         From `tactile_bayes.planning.required_rod`.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -142,8 +138,7 @@ def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     names = {"width", "status", "length", "diameter", "best_length", "best_diameter", "best_width"}
     check_dataset(found, names, "choice of rods", "required_rod")
-    check_drawing(ax)
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax)
     found = found.sortby(["length", "diameter"])
     lengths, diameters = found["length"].values, found["diameter"].values
     width, status = (found[name].transpose("diameter", "length").values for name in ("width", "status"))

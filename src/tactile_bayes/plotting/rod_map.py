@@ -11,7 +11,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_kind, check_whole_number, shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.centreline import rod_shape
-from tactile_bayes.plotting.axes import check_drawing, single_axes
+from tactile_bayes.plotting.axes import axes_for
 from tactile_bayes.plotting.maps import draw_object, draw_path, draw_pivot, finish_map
 from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES
 from tactile_bayes.plotting.sweep_lines import ENDINGS
@@ -48,7 +48,6 @@ def rods(
         Largest number of rods, evenly over the samples in contact; those at first contact, phase changes and snap-off
         are added.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -72,7 +71,6 @@ def rods(
     '$x$ [$L$]'
     """
     check_kind("scan", scan, Scan, "give what scan returned")
-    check_drawing(ax)
     number = _number(scan, direction, sweep)
     check_whole_number("count", count, 1, "at least one rod must be drawn")
     record, events, rod = in_frame(scan.record, "fixed"), scan.sweeps[number], rod_of(scan.record)
@@ -95,7 +93,7 @@ def rods(
     def true(name: str) -> Floats:
         return record[f"truth_{name}" if f"truth_{name}" in record else name].values[samples]
 
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax)
     phases = record["truth_contact_phase"].values[samples]
     x, y = shape({name: true(name) for name in ("base_x", "base_y", "drive_angle", *CHANNELS)})
     for phase, label in PHASES.items():

@@ -10,11 +10,10 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import refused
-from tactile_bayes.plotting.axes import check_drawing, single_axes
-from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, number
+from tactile_bayes.plotting.axes import axes_for, check_among, group_of
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, number, set_log_scale
 from tactile_bayes.plotting.legends import legend_above, legend_entry
 from tactile_bayes.plotting.marks import BASES, SWEEP_LINES
-from tactile_bayes.plotting.planning_groups import check_among, group_of, set_log_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,7 +57,6 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
     sweep : int
         Number of the sweep.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -79,8 +77,7 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
     'standard deviation of a contact point [$L$]'
     """
     grown = _of_sweep(group_of(found, "amplification", _VARIABLES), sweep)
-    check_drawing(ax)
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax)
     angle = np.degrees(grown["drive_angle"].values)
     first, last = _events(grown)
     near = np.minimum(grown["after_first_contact"].values, grown["before_snap_off"].values)
@@ -131,7 +128,6 @@ def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> A
     found : xr.Dataset or xr.DataTree
         Result of `tactile_bayes.sensitivity`, or its group "information".
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -152,8 +148,7 @@ def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> A
     'leverage of a reading'
     """
     known = group_of(found, "information", {"leverage", "channel", "sweep", "direction", "drive_angle"})
-    check_drawing(ax)
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax)
     for sweep in np.unique(known["sweep"].values):
         of = _of_sweep(known, sweep)
         angle, style = np.degrees(of["drive_angle"].values), SWEEP_LINES[str(of["direction"].values[0])]
@@ -199,7 +194,6 @@ def noise_shares(
     sweep : int
         Number of the sweep.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -224,8 +218,7 @@ def noise_shares(
     for name, value in (("reconstruction", reconstruction), ("error", error)):
         check_among(name, value, shares)
     chosen = _of_sweep(shares.sel(reconstruction=reconstruction, error=error), sweep)
-    check_drawing(ax)
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax)
     angle = np.degrees(chosen["drive_angle"].values)
     wide = float(np.median(np.diff(angle))) if angle.size > 1 else 1.0
     share = np.maximum(chosen["share"].transpose("sample", "source").values, 0.0)

@@ -11,7 +11,7 @@ import xarray as xr
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import AxesArray, check_drawing, check_panels, checked_samples
-from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, radius_of
+from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, is_certain, radius_of
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, show_numbers
 from tactile_bayes.plotting.legends import legend_above, legend_entry
 from tactile_bayes.plotting.maps import label_map, limits_of, outline
@@ -128,8 +128,7 @@ def _refuse_another_record(
 
 def _certain(moments: xr.Dataset) -> Any:
     """Return True for samples that are certainly in contact and have standard deviations, shape (samples,)."""
-    known = moments["status"] == "ok" if "status" in moments else moments["contact_probability"] == 1.0
-    return known.values & np.isfinite(moments["tangent_sd"].values) & np.isfinite(moments["normal_sd"].values)
+    return is_certain(moments) & np.isfinite(moments["tangent_sd"].values) & np.isfinite(moments["normal_sd"].values)
 
 
 def _panels(axes: Any) -> AxesArray:

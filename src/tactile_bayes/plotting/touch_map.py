@@ -9,7 +9,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import check_drawing, single_axes
+from tactile_bayes.plotting.axes import axes_for
 from tactile_bayes.plotting.labels import number, shown_unit
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import draw_gap, draw_object, draw_pivot, finish_map, limits_of, outline, write_on_top
@@ -48,7 +48,6 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     scan : Scan
         A scan, from one base or several.
     ax : Axes, optional
-        Axes to draw in.
 
     Returns
     -------
@@ -75,10 +74,9 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
             f"touched draws what scan(...) returns, and not a {type(scan).__name__}: a record alone does not say what "
             "was touched; plotting.observables draws it"
         )
-    check_drawing(ax)
     rod, attrs = rod_of(scan.record), scan.record["base_x"].attrs
     same = _SAME_PLACE * rod.length_unit
-    ax = single_axes() if ax is None else ax
+    ax = axes_for(ax)
     arcs = [_arc(scan.contour, sweep) for sweep in scan.sweeps]
     looks = product(_STYLES, BASES)
     lines: dict[tuple[float, float], dict[str, Any]] = {

@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.stored_experiment import found_rig
+from tactile_bayes.plotting.maps import contacts_within
 from tactile_bayes.record import bases_of, carried_sweeps
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
 from tactile_bayes.report.overlay import put_overlay, put_overlay_band
@@ -28,33 +29,15 @@ _MOST_OFF, _SIGNS = 5.0, np.array([-1.0, 1.0])
 
 @dataclass(frozen=True)
 class ContourFindings:
-    """Content of the figures.
+    """Content of the figures."""
 
-    Attributes
-    ----------
-    posterior : xr.DataTree
-        The posterior as stored.
-    record : xr.Dataset
-        The record in it.
-    contacts : xr.Dataset or None
-        Contact points; None if a load channel is missing.
-    band : xr.Dataset
-        Band of the contour.
-    edges : xr.Dataset or None
-        The gap; None if there are sweeps in one direction only.
-    probability : float
-        Probability of bands and intervals.
-    overlay : Overlay or None
-        Another contour, laid over it.
-    """
-
-    posterior: xr.DataTree
+    posterior: xr.DataTree  # as stored, with the record
     record: xr.Dataset
-    contacts: xr.Dataset | None
+    contacts: xr.Dataset | None  # None if a load channel is missing
     band: xr.Dataset
-    edges: xr.Dataset | None
-    probability: float
-    overlay: Overlay | None
+    edges: xr.Dataset | None  # the gap; None if there are sweeps in one direction only
+    probability: float  # of bands and intervals
+    overlay: Overlay | None  # another contour, laid over it
 
 
 class ContourFigure(NamedTuple):
@@ -152,7 +135,7 @@ def _put_contacts(overview: Plot, findings: ContourFindings, x: Floats) -> list[
     if contacts is None:
         return []
     at_x, at_y = contacts["contact_x"].values, contacts["contact_y"].values
-    good = (contacts["status"].values == "ok") & (at_x >= x[0]) & (at_x <= x[-1])
+    good = contacts_within(contacts, x[0], x[-1])
     entries = []
     for phase, name in (("tip", "tip contact"), ("tangential", "tangential contact")):
         chosen = good & (contacts["contact_phase"].values == phase)

@@ -83,12 +83,7 @@ def scale_of(values: ArrayLike, start: float, end: float, room: float = 0.04) ->
 class Plot:
     """A frame with two scales and elements in it; `drawn` returns them with their axes.
 
-    Parameters
-    ----------
-    x, y : Scale
-    x_label, y_label : str
-    x_power, y_power : int
-        Powers of ten by which values are divided in labels.
+    Labels of ticks are values over 10**x_power and 10**y_power.
     """
 
     x: Scale

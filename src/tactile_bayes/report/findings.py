@@ -37,37 +37,17 @@ _USUAL = 0.95  # probability of intervals if a posterior does not state one
 
 @dataclass(frozen=True)
 class Findings(ContourFindings):
-    """Content of a report, besides that of the figures of the contour.
+    """Content of a report, besides that of the figures of the contour."""
 
-    Attributes
-    ----------
-    interval : xr.Dataset
-        Posterior predictive intervals of the readings.
-    numbers : xr.Dataset
-        Parameters, from `tactile_bayes.uncertainty.summary.summary`.
-    verdicts : tuple of str
-        Messages of `verdicts`.
-    check : xr.Dataset or None
-        Check of the record; None if there are too few draws.
-    zero : xr.Dataset
-        Unloaded stretches, from `zero_load`.
-    comparison : xr.Dataset or None
-        Comparison of families.
-    trust : xr.Dataset or None
-        Result of `tactile-bayes trust`.
-    posterior_sha256, record_sha256 : str
-        Digests of the file, and of the record in it (`record_hash`).
-    """
-
-    interval: xr.Dataset
-    numbers: xr.Dataset
+    interval: xr.Dataset  # posterior predictive, of the readings
+    numbers: xr.Dataset  # parameters, from `uncertainty.summary`
     verdicts: tuple[str, ...]
-    check: xr.Dataset | None
-    zero: xr.Dataset
-    comparison: xr.Dataset | None
-    trust: xr.Dataset | None
-    posterior_sha256: str
-    record_sha256: str
+    check: xr.Dataset | None  # of the record; None if there are too few draws
+    zero: xr.Dataset  # unloaded stretches, from `zero_load`
+    comparison: xr.Dataset | None  # of families
+    trust: xr.Dataset | None  # from `tactile-bayes trust`
+    posterior_sha256: str  # digest of the file
+    record_sha256: str  # digest of the record in it, from `record_hash`
 
     @property
     def is_rejected(self) -> bool:

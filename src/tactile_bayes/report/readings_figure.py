@@ -257,17 +257,8 @@ def _readings(findings: Findings, shown: Mapping[str, Shown], here: int) -> tupl
 
 def _places(findings: Findings, along: DriveAxis, events: xr.Dataset, event: str) -> list[float]:
     """Return where an event of every sweep segment is drawn."""
-    if along.kind == "angle":
-        return [float(at) for at in np.degrees(events[f"{event}_drive_angle"].values)]
-    travels = [float(at) for at in events[f"{event}_travel"].values]
-    if along.kind == "travel":
-        return travels
-    segments = segments_of(findings.posterior, findings.record)
-    places = []
-    for own, travel in zip(segments.samples, travels, strict=True):
-        order = own[np.argsort(along.travels[own], kind="stable")]
-        places.append(float(np.interp(travel, along.travels[order], along.values[order])))
-    return places
+    samples = segments_of(findings.posterior, findings.record).samples
+    return [along.place_of(events.isel(segment=k), event, own) for k, own in enumerate(samples)]
 
 
 def _length(findings: Findings, motion: Frames) -> Shown:

@@ -10,6 +10,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.plotting.maps import contacts_within
 from tactile_bayes.report.drawing import Plot, dots, figure, legend
 from tactile_bayes.report.overlay import put_overlay
 from tactile_bayes.report.wording import shown_as
@@ -85,6 +86,6 @@ def _put_band(plot: Plot, x: Floats, edges: Sequence[Floats], colour: str) -> No
 
 
 def _put_contacts(plot: Plot, contacts: xr.Dataset, x: Floats, colour: str) -> None:
-    at_x, at_y = contacts["contact_x"].values, contacts["contact_y"].values
-    good = (contacts["status"].values == "ok") & (at_x >= x[0]) & (at_x <= x[-1])
-    plot.put(dots(plot.x(at_x[good]), plot.y(at_y[good]), 1.8, f"run-contact {colour}", square=False))
+    good = contacts.isel(sample=contacts_within(contacts, x[0], x[-1]))
+    at_x, at_y = plot.x(good["contact_x"].values), plot.y(good["contact_y"].values)
+    plot.put(dots(at_x, at_y, 1.8, f"run-contact {colour}", square=False))
