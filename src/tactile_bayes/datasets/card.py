@@ -35,16 +35,16 @@ record = tb.datasets.record(".", 0)  # one record, as infer_contour and the like
 ## What is in the files
 
 Dimensions are record, sweep and sample. `drive_angle`, `holding_moment`, `force_x` and `force_y` are what encoder and \
-load cell read; what begins with `truth_` is what they would read without error, the contact (NaN out of contact, where \
-loads are 0), the contour's parameters (NaN where its family has none of that name), and first contact, snap-off and \
-phases of each sweep. Whole numbers with `flag_meanings` stand for words. Numbers over samples have {bits} bits; true \
-loads are right to 1e-6 of the largest.
+load cell read; what begins with `truth_` is what they would read without error, the contact (NaN out of contact, \
+where loads are 0), the contour's parameters (NaN where its family has none of that name), and first contact, snap-off \
+and phases of each sweep. Whole numbers with `flag_meanings` stand for words. Numbers over samples have {bits} bits; \
+true loads are right to 1e-6 of the largest.
 
 {not_stored}## Where it is from
 
-Seed {seed}; specification {sha256:.16}…, whole in `manifest.json` with a checksum of each file: `tactile-bayes dataset \
-verify .` compares every byte. Made with {versions}; the same specification gives the same numbers with these versions, \
-whatever the workers.
+Seed {seed}; specification {sha256:.16}…, whole in `manifest.json` with a checksum of each file: `tactile-bayes \
+dataset verify .` compares every byte. Made with {versions}; the same specification gives the same numbers with these \
+versions, whatever the workers.
 
 The physics: L. Merker, C. Will, J. Steigenberger, C. Behn, Math. Probl. Eng. 2018, 1613945, \
 doi 10.1155/2018/1613945.
