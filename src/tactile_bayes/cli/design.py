@@ -88,8 +88,8 @@ def design(
         usual = [usual_drives(known, options.get("rig"), step) for step in steps]
         drives = [drive for each in zip(*usual, strict=True) for drive in each]
 
-    where, then = (out / "nested", "resumes") if nested else (None, "starts again")
-    then = f"the same command {then}"
+    where = out / "nested" if nested else None
+    then = f"the same command {'resumes' if nested else 'starts again'}"
     with resumable_bar("candidate", output.is_silent, where, len(drives), then=then) as note:
         made = design_into(
             out,
