@@ -2,16 +2,13 @@
 
 import importlib
 import json
-import signal
 from functools import partial
 
 import pytest
-import typer
 import xarray as xr
 
 from helpers import commands
 from tactile_bayes.calibration.store import REPLICATES
-from tactile_bayes.cli.interrupts import resumable
 from tactile_bayes.errors import CalibrationError
 from tactile_bayes.rig import NOTHING
 
@@ -155,20 +152,6 @@ def test_lost_replicates_end_no_run(call, tmp_path, monkeypatch):
     assert "add --replicate 0 --debug to the command" in result.stdout
     told = json.loads(call("--out", tmp_path, "--replicates", 2, "--json", *QUICK).stdout)
     assert (told["conclusion"], told["lost"], told["claims"]) == ("too few", 2, [])
-
-
-def test_a_termination_that_the_sampler_answers_is_still_one():
-    """It ends with the code of one, though what reaches the command is an interrupt of the sampler's own."""
-
-    def sampler():
-        try:
-            signal.raise_signal(signal.SIGTERM)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt("interrupted while sampling replicate 3") from None
-
-    with pytest.raises(typer.Exit) as ended, resumable(lambda: "3 of 5 replicates are there"):
-        sampler()
-    assert ended.value.exit_code == 143
 
 
 # ---- refusals

@@ -91,17 +91,6 @@ def test_what_is_written_is_read_back(comparison, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == FILES
 
 
-@pytest.mark.slow
-def test_all_shapes_are_compared_unless_some_are_named(instead, record, tmp_path):
-    asked = instead(made_up([0.3, 0.7]))
-    call("compare", record, "--out", tmp_path)
-    assert tuple(asked["families"]) == NAMES
-    assert asked["leave_one_out"] is True
-    call("compare", record, "--out", tmp_path, "--family", "circle", "--family", "ellipse", "--no-leave-one-out")
-    assert asked["families"] == ["circle", "ellipse"]
-    assert asked["leave_one_out"] is False
-
-
 def test_the_table_says_how_samples_are_predicted(instead, record, tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     flags = {"sampled": [False, True, True], "fits": [False, True, False]}
@@ -139,9 +128,6 @@ def test_progress_names_the_family(instead, record, tmp_path, monkeypatch):
     [
         (["--family", "circle"], "families are circle"),
         (["--family", "circle", "--family", "blob"], "there is no family 'blob'"),
-        (["--rig", "nowhere.toml"], "nowhere.toml: No such file or directory"),
-        (["--length", "0.1"], "--length and --flexural-rigidity go together"),
-        (["--force-noise", "-1"], "the load cell's force_noise is -1.0"),
         (["--max-seconds", "0"], "max_seconds is 0.0"),
         (["--out", __file__ + "/run"], "Not a directory"),
     ],
@@ -154,19 +140,12 @@ def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, opt
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--out", "run", "--max-steps", "50"], "No such option: --max-steps"),
-        (["--out", "run", "--friction", "1"], "No such option: --friction"),
         ([], "Missing option '--out'"),
         (["--out", __file__], "is a file"),
     ],
 )
 def test_a_call_that_is_none_is_refused_with_the_usage(options, message):
     assert_misused(call("compare", "record.csv", *options), message)
-
-
-def test_a_file_that_is_not_there(tmp_path):
-    path = tmp_path / "nowhere.csv"
-    assert_refused(call("compare", path, "--out", tmp_path), f"{path}: No such file or directory")
 
 
 # --- Interrupts -----------------------------------------------------------------------------------------------------

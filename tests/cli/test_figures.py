@@ -118,5 +118,5 @@ def test_an_interrupt_says_what_is_there(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "figure", interrupted)
     result = run("--out", tmp_path, *QUICK, "--format", "svg")
     assert result.exit_code == 130
-    assert "1 of 2 figures are drawn: the same command draws all of them again" in result.stderr
+    assert f"1 of 2 figures are in {tmp_path}: the same command draws all of them again" in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["figure_03.svg"]

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-from helpers.commands import assert_misused, assert_refused, call
+from helpers.commands import assert_refused, call
 from tactile_bayes.rig import Rig
 
 COARSE = ["--drive-step", 10]
@@ -138,10 +138,6 @@ def test_folders_of_files_are_made(tmp_path):
     assert all(path.is_file() for path in (out, figure, measured))
 
 
-def test_a_profile_that_is_none(tmp_path):
-    assert_misused(call("scan", "--profile", "V", "--out", tmp_path / "r.csv"), "--profile")
-
-
 # --- measure --------------------------------------------------------------------------------------------------------
 
 
@@ -184,46 +180,6 @@ def test_the_truth_is_kept_if_asked(ideal, tmp_path):
     call("measure", ideal[0], "--force-noise", 0.1, "--moment-noise", 0.1, "--keep-truth", "--out", tmp_path / "m.nc")
     found = tb.read_record(tmp_path / "m.nc")
     xr.testing.assert_equal(found.truth_force_x.drop_attrs(), tb.read_record(ideal[0]).force_x.drop_attrs())
-
-
-def test_every_flaw_arrives(ideal, tmp_path, rig_file):
-    rig = rig_file("""
-[load_cell]
-relative_noise = 0.01
-degrees_of_freedom = 5
-bias_uncertainty = [0.1, 0.2, 0.3]
-ornstein_uhlenbeck_moment = 0.01
-ornstein_uhlenbeck_force = 0.02
-ornstein_uhlenbeck_time = 30
-force_range = 9
-moment_range = 2
-force_resolution = 0.01
-moment_resolution = 0.005
-lever = [0.01, -0.02]
-drive_angle_offset = "1 deg"
-drive_angle_backlash = "0.2 deg"
-drive_angle_resolution = "0.5 deg"
-frame = "turning"
-gain_force_x_force_x = 1.01
-gain_force_x_force_y = 0.02
-""")
-    told("measure", ideal[0], "--rig", rig, "--out", tmp_path / "m.csv")
-    assert tb.LoadCell.from_record(tb.read_record(tmp_path / "m.csv")) == tb.LoadCell(
-        relative_noise=0.01,
-        degrees_of_freedom=5.0,
-        bias_uncertainty=(0.1, 0.2, 0.3),
-        drift=tb.load_cell.OrnsteinUhlenbeck(moment=0.01, force=0.02, time=30.0),
-        force_range=9.0,
-        moment_range=2.0,
-        force_resolution=0.01,
-        moment_resolution=0.005,
-        lever=(0.01, -0.02),
-        drive_angle_offset=math.radians(1.0),
-        drive_angle_backlash=math.radians(0.2),
-        drive_angle_resolution=math.radians(0.5),
-        gain=((1.0, 0.0, 0.0), (0.0, 1.01, 0.02), (0.0, 0.0, 1.0)),
-    )
-    assert tb.read_record(tmp_path / "m.csv").attrs["load_cell_frame"] == "turning"
 
 
 @pytest.mark.parametrize(

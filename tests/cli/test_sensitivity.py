@@ -199,35 +199,6 @@ def test_the_study_is_of_the_profile_or_of_those_that_are_given(asked, tmp_path)
 # --- Stopping and going on ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("stopped_at", "have"), [(1, "1 of 2 cells are in {}"), (0, "no further cell was done")])
-def test_control_c_says_how_to_go_on_and_the_same_command_does(asked, monkeypatch, tmp_path, stopped_at, have):
-    whole = error_map_module.error_cell
-
-    def interrupted(task):
-        if task[1] == stopped_at:
-            raise KeyboardInterrupt
-        return whole(task)
-
-    monkeypatch.setattr(error_map_module, "error_cell", interrupted)
-    result = call("--out", tmp_path, *STUDY)
-    assert result.exit_code == 130
-    told = have.format(tmp_path / "study")
-    assert result.stderr == f"tactile-bayes: interrupted, {told}: the same command resumes\n"
-    assert result.stdout == ""
-    assert (tmp_path / "words.txt").exists()  # the analysis is there before the study begins
-    monkeypatch.setattr(error_map_module, "error_cell", whole)
-    before = len(asked.get("cells", []))
-    assert call("--out", tmp_path, *STUDY).exit_code == 0
-    assert [number for _, number in asked["cells"][before:]] == list(range(stopped_at, 2))
-    assert (tmp_path / "study" / "study.nc").exists()
-
-
-def test_another_study_is_refused(asked, tmp_path):
-    assert call("--out", tmp_path, *STUDY).exit_code == 0
-    message = "holds cells of another experiment: seed is 1 there and 2 here"
-    commands.assert_refused(call("--out", tmp_path, *STUDY, "--seed", 2), message)
-
-
 # --- Refusals -------------------------------------------------------------------------------------------------------
 
 

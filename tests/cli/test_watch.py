@@ -334,23 +334,11 @@ def test_options_that_are_wrong_are_refused(path, lines, follow, options, words)
     [
         ("[unknown]\nleaver = 0.0\n", "did you mean 'lever'?"),
         ('[file]\nforce_x = "Fx"\n', "Fx"),
-        ("[rod]\nlength = 0.1\n", "length and flexural_rigidity"),
-        ('[file]\nmissing = ["torque"]\n', "torque"),
-        ("rod = 1", "rod"),
     ],
 )
 def test_a_rig_that_is_wrong_is_refused(path, lines, follow, rig_file, text, words):
     write(path, lines[0], lines[1][:5])
     commands.assert_refused(follow(rig=rig_file(text)), words)
-
-
-def test_a_wrong_call_is_refused(path):
-    for options, words in (
-        (["--particles", 10], "Invalid value for --particles"),
-        (["--poll", 0], "Invalid value for --poll"),
-        (["--idle", -1], "Invalid value for --idle"),
-    ):
-        commands.assert_misused(commands.call("watch", path, "--out", path.parent, *options), words)
 
 
 def test_what_can_never_be_followed_is_refused(path, tmp_path):

@@ -17,10 +17,10 @@ import pytest
 from helpers.data_sets import PLAIN, RICH, changed, hashes
 from helpers.refusals import refused
 from helpers.tasks import alive, wait_until
-from tactile_bayes.datasets import generate, production, verify
+from tactile_bayes.datasets import generate, verify
 from tactile_bayes.datasets.manifest import read_manifest, write_manifest
 from tactile_bayes.datasets.specification_text import toml_of
-from tactile_bayes.errors import ParameterError, SpecificationError
+from tactile_bayes.errors import SpecificationError
 from tactile_bayes.tasks import Workers
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -89,16 +89,6 @@ def test_tapered_rods_are_resumed_and_verified_like_others(tmp_path):
         generate(changed(PLAIN, rod={"taper": {"uniform": [0.2, 0.9]}}), tmp_path)
 
 
-@pytest.mark.slow
-def test_order_does_not_change_a_byte(many, tmp_path, monkeypatch):
-    def backwards(function, tasks, **options):
-        yield from ((task, function(task)) for task in reversed(tasks))
-
-    monkeypatch.setattr(production, "run_tasks", backwards)
-    generate(MANY, tmp_path, workers=1)
-    assert hashes(tmp_path) == many[0]
-
-
 def test_manifest_states_everything(tmp_path):
     spec = changed(PLAIN, contours=[{"family": "circle", "r": 0.5, "q": {"uniform": [0.5, 1.2]}}])
     path = generate(spec, tmp_path, workers=1)
@@ -159,58 +149,6 @@ def test_killed_at_random_moments_it_goes_on(many, tmp_path, workers, kills):
 
 @pytest.mark.slow
 @on_linux
-def test_what_was_noted_is_not_made_again(many, tmp_path):
-    expected, spec = many
-    out = tmp_path / "out"
-    slow = GENERATE.replace(
-        "; generate(", "; from tactile_bayes.datasets import production; production._NOTING = 1e9; generate("
-    )
-    run = subprocess.Popen([sys.executable, "-c", slow, str(spec), str(out), "1"], cwd=TESTS)
-    wait_until(lambda: (out / "manifest.json").exists() and len(read_manifest(out).shards) > 5)
-    run.kill()
-    run.wait()
-    noted = whole_shards(out)
-    times = {name: (out / name).stat().st_mtime_ns for name in noted}
-    generate(spec, out, workers=1)
-    assert {name: (out / name).stat().st_mtime_ns for name in noted} == times
-    assert hashes(out) == expected
-
-
-@pytest.mark.slow
-@on_linux
-def test_a_killed_worker_is_replaced(many, tmp_path):
-    expected, spec = many
-    out = tmp_path / "out"
-    run = start(spec, out, 2)
-    wait_until(lambda: len(list(out.glob("shard-*.nc"))) > 2 or run.poll() is not None)
-    victims = [pid for pid in children(run.pid) if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
-    os.kill(victims[0], signal.SIGKILL)
-    _, words = run.communicate(timeout=120)
-    assert run.returncode == 0, words
-    assert hashes(out) == expected
-
-
-@pytest.mark.slow
-@on_linux
-@pytest.mark.parametrize("workers", [2, 1])
-def test_an_interrupt_leaves_what_is_finished(many, tmp_path, workers):
-    expected, spec = many
-    out = tmp_path / "out"
-    run = start(spec, out, workers)
-    wait_until(lambda: len(list(out.glob("shard-*.nc"))) > 2)
-    finished = {path.name for path in out.glob("shard-*.nc")}
-    os.killpg(run.pid, signal.SIGINT)
-    _, words = run.communicate(timeout=120)
-    assert words.count("Traceback") == 1, words
-    assert words.rstrip().endswith("KeyboardInterrupt")
-    assert not list(out.glob(".*.tmp*"))
-    assert len(set(whole_shards(out)) & finished) >= len(finished) - workers
-    generate(spec, out, workers=1)
-    assert hashes(out) == expected
-
-
-@pytest.mark.slow
-@on_linux
 def test_a_cluster_makes_the_same_though_a_worker_is_killed(many, tmp_path):
     """A scheduler and two workers, each a process of its own, on loopback."""
     pytest.importorskip("distributed")
@@ -250,24 +188,7 @@ def test_a_cluster_makes_the_same_though_a_worker_is_killed(many, tmp_path):
             process.wait()
 
 
-def test_no_scheduler_is_told(tmp_path, monkeypatch):
-    pytest.importorskip("distributed")
-    with refused(ParameterError, "'nowhere'", "tcp:"):
-        generate(PLAIN, tmp_path, workers="nowhere")
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with refused(ParameterError, "Dask", "'tactile-bayes[cluster]'"):
-        generate(PLAIN, tmp_path, workers="tcp://127.0.0.1:1")
-
-
 # ---- folders
-
-
-@pytest.mark.slow
-def test_folders_with_blanks_and_relative_ones(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("a spec.toml").write_text(toml_of(PLAIN), encoding="utf-8")
-    assert generate("a spec.toml", "deep in/the middle", workers=2) == tmp_path / "deep in/the middle/manifest.json"
-    verify("deep in/the middle")
 
 
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
@@ -346,13 +267,6 @@ def test_a_data_set_without_name_has_none_in_the_refusal(tmp_path):
     generate(changed(PLAIN, name=None), tmp_path, workers=1)
     with refused(SpecificationError, "another specification, seed is 7 there"):
         generate(changed(PLAIN, name=None, seed=8), tmp_path)
-
-
-def test_defaults_that_are_written_out_are_no_other_data_set(tmp_path):
-    generate(PLAIN, tmp_path, workers=1)
-    before = hashes(tmp_path)
-    generate(changed(PLAIN, scan__margin=0.1, precision="double", description=""), tmp_path, workers=1)
-    assert hashes(tmp_path) == before
 
 
 @pytest.mark.slow
@@ -475,35 +389,6 @@ def test_two_runs_at_once_in_one_folder_are_refused(tmp_path):
         go_on.set()
         first.join()
     verify(tmp_path)
-
-
-def test_an_impossible_specification_ends_with_the_counts(tmp_path):
-    spec = changed(PLAIN, contours=[{"family": "circle", "r": 0.5, "q": 2.0}])
-    with refused(SpecificationError, "1000 times", "1000 out of reach"):
-        generate(spec, tmp_path, workers=1)
-
-
-UNGUARDED = """
-from helpers.data_sets import PLAIN
-from tactile_bayes.datasets import generate
-generate(PLAIN, "out", workers=2)
-"""
-
-
-@pytest.mark.slow
-def test_a_script_without_guard_is_told_so(tmp_path):
-    """Its processes find the folder locked, or must not start others: either way they end, and it says why."""
-    path = tmp_path / "unguarded.py"
-    path.write_text(UNGUARDED)
-    environment = {**os.environ, "PYTHONPATH": str(TESTS)}
-    done = subprocess.run(
-        [sys.executable, path], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=False
-    )
-    assert done.returncode == 1
-    last = done.stderr.splitlines()[-1]
-    assert "TaskError: a process for the work ended before it began" in last
-    assert "if __name__ == '__main__'" in last
-    assert done.stderr.count("Traceback") <= 3
 
 
 MEMORY = """

@@ -135,18 +135,6 @@ def test_a_dimensionless_record_with_unknown_noise(tmp_path):
     assert run.contacts.attrs["misfit_probability"] > 1e-4
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("quick")
-def test_a_second_run_replaces_the_files_of_the_first(measured, tmp_path):
-    (tmp_path / "band.csv").write_text("old", encoding="utf-8")
-    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
-    (tmp_path / "report.html").write_text("of another posterior", encoding="utf-8")
-    analyse(measured, tmp_path, rng=1)
-    assert not (tmp_path / "report.html").exists()
-    assert (tmp_path / "band.csv").read_text(encoding="utf-8") != "old"
-    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
-
-
 def test_a_run_that_writes_less_leaves_nothing_of_the_former_one(analysed, measured, tmp_path, monkeypatch):
     """Neither contacts, if a channel is missing, nor figures, nor what belongs to the former posterior."""
     run, _ = analysed
@@ -173,9 +161,9 @@ def test_the_posterior_removes_what_belongs_to_a_former_one_at_once(analysed, tm
 @pytest.mark.usefixtures("quick")
 def test_another_rod_is_that_of_all_results(measured, tmp_path):
     wrong = measured.assign_attrs(rod_length=0.21, rod_diameter=0.0)
-    run = analyse(wrong, tmp_path, rod=ROD, rng=1)
+    run = analyse(wrong, tmp_path, rig=Rig(ROD, unknown="nothing"), rng=1)
     assert run.posterior.attrs["rod_length"] == ROD.length
-    expected = contact_points(measured, None, run.posterior)
+    expected = contact_points(measured, run.posterior, None)
     np.testing.assert_array_equal(run.contacts.contact_x, expected.contact_x)
 
 

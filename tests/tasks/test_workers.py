@@ -136,6 +136,12 @@ def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address, monkeypat
         list(run_tasks(double, [1, 2], workers=address))
 
 
+def test_a_scheduler_without_dask_is_told_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with refused(ParameterError, "Dask", "'tactile-bayes[cluster]'"):
+        list(run_tasks(double, [1, 2], workers="tcp://127.0.0.1:1"))
+
+
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "127.0.0.1:1"])
 def test_a_scheduler_that_does_not_answer_is_waited_for_no_longer_than_it_takes(address, monkeypatch):
     pytest.importorskip("distributed")

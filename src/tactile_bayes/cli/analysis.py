@@ -13,9 +13,8 @@ import typer
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.interrupts import acknowledge_interrupt
+from tactile_bayes.cli.progress import resumable_bar, sampling_bar
 from tactile_bayes.cli.rig_options import RigOptions
-from tactile_bayes.cli.sampling_bar import sampling_bar
-from tactile_bayes.cli.task_bar import counted, resumable_bar
 from tactile_bayes.runs.names import CHECKPOINT, INFERENCE, MANY, OF_POSTERIOR, WATCH_PAGE
 
 if TYPE_CHECKING:
@@ -121,7 +120,7 @@ def _of_many(
 
     stated = rig.stated
     of_all = replace(stated, load_cell=rig.in_place_of(stated.load_cell))
-    with resumable_bar(len(paths), "record", output.is_silent, _done) as note:
+    with resumable_bar("record", output.is_silent, out, len(paths)) as note:
         table = infer_contours(
             paths,
             of_all,
@@ -130,14 +129,10 @@ def _of_many(
             rng=seed,
             settings=settings,
             probability=probability,
-            workers=Workers(progress=lambda made: note(made.done)),
+            workers=Workers(progress=note),
         )
     files = {"table": out / "runs.csv", "table, as NetCDF": out / "runs.nc"}
     return Answer([_rows_of(table), "", files], lambda: {"records": table.to_dict()["data_vars"], "files": files})
-
-
-def _done(made: int | None) -> str:
-    return "no record was done" if made is None else f"{counted(made, 'record')} done"
 
 
 def _rows_of(table: xr.Dataset) -> Table:

@@ -18,16 +18,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Answer:
-    """Result of a command.
+    """Result of a command: parts for people (sentences, tables, files by content), and the object for programs.
 
-    Attributes
-    ----------
-    parts : iterable of str, Table, or mapping of str to Path
-        Output for people: sentences, tables, and files by content, in this order.
-    numbers : callable
-        Function that returns the object for programs.
-    interrupted : str
-        If an interrupt has cut the work short, the message for stderr; the exit code is then that of an interrupt.
+    An interrupt that has cut the work short has a message for stderr, and the exit code of an interrupt.
     """
 
     parts: Iterable[str | Table | Mapping[str, Path]]

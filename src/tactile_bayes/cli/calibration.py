@@ -10,9 +10,8 @@ import typer
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.drive_options import Pivots, pivots_in
+from tactile_bayes.cli.progress import WorkerOptions, resumable_bar
 from tactile_bayes.cli.rig_options import RigFile
-from tactile_bayes.cli.task_bar import resumable_bar
-from tactile_bayes.cli.worker_options import WorkerOptions
 from tactile_bayes.runs.names import CALIBRATION
 
 if TYPE_CHECKING:
@@ -77,14 +76,8 @@ def calibrate(
 
         return _of_replicate(calibration_replicate(replicate, out=out, throw=common["debug"], **experiment))
 
-    def have(done: int | None) -> str:
-        return (
-            "no further replicate was done" if done is None else f"{done:,} of {replicates:,} replicates are in {out}"
-        )
-
-    with resumable_bar(replicates, "replicate", output.is_silent, have) as note:
-        workers = work.reporting(lambda calibrating: note(calibrating.done))
-        run = calibrate_into(out, replicates=replicates, workers=workers, **experiment)
+    with resumable_bar("replicate", output.is_silent, out, replicates) as note:
+        run = calibrate_into(out, replicates=replicates, workers=work.reporting(note), **experiment)
     found = run.result
     names = ("conclusion", "lost", "probability", "power", "noticed_shift", "noticed_narrow", "noticed_wide")
     return Answer(

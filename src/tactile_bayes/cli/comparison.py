@@ -8,8 +8,8 @@ import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
+from tactile_bayes.cli.progress import sampling_bar
 from tactile_bayes.cli.rig_options import Record, RigOptions
-from tactile_bayes.cli.sampling_bar import sampling_bar
 from tactile_bayes.runs.names import COMPARISON
 
 if TYPE_CHECKING:

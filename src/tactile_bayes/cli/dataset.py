@@ -9,8 +9,7 @@ import typer
 
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Output, Writes, as_command
-from tactile_bayes.cli.task_bar import counted, resumable_bar, step_bar
-from tactile_bayes.cli.worker_options import WorkerOptions
+from tactile_bayes.cli.progress import WorkerOptions, counted, resumable_bar, step_bar
 from tactile_bayes.runs.names import DATASET
 
 if TYPE_CHECKING:
@@ -62,15 +61,12 @@ def generate(
     spec = datasets.read_specification(specification)
     last: TaskProgress | None = None
 
-    def have(done: int | None) -> str:
-        return "no further file was finished" if done is None else f"{done:,} of {spec.records:,} records are in {out}"
-
-    with resumable_bar(spec.records, "record", output.is_silent, have) as note:
+    with resumable_bar("record", output.is_silent, out, spec.records) as note:
 
         def progress(made: TaskProgress) -> None:
             nonlocal last
             last = made
-            note(made.done)
+            note(made)
 
         datasets.generate(spec, out, workers=work.reporting(progress))
     manifest = read_manifest(out)

@@ -11,9 +11,8 @@ import typer
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Reads, Seed, Writes
 from tactile_bayes.cli.drive_options import CarryOptions, pivots_in
+from tactile_bayes.cli.progress import WorkerOptions, resumable_bar
 from tactile_bayes.cli.rig_options import RigFile
-from tactile_bayes.cli.task_bar import counted, resumable_bar
-from tactile_bayes.cli.worker_options import WorkerOptions
 from tactile_bayes.runs.names import DESIGN
 
 if TYPE_CHECKING:
@@ -89,13 +88,9 @@ def design(
         usual = [usual_drives(known, options.get("rig"), step) for step in steps]
         drives = [drive for each in zip(*usual, strict=True) for drive in each]
 
-    def have(done: int | None) -> str:
-        if not nested:
-            return "nothing was written"
-        return f"{done or 0:,} of {counted(len(drives), 'candidate')} are in {out / 'nested'}"
-
-    then = "the same command resumes" if nested else "the same command starts again"
-    with resumable_bar(len(drives), "candidate", output.is_silent, have, then=then) as note:
+    where = out / "nested" if nested else None
+    then = f"the same command {'resumes' if nested else 'starts again'}"
+    with resumable_bar("candidate", output.is_silent, where, len(drives), then=then) as note:
         made = design_into(
             out,
             known,
@@ -104,7 +99,7 @@ def design(
             criterion=criterion,
             nested=nested,
             draws=draws,
-            workers=work.reporting(lambda designing: note(designing.done)),
+            workers=work.reporting(note),
             **options,
         )
     words = made.files["words"].read_text(encoding="utf-8").splitlines()

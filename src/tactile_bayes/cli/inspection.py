@@ -12,8 +12,8 @@ import typer
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Output, Writes
 from tactile_bayes.cli.numbers import assigned
+from tactile_bayes.cli.progress import step_bar
 from tactile_bayes.cli.rig_options import Record, RigOptions
-from tactile_bayes.cli.task_bar import step_bar
 from tactile_bayes.runs.names import INSPECTION
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ import typer
 
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Output, Seed
+from tactile_bayes.cli.progress import step_bar
 from tactile_bayes.cli.rig_options import NoiseOptions, RigFile
 from tactile_bayes.cli.scanning import RecordFile, refuse_other_suffix
-from tactile_bayes.cli.task_bar import step_bar
 
 if TYPE_CHECKING:
     import xarray as xr

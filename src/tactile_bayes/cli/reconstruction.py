@@ -9,8 +9,8 @@ import typer
 
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Writes
+from tactile_bayes.cli.progress import step_bar
 from tactile_bayes.cli.rig_options import Record, RigOptions
-from tactile_bayes.cli.task_bar import step_bar
 from tactile_bayes.runs.names import RECONSTRUCTION
 
 if TYPE_CHECKING:

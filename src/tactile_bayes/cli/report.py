@@ -9,7 +9,7 @@ import typer
 
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Output, Reads, Writes
-from tactile_bayes.cli.task_bar import step_bar
+from tactile_bayes.cli.progress import step_bar
 
 
 def report(

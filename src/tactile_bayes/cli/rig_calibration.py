@@ -11,8 +11,8 @@ from tactile_bayes.cli.analysis import quantities
 from tactile_bayes.cli.answer import Answer, columns_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.contour_options import GaugeOptions
+from tactile_bayes.cli.progress import sampling_bar
 from tactile_bayes.cli.rig_options import RigOptions
-from tactile_bayes.cli.sampling_bar import sampling_bar
 from tactile_bayes.runs.names import RIG
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from tactile_bayes.cli.answer import Answer, table_of
 from tactile_bayes.cli.command import Output, Writes
 from tactile_bayes.cli.contour_options import ContourOptions
 from tactile_bayes.cli.drive_options import Directions, DriveOptions, Pivots
+from tactile_bayes.cli.progress import step_bar
 from tactile_bayes.cli.rig_options import RigFile
-from tactile_bayes.cli.task_bar import step_bar
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

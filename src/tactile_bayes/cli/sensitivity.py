@@ -11,9 +11,8 @@ import typer
 from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
 from tactile_bayes.cli.drive_options import Pivots, pivots_in
+from tactile_bayes.cli.progress import WorkerOptions, resumable_bar, step_bar
 from tactile_bayes.cli.rig_options import RigFile
-from tactile_bayes.cli.task_bar import counted, resumable_bar, task_bar
-from tactile_bayes.cli.worker_options import WorkerOptions
 from tactile_bayes.runs.names import SENSITIVITY
 
 if TYPE_CHECKING:
@@ -102,8 +101,9 @@ def sensitivity(
         "band_widths": band_width or None,
     }
     if not replicates:
-        with task_bar(steps_of(material), "step", output.is_silent) as show:
-            run = sensitivity_into(out, progress=show, **analysis)
+        steps = steps_of(material)
+        with step_bar(output.is_silent, has_rate=True) as show:
+            run = sensitivity_into(out, progress=lambda done: show(done, steps), **analysis)
         return _answer(run)
     over = {"distance": distances, "noise_factor": noise_factor or [0.1, 0.3, 1.0, 3.0]}
     study = {
@@ -114,14 +114,8 @@ def sensitivity(
         "replicates": replicates,
     }
     count = len(profiles) * math.prod(map(len, over.values()))
-
-    def have(done: int | None) -> str:
-        if done is None:
-            return "no further cell was done"
-        return f"{done:,} of {counted(count, 'cell')} are in {out / 'study'}"
-
-    with resumable_bar(count, "cell", output.is_silent, have) as note:
-        study["workers"] = work.reporting(lambda studied: note(studied.done))
+    with resumable_bar("cell", output.is_silent, out / "study", count) as note:
+        study["workers"] = work.reporting(note)
         run = sensitivity_into(out, study=study, **analysis)
     return _answer(run)
 

@@ -9,16 +9,12 @@ import typer
 
 from tactile_bayes.cli.answer import Answer, columns_of, table_of, text_of
 from tactile_bayes.cli.command import Output, Reads, Seed, Writes
-from tactile_bayes.cli.interrupts import resumable
-from tactile_bayes.cli.task_bar import step_bar
-from tactile_bayes.cli.worker_options import WorkerOptions
+from tactile_bayes.cli.progress import WorkerOptions, resumable_bar
 from tactile_bayes.runs.names import TRUST
 
 if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
-
-    from tactile_bayes.tasks import TaskProgress
 
 
 def trust(
@@ -52,15 +48,7 @@ def trust(
     """Judge whether the band of a run holds for its record, and what it rests on: record, prior, sampling."""
     from tactile_bayes.runs.trust import REPLICATES_FOLDER, trust_into
 
-    def have() -> str:
-        return f"replicates so far are in {(out or run) / REPLICATES_FOLDER}"
-
-    with resumable(have) as raise_lost, step_bar(output.is_silent, "posterior", has_rate=True) as show:
-
-        def note(done: TaskProgress) -> None:
-            show(done.done, done.wanted)
-            raise_lost()
-
+    with resumable_bar("posterior", output.is_silent, (out or run) / REPLICATES_FOLDER) as note:
         made = trust_into(
             run,
             out,

@@ -96,13 +96,11 @@ _CORRECTIONS = {
 
 @threadpool_limits.wrap(limits=1)  # with more threads, products of matrices are rounded otherwise
 def generate_records(spec: Specification, begin: int, end: int) -> Records:
-    """Generate records from index `begin` to before `end`, by rejection sampling with look-ahead.
+    """Generate records from index `begin` to before `end`, each the first draw that all sweeps reach and leave clear.
 
-    A record keeps the first of its draws whose contour every sweep reaches and leaves clear. The number of draws ahead
-    doubles for the remaining records each time, since most of the cost is per call; later draws are discarded.
-
-    The random numbers of a record depend on the seed and its index only, and those of its contour are drawn before all
-    others. Rounding may depend on the records that are generated together, so that only the same range of records gives
+    The number of draws ahead doubles for the remaining records each time, since most of the cost is per call. The
+    random numbers of a record depend on the seed and its index only, and those of its contour are drawn before all
+    others. Rounding may depend on the records that are generated together: only the same range of records gives
     identical bits.
     """
     index = np.arange(begin, end)

@@ -33,35 +33,17 @@ _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "xarray", "h5netcdf", "h5py")
 
 @dataclass(frozen=True)
 class Manifest:
-    """Manifest of a data set, a JSON file beside its shards.
-
-    Attributes
-    ----------
-    name : str
-        Name of the data set.
-    specification : str
-        Text of the specification.
-    specification_sha256 : str
-        SHA-256 of its meaning.
-    seed, records, shard_records : int
-        As in the specification.
-    versions : mapping of str to str
-        Versions of Python and of the libraries on which numbers and bytes depend.
-    shards : tuple of Written
-        Complete files, by number.
-    card_sha256 : str
-        SHA-256 of the data card; "" as long as there is none.
-    """
+    """Manifest of a data set, a JSON file beside its shards."""
 
     name: str
-    specification: str
-    specification_sha256: str
+    specification: str  # its text
+    specification_sha256: str  # of its meaning
     seed: int
     records: int
     shard_records: int
-    versions: Mapping[str, str]
-    shards: tuple[Written, ...] = field(default=())
-    card_sha256: str = ""
+    versions: Mapping[str, str]  # of Python and of the libraries on which numbers and bytes depend
+    shards: tuple[Written, ...] = field(default=())  # complete files, by number
+    card_sha256: str = ""  # of the data card; "" as long as there is none
 
     @classmethod
     def of(cls, spec: Specification) -> Manifest:

@@ -32,16 +32,10 @@ class Group:
 
 @dataclass(frozen=True)
 class Drive:
-    """Drive angles of a sweep: between two angles, or about the contact.
+    """Drive angles of a sweep: `samples` evenly spaced ones from `begin` to `end` [rad], or about the contact.
 
-    Parameters
-    ----------
-    samples : int
-        Number of evenly spaced samples in each sweep.
-    begin, end : float, optional
-        Least and greatest angle [rad]; backward sweeps go from the greatest to the least.
-    margin : float
-        Without these angles: range before first contact and after snap-off, each as a share of the angle between them.
+    About the contact, `margin` is the range before first contact and after snap-off, in shares of the angle between
+    them.
     """
 
     samples: int

@@ -21,20 +21,14 @@ _WORDS = {"default": "the default of the rig", "calibrated": "as the calibration
 class Variation:
     """A number for each record: constant, drawn, or from a list in turn.
 
-    Parameters
-    ----------
-    kind : {"constant", "uniform", "log_uniform", "normal", "log_normal", "half_normal", "choice", "each", "scipy"}
-        Constant: the number. Uniform and log_uniform: the two limits. Normal: mean and standard deviation; log_normal:
-        median, and standard deviation of the natural logarithm; half_normal: the scale. Choice: one of a list with
-        equal probabilities. Each: the numbers of the list in turn, in all combinations with the specification's other
-        lists, except those on the same axis, which advance in step. Scipy: a distribution of `scipy.stats`. Deviations
-        of a rig may be "default", the default distribution around what its data sheets state, or "calibrated".
-    numbers : tuple of float
-        Parameters of the kind; of "scipy" the finite ends of its support.
+    Kinds are those of `KINDS`; constant; choice, one of a list with equal probabilities; each, the numbers of a list in
+    turn, in all combinations with the specification's other lists, except those on the same axis, which advance in
+    step; scipy, a distribution of `scipy.stats`. Deviations of a rig may be "default" (around what its data sheets
+    state) or "calibrated".
     """
 
     kind: str
-    numbers: tuple[float, ...] = ()
+    numbers: tuple[float, ...] = ()  # parameters of the kind; of scipy the finite ends of its support
     axis: str | None = None  # axis of a list
     of: Any = None  # frozen distribution of the kind "scipy"
 

@@ -46,35 +46,17 @@ _MOST_PARAMETERS = 5  # largest number of parameters in a figure, unless a conto
 
 @dataclass(frozen=True)
 class ContourRun:
-    """Result of `analyse`.
-
-    Attributes
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`.
-    contacts : xr.Dataset or None
-        Most probable contact points (raw Step 2 for Student's t with 2 degrees of freedom and fewer); None if a load
-        channel is missing.
-    band : xr.Dataset or None
-        From `contour_band`.
-    summary : xr.Dataset
-        From `summary`.
-    verdicts : tuple of str
-        What is wrong, the most serious first, or that all is well; see `tactile_bayes.verdicts`. Last, what is left
-        out, and why.
-    files : mapping of str to Path
-        Files by content.
-    left_out : mapping of str to Exception
-        Errors by the part that failed after sampling. Such a part is None, or has no file.
-    """
+    """Result of `analyse`."""
 
     posterior: xr.DataTree
+    # Most probable contact points (raw Step 2 for Student's t with 2 degrees of freedom and fewer); None if a load
+    # channel is missing.
     contacts: xr.Dataset | None
     band: xr.Dataset | None
     summary: xr.Dataset
-    verdicts: tuple[str, ...]
-    files: Mapping[str, Path]
-    left_out: Mapping[str, Exception]
+    verdicts: tuple[str, ...]  # as of `tactile_bayes.verdicts`; last, what is left out, and why
+    files: Mapping[str, Path]  # by content
+    left_out: Mapping[str, Exception]  # by the part that failed after sampling, which is None, or has no file
 
 
 class RunFolder(Folder):

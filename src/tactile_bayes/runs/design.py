@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,10 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes import plotting
+from tactile_bayes.arrays import Floats
 from tactile_bayes.planning.design import design
 from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.names import DESIGN
-from tactile_bayes.runs.outermost import outermost
 
 
 def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, **options: Any) -> Run[xr.Dataset]:
@@ -83,3 +84,12 @@ def design_messages(found: xr.Dataset) -> tuple[str, ...]:
             f"Laplace's approximation {length(float(best.width))}."
         )
     return tuple(sentences)
+
+
+def outermost(choices: Iterable[tuple[Floats, float, str, str]]) -> str:
+    """Return the extremes at which the best choice lies, as text; "" if it lies inside all ranges."""
+    words: list[str] = []
+    for tried, best, least, most in choices:
+        if np.ptp(tried) > 0.0:
+            words += [least] * bool(best == tried.min()) + [most] * bool(best == tried.max())
+    return " and ".join(words)

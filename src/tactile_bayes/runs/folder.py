@@ -26,15 +26,7 @@ _OTHERS = {"comparison.nc": "a comparison of shapes", "design.nc": "a design", "
 
 @dataclass(frozen=True)
 class Run(Generic[Result]):
-    """Result of a command.
-
-    Attributes
-    ----------
-    result : object
-        Result of the library function behind the command.
-    files : mapping of str to Path
-        Files by content.
-    """
+    """Result of the library function behind a command, and its files by content."""
 
     result: Result
     files: Mapping[str, Path]
@@ -43,29 +35,16 @@ class Run(Generic[Result]):
 class Folder:
     """A folder of results, created if missing, in which the files of one run replace those of the former one together.
 
-    Files are written inside a `with` block, at whose end they are moved into the folder (`replace_together`); if it
-    raises, the folder stays as it was.
-
-    Parameters
-    ----------
-    out : path-like
-        The folder.
-    names : sequence of str
-        All files that such a run can write; those it does not write are removed. A folder that lacks the first one is
-        not complete.
-
-    Attributes
-    ----------
-    path : Path
-    files : dict of str to Path
-        Files written so far, by content.
+    They are moved into it at the end of a `with` block (`replace_together`); if it raises, the folder stays as it was.
+    Of all `names` that such a run can write, those it does not write are removed; without the first one it is not
+    complete.
     """
 
     def __init__(self, out: str | os.PathLike[str], names: Sequence[str]) -> None:
         self.path = Path(out)
         self.path.mkdir(parents=True, exist_ok=True)
         self.names = tuple(names)
-        self.files: dict[str, Path] = {}
+        self.files: dict[str, Path] = {}  # those written so far, by content
 
     def __enter__(self) -> Self:
         self._replacing = replace_together(self.path, self.names)

@@ -31,19 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReconstructionRun(Run[xr.Dataset]):
-    """Result of `reconstruct_into`.
-
-    Attributes
-    ----------
-    result : xr.Dataset
-        From `reconstruct`.
-    files : mapping of str to Path
-        Files by content.
-    load_cell : LoadCell or None
-        The load cell that was assumed.
-    source : {"given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"}
-        Source of the load cell; see `known_cell`.
-    """
+    """Contacts from `reconstruct`, with the load cell that was assumed, and its source as of `known_cell`."""
 
     load_cell: LoadCell | None
     source: CellSource

@@ -22,15 +22,7 @@ from tactile_bayes.uncertainty.summary import summary
 
 @dataclass(frozen=True)
 class RigRun(Run[Rig]):
-    """Result of `calibrate_rig_into`.
-
-    Attributes
-    ----------
-    summary : xr.Dataset
-        From `summary`.
-    messages : tuple of str
-        The verdicts on each record, and what the rig's later records take over.
-    """
+    """A calibrated rig, with the verdicts on each record, and what later records take over."""
 
     summary: xr.Dataset
     messages: tuple[str, ...]

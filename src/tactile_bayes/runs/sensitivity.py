@@ -18,9 +18,9 @@ from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import sensitivity
 from tactile_bayes.rig.rig import rig_of
+from tactile_bayes.runs.design import outermost
 from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.runs.names import SENSITIVITY, STUDY
-from tactile_bayes.runs.outermost import outermost
 from tactile_bayes.tasks import TaskProgress
 
 if TYPE_CHECKING:
@@ -41,19 +41,7 @@ class Material(NamedTuple):
 
 @dataclass(frozen=True)
 class SensitivityRun(Run[xr.DataTree]):
-    """Result of `sensitivity_into`.
-
-    Attributes
-    ----------
-    result : xr.DataTree
-        From `sensitivity`.
-    files : mapping of str to Path
-        Files by content.
-    rods : xr.Dataset or None
-        From `required_rod`, if a material was given.
-    study : xr.Dataset or None
-        From `error_map`, if a study was requested.
-    """
+    """Result of `sensitivity`, with rods if a material was given, and a study if one was requested."""
 
     rods: xr.Dataset | None
     study: xr.Dataset | None

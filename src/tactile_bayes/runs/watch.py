@@ -65,42 +65,24 @@ def open_watch(out: str | os.PathLike[str], **options: Any) -> Iterator[Watch]:
 
 
 class Watch:
-    """The stream behind a record that grows, with its folder.
+    """The stream behind a record that grows, with its folder, which has stream.nc and posterior.nc after each update.
 
     Parameters
     ----------
-    out : path-like
-        Folder for stream.nc and posterior.nc after each update, and at the end for the files of a run; created if
-        missing.
-    probability : float
-        Probability of the band and of intervals, in (0, 1).
     between : pair of float, optional
         Ends of the band in x, in the record's unit of length; by default those of the arcs that
         its sweeps touch if they continue.
-    until_width : float, optional
-        Width below which the band has to be everywhere between these ends for measuring to stop [length].
-    until_probability : float, optional
-        Probability of a family above which measuring may stop.
+    until_width, until_probability : float, optional
+        Width below which the band has to be everywhere between these ends for measuring to stop [length], and
+        probability of a family above which it may.
     most_samples : int
-        Largest number of samples that are taken into account, at least 100. Of a longer record every second sample is,
-        every fourth, and so on; when this begins, all that are left are taken again. Records of a load cell that drifts
-        from sample to sample are taken whole.
+        Largest number of samples that are taken into account. Of a longer record every second sample is, every fourth,
+        and so on; when this begins, all that are left are taken again. Records of a load cell that drifts from sample
+        to sample are taken whole.
     families : sequence of str or Family
-        Families of contours; of several, the posterior is that of the most probable one, and the band is averaged.
-    rig : Rig, optional
-        As in `infer_contour`.
-    record_file : path-like
-        File that is followed; the posterior states it.
-    command : sequence of str
-        Words of the command; the posterior states them.
+        Of several, the posterior is that of the most probable one, and the band is averaged.
     **options
         Arguments of `Stream`, without family and rig.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is not valid, a width is given without ends, or the probability of a family for a single one, or
-        a file of the folder would replace the record.
     """
 
     def __init__(

@@ -23,15 +23,11 @@ _DAY = 86_400.0
 
 @contextmanager
 def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path to write to, and move it to `path` when the block has succeeded.
+    """Yield a temporary path to write to, and move it to `path` when the block has succeeded, else remove it.
 
-    The temporary file has the same name, in a hidden folder beside `path`, which is locked while it exists. At the end
-    of the block the file is flushed to the disk and renamed, and the directory is flushed; if the block raises, the
-    temporary file is removed and `path` stays as it was.
-
-    Processes that were killed leave such folders behind. They are removed first if their lock shows that nobody writes
-    to them: not on Windows, nor on a file system without locks. Since locks may not reach other machines, folders from
-    another machine must also be a day old.
+    It has the same name, in a hidden, locked folder beside `path`. Those that killed processes have left are removed
+    first if their lock shows that nobody writes to them (not on Windows, nor on a file system without locks), and if
+    they are from this machine or a day old, since locks may not reach other machines.
     """
     target = Path(path).resolve()
     with _beside(target.parent, target) as folder:
@@ -46,11 +42,10 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
 def replace_together(folder: Path, names: Sequence[str]) -> Iterator[Path]:
     """Yield a temporary folder for files that replace those of these names in `folder`, when the block has succeeded.
 
-    Names of which the block writes no file are removed from `folder`. If the block raises, or a file cannot be
-    replaced, `folder` stays as it was. While the files are moved there are never old ones beside new ones: the old ones
-    go first, and the first name is the first to go and the last to come. A single new file that is not the first
-    replaces the old one at once. So a folder in which a process was killed holds the old files, or the new ones, or
-    lacks the first name.
+    Names of which the block writes no file are removed. If it raises, or a file cannot be replaced, `folder` stays as
+    it was. There are never old files beside new ones: the old ones go first, the first name is the first to go and the
+    last to come, and a single new file that is not the first replaces the old one at once. A process that is killed
+    leaves the old files, the new ones, or none of the first name.
     """
     with _beside(folder, folder) as temporary:
         yield temporary

@@ -1,18 +1,21 @@
-"""The bar of steps, as a terminal gets it."""
+"""Bars as a terminal gets them, and what an interrupt says of the tasks behind one."""
 
 import os
 import pty
 import re
+import signal
 import sys
 from contextlib import contextmanager, nullcontext, suppress
 
 import pytest
+import typer
 
 from helpers import commands
 from helpers.report_pages import analysed_quickly, coarse_record
-from tactile_bayes.cli.task_bar import step_bar
+from tactile_bayes.cli.progress import resumable_bar, step_bar
 from tactile_bayes.record import write_record
 from tactile_bayes.rig import Rig
+from tactile_bayes.tasks import TaskProgress
 
 
 @contextmanager
@@ -51,6 +54,39 @@ def test_it_is_silent_where_it_is_told_to_be_and_where_nobody_looks(monkeypatch,
     with step_bar(quiet=False) as show:
         show(1, 3)
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("where", "done", "said"),
+    [
+        (None, 3, "nothing was written"),
+        ("out", None, "no further cell was done"),
+        ("out", 3, "3 of 5 cells are in out"),
+    ],
+)
+def test_an_interrupt_says_what_is_kept_and_how_to_go_on(where, done, said):
+    def interrupted():
+        with resumable_bar("cell", True, where, 5) as note:
+            if done is not None:
+                note(TaskProgress(done, 5, done, 1.0))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match=f"^interrupted, {said}: the same command resumes$"):
+        interrupted()
+
+
+def test_a_termination_that_the_sampler_answers_is_still_one():
+    """It ends with the code of one, though what reaches the command is an interrupt of the sampler's own."""
+
+    def sampler():
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt("interrupted while sampling replicate 3") from None
+
+    with pytest.raises(typer.Exit) as ended, resumable_bar("replicate", True, None):
+        sampler()
+    assert ended.value.exit_code == 143
 
 
 @pytest.mark.slow
