@@ -17,9 +17,8 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.coverage import coverage_p_value
-from tactile_bayes.calibration.replicate import Outcome, compared, contact_coverage, grid_points_of
+from tactile_bayes.calibration.replicate import REPLICATES, Outcome, compared, contact_coverage, grid_points_of
 from tactile_bayes.calibration.simulation import Simulation
-from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import sampled
@@ -65,29 +64,14 @@ class JointModel(ContourModel):
 
 @dataclass(frozen=True, eq=False)
 class PosteriorExperiment:
-    """A record with its posterior, and truths and records drawn from that.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        The experiment of the posterior.
-    truths : ndarray, shape (replicates, d)
-        Draws of the posterior.
-    readings : ndarray, shape (replicates, samples, 3)
-        Predicted readings of each, in the record's units; NaN where a channel is missing.
-    starts : ndarray, shape (n, d)
-        Draws of the posterior from which the start of a joint posterior is made.
-    settings : SamplerSettings
-    probability : float
-        Probability of the intervals that are tested.
-    seed : int
-    """
+    """A record with its posterior, and truths and records drawn from that."""
 
     experiment: Experiment
-    truths: Floats
+    truths: Floats  # draws of the posterior, shape (replicates, d)
+    # Predicted readings of each, in the record's units, shape (replicates, samples, 3); NaN where a channel is missing.
     readings: Floats
-    starts: Floats
-    probability: float
+    starts: Floats  # draws of the posterior from which the start of a joint posterior is made, shape (n, d)
+    probability: float  # probability of the intervals that are tested
     seed: Seed
     settings: SamplerSettings = field(default=_SETTINGS)
 

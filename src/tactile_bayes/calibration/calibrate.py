@@ -11,9 +11,8 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.calibration.misspecification import Misspecification
-from tactile_bayes.calibration.replicate import Replicate, make_replicate, replicate
+from tactile_bayes.calibration.replicate import REPLICATES, Replicate, make_replicate, replicate
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
-from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.checks import (
     check_optional,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import traceback
 from collections.abc import Mapping
@@ -14,12 +15,13 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.diagnostics.record_check import check_record
-from tactile_bayes.errors import InferenceError, TactileBayesError
+from tactile_bayes.errors import CalibrationError, InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import child
+from tactile_bayes.tasks import Kind
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
@@ -45,6 +47,23 @@ class Outcome(NamedTuple):
     def is_lost(self) -> bool:
         """True if an error ended the replicate before the ranks were computed."""
         return not self.ranks
+
+
+def _encode(outcome: Outcome) -> dict[str, Any]:
+    row = {"ranks": dict(outcome.ranks), "numbers": outcome.numbers, "message": outcome.message}
+    return row | ({"traceback": outcome.traceback} if outcome.traceback else {})
+
+
+def _decode(row: dict[str, Any]) -> Outcome:
+    return Outcome(
+        {name: int(rank) for name, rank in row["ranks"].items()},
+        {name: math.nan if v is None else float(v) for name, v in row["numbers"].items()},
+        str(row["message"]),
+        str(row.get("traceback", "")),  # older stores have none
+    )
+
+
+REPLICATES = Kind("replicates", CalibrationError, _encode, _decode)
 
 
 class Replicate(NamedTuple):
