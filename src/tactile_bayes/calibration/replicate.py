@@ -32,6 +32,7 @@ _GRID_POINTS = 9  # number of grid points of x at which a band is judged, in the
 # Samples whose contact region is judged, as shares of the way from first contact to snap-off in a segment.
 _CONTACTS = (0.1, 0.5, 0.9)
 _CONTACT_DRAWS = 200  # number of draws from which a contact region is computed
+_FEWEST_WALKERS, _MORE_WALKERS = 20, 2  # least number of walkers, and their excess over twice the parameters
 
 
 class Outcome(NamedTuple):
@@ -64,6 +65,16 @@ def _decode(row: dict[str, Any]) -> Outcome:
 
 
 REPLICATES = Kind("replicates", CalibrationError, _encode, _decode)
+
+
+def lost(error: Exception) -> Outcome:
+    """Return the outcome of a replicate that an error, which is being handled, ended."""
+    return Outcome({}, {}, f"{type(error).__name__}: {error}", traceback.format_exc())
+
+
+def walkers_of(parameters: int) -> int:
+    """Return the number of walkers of an ensemble; few suffice for 200 draws."""
+    return max(_FEWEST_WALKERS, 2 * parameters + _MORE_WALKERS)
 
 
 class Replicate(NamedTuple):
@@ -111,15 +122,13 @@ def make_replicate(experiment: SimulatedExperiment, number: int, *, throw: bool 
         seconds = time.perf_counter() - began
         result.draws.refuse_interrupted(f"replicate {number}")
         outcome = _compared(experiment, simulation, problem.model, result, np.random.default_rng(for_ranks))
-        outcome = outcome._replace(numbers={"seconds": seconds, **outcome.numbers})
     except Exception as error:
         if throw:
             raise
-        numbers = {"seconds": time.perf_counter() - began}
-        outcome = Outcome({}, numbers, f"{type(error).__name__}: {error}", traceback.format_exc())
+        outcome, seconds = lost(error), time.perf_counter() - began
     return Replicate(
         number,
-        outcome,
+        outcome._replace(numbers={"seconds": seconds, **outcome.numbers}),
         {} if simulation is None else simulation.truth,
         None if simulation is None else simulation.measured,
         None if result is None else result.tree,
