@@ -18,8 +18,7 @@ from helpers.replicates import STAGES, failing
 from helpers.tasks import wait_until
 from tactile_bayes.calibration.calibrate import calibrate, calibration_replicate, experiment_of
 from tactile_bayes.calibration.misspecification import Misspecification
-from tactile_bayes.calibration.replicate import Outcome
-from tactile_bayes.calibration.store import REPLICATES
+from tactile_bayes.calibration.replicate import REPLICATES, Outcome
 from tactile_bayes.errors import CalibrationError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.ensembles import SamplerSettings, moves

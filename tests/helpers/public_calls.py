@@ -16,7 +16,7 @@ from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, swept
 from tactile_bayes.diagnostics.inspection import Inspection
 from tactile_bayes.load_cell.discrepancy import Course, Discrepancy
 from tactile_bayes.mechanics import elastica
-from tactile_bayes.planning.bands import Bands
+from tactile_bayes.planning.error_map import Bands
 from tactile_bayes.rig import FileFormat, Rig
 
 PARABOLA = tb.contours.Parabola(0.5, 0.5)

@@ -12,7 +12,7 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import amplification
-from tactile_bayes.planning.criterion import Criterion
+from tactile_bayes.planning.design import Criterion
 from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import Rig

@@ -16,8 +16,7 @@ from tactile_bayes.inference.family import Family
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.planning.candidate import Candidate, Question, _band_widths, expected_of
-from tactile_bayes.planning.criterion import Criterion
-from tactile_bayes.planning.design import design, usual_drives
+from tactile_bayes.planning.design import Criterion, design, usual_drives
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.knowledge import known_from_posterior, known_from_prior
 from tactile_bayes.planning.plan import Plan

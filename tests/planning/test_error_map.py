@@ -13,9 +13,8 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, StudyError
 from tactile_bayes.planning.amplification import amplification
-from tactile_bayes.planning.bands import Bands
 from tactile_bayes.planning.error_cell import CellOutcome
-from tactile_bayes.planning.error_map import CELLS, _identity, error_map
+from tactile_bayes.planning.error_map import CELLS, Bands, _identity, error_map
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rig import NOTHING, Rig

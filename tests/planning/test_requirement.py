@@ -194,22 +194,27 @@ def test_no_rod_will_do_and_progress_is_told_after_each():
     assert np.isnan([found.best_length, found.best_diameter, found.best_width]).all()
 
 
+MATERIAL = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
+
+
 def test_a_rod_wants_a_load_cell_and_units():
-    options = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
     for plan in (PLAN, *(replace(METAL, rig=replace(METAL.rig, **{name: None})) for name in ("load_cell", "rod"))):
         with refused(ParameterError, "rod", "SI", "load_cell"):
-            required_rod(plan, **options)
+            required_rod(plan, **MATERIAL)
 
 
-@pytest.mark.parametrize("wrong", [{"lengths": []}, {"diameters": [0.0]}, {"lengths": [-0.1]}, {"diameters": [np.nan]}])
-def test_sizes_that_are_none_are_refused(wrong):
-    options = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
-    with refused(ParameterError, *wrong):
-        required_rod(METAL, **{**options, **wrong})
-
-
-@pytest.mark.parametrize("wrong", [{"elastic_strain": 0.0}, {"elastic_strain": np.nan}, {"youngs_modulus": -1.0}])
-def test_a_material_that_is_none_is_refused(wrong):
-    options = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
-    with pytest.raises(ParameterError):
-        required_rod(METAL, **{**options, **wrong})
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"lengths": []}, ["lengths"]),
+        ({"diameters": [0.0]}, ["diameters"]),
+        ({"lengths": [-0.1]}, ["lengths"]),
+        ({"diameters": [np.nan]}, ["diameters"]),
+        ({"elastic_strain": 0.0}, ["elastic_strain"]),
+        ({"elastic_strain": np.nan}, ["elastic_strain"]),
+        ({"youngs_modulus": -1.0}, []),
+    ],
+)
+def test_sizes_and_materials_that_are_none_are_refused(wrong, named):
+    with refused(ParameterError, *named):
+        required_rod(METAL, **{**MATERIAL, **wrong})

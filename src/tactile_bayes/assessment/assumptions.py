@@ -171,8 +171,4 @@ def _decode(row: dict[str, Any]) -> _Outcome:
     return _Outcome(band, bool(row["fits"]), bool(row["converged"]), str(row["message"]))
 
 
-def _encode(outcome: _Outcome) -> dict[str, Any]:
-    return outcome._asdict()
-
-
-_ALTERNATIVES = Kind("alternatives", StudyError, _encode, _decode)
+_ALTERNATIVES = Kind("alternatives", StudyError, _Outcome._asdict, _decode)

@@ -96,19 +96,9 @@ class _Around(NamedTuple):
 
 
 class Linearisation:
-    """Linear fits of records that were measured as that of a model.
+    """Linear fits of records that were measured as that of a model, from the posterior's deviations, shape (d,).
 
-    Parameters
-    ----------
-    model : ContourModel
-        Model of contour and rig.
-    scales : ndarray, shape (d,)
-        Posterior standard deviations of its parameters.
-
-    Raises
-    ------
-    InferenceError
-        If more than 2000 samples share a drift process, or a bias that is integrated out.
+    It refuses more than 2000 samples that share a drift process, or a bias that is integrated out.
     """
 
     def __init__(self, model: ContourModel, scales: Floats) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import time
-import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -17,9 +16,16 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.coverage import coverage_p_value
-from tactile_bayes.calibration.replicate import Outcome, compared, contact_coverage, grid_points_of
+from tactile_bayes.calibration.replicate import (
+    REPLICATES,
+    Outcome,
+    compared,
+    contact_coverage,
+    grid_points_of,
+    lost,
+    walkers_of,
+)
 from tactile_bayes.calibration.simulation import Simulation
-from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import sampled
@@ -39,8 +45,8 @@ from tactile_bayes.record import CHANNELS
 from tactile_bayes.tasks import Workers, keep_outcomes, open_results_store
 from tactile_bayes.uncertainty.band import contour_band
 
+# As in `calibrate`, with more steps: shape-free posteriors take some thousand.
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
-_FEWEST_WALKERS, _MORE_WALKERS = 20, 2  # as in `calibrate`, with more steps: shape-free posteriors take some thousand
 _STARTS = 400  # number of posterior draws of which the start of a joint posterior is made
 _LEAST_EFFECTIVE = 4  # least number of effective starting draws per parameter
 _RATIO = "ratio"  # beginning of the names of numbers that hold distances over half widths of the band
@@ -65,29 +71,14 @@ class JointModel(ContourModel):
 
 @dataclass(frozen=True, eq=False)
 class PosteriorExperiment:
-    """A record with its posterior, and truths and records drawn from that.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        The experiment of the posterior.
-    truths : ndarray, shape (replicates, d)
-        Draws of the posterior.
-    readings : ndarray, shape (replicates, samples, 3)
-        Predicted readings of each, in the record's units; NaN where a channel is missing.
-    starts : ndarray, shape (n, d)
-        Draws of the posterior from which the start of a joint posterior is made.
-    settings : SamplerSettings
-    probability : float
-        Probability of the intervals that are tested.
-    seed : int
-    """
+    """A record with its posterior, and truths and records drawn from that."""
 
     experiment: Experiment
-    truths: Floats
+    truths: Floats  # draws of the posterior, shape (replicates, d)
+    # Predicted readings of each, in the record's units, shape (replicates, samples, 3); NaN where a channel is missing.
     readings: Floats
-    starts: Floats
-    probability: float
+    starts: Floats  # draws of the posterior from which the start of a joint posterior is made, shape (n, d)
+    probability: float  # probability of the intervals that are tested
     seed: Seed
     settings: SamplerSettings = field(default=_SETTINGS)
 
@@ -165,7 +156,7 @@ def _task(
         every[evenly_spread(len(every), _STARTS)],
         probability,
         seed,
-        replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * points.shape[-1] + _MORE_WALKERS)),
+        replace(_SETTINGS, walkers=walkers_of(points.shape[-1])),
     )
 
 
@@ -176,7 +167,7 @@ def _replicate(task: tuple[PosteriorExperiment, int]) -> Outcome:
     try:
         outcome = _made(experiment, number)
     except Exception as error:
-        outcome = Outcome({}, {}, f"{type(error).__name__}: {error}", traceback.format_exc())
+        outcome = lost(error)
     return outcome._replace(numbers={"seconds": time.perf_counter() - began, **outcome.numbers})
 
 

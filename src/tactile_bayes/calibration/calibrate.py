@@ -11,9 +11,8 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.calibration.misspecification import Misspecification
-from tactile_bayes.calibration.replicate import Replicate, make_replicate, replicate
+from tactile_bayes.calibration.replicate import REPLICATES, Replicate, make_replicate, replicate, walkers_of
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
-from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.checks import (
     check_optional,
@@ -34,8 +33,6 @@ from tactile_bayes.tasks import ResultsStore, Workers, keep_outcomes, open_resul
 # Default drive angles [degrees], from before first contact to after snap-off in either direction.
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
-# Least number of walkers of an ensemble, and their excess over twice the parameters; few suffice for 200 draws.
-_FEWEST_WALKERS, _MORE_WALKERS = 20, 2
 # Settings of a second run if the first has not converged; the walkers of `infer_contour` adapt to a bent posterior.
 _AGAIN = replace(_SETTINGS, max_steps=6000)
 
@@ -230,5 +227,5 @@ def experiment_of(
         seed=seed_sequence(rng),
         truth=truth,
     )
-    default = replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS))
+    default = replace(_SETTINGS, walkers=walkers_of(len(experiment.assumed.priors)))
     return replace(experiment, settings=default, again=_AGAIN) if settings in (None, default) else experiment

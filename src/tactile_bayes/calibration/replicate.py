@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import traceback
 from collections.abc import Mapping
@@ -14,12 +15,13 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.diagnostics.record_check import check_record
-from tactile_bayes.errors import InferenceError, TactileBayesError
+from tactile_bayes.errors import CalibrationError, InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import child
+from tactile_bayes.tasks import Kind
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
@@ -30,6 +32,7 @@ _GRID_POINTS = 9  # number of grid points of x at which a band is judged, in the
 # Samples whose contact region is judged, as shares of the way from first contact to snap-off in a segment.
 _CONTACTS = (0.1, 0.5, 0.9)
 _CONTACT_DRAWS = 200  # number of draws from which a contact region is computed
+_FEWEST_WALKERS, _MORE_WALKERS = 20, 2  # least number of walkers, and their excess over twice the parameters
 
 
 class Outcome(NamedTuple):
@@ -45,6 +48,33 @@ class Outcome(NamedTuple):
     def is_lost(self) -> bool:
         """True if an error ended the replicate before the ranks were computed."""
         return not self.ranks
+
+
+def _encode(outcome: Outcome) -> dict[str, Any]:
+    row = {"ranks": dict(outcome.ranks), "numbers": outcome.numbers, "message": outcome.message}
+    return row | ({"traceback": outcome.traceback} if outcome.traceback else {})
+
+
+def _decode(row: dict[str, Any]) -> Outcome:
+    return Outcome(
+        {name: int(rank) for name, rank in row["ranks"].items()},
+        {name: math.nan if v is None else float(v) for name, v in row["numbers"].items()},
+        str(row["message"]),
+        str(row.get("traceback", "")),  # older stores have none
+    )
+
+
+REPLICATES = Kind("replicates", CalibrationError, _encode, _decode)
+
+
+def lost(error: Exception) -> Outcome:
+    """Return the outcome of a replicate that an error, which is being handled, ended."""
+    return Outcome({}, {}, f"{type(error).__name__}: {error}", traceback.format_exc())
+
+
+def walkers_of(parameters: int) -> int:
+    """Return the number of walkers of an ensemble; few suffice for 200 draws."""
+    return max(_FEWEST_WALKERS, 2 * parameters + _MORE_WALKERS)
 
 
 class Replicate(NamedTuple):
@@ -92,15 +122,13 @@ def make_replicate(experiment: SimulatedExperiment, number: int, *, throw: bool 
         seconds = time.perf_counter() - began
         result.draws.refuse_interrupted(f"replicate {number}")
         outcome = _compared(experiment, simulation, problem.model, result, np.random.default_rng(for_ranks))
-        outcome = outcome._replace(numbers={"seconds": seconds, **outcome.numbers})
     except Exception as error:
         if throw:
             raise
-        numbers = {"seconds": time.perf_counter() - began}
-        outcome = Outcome({}, numbers, f"{type(error).__name__}: {error}", traceback.format_exc())
+        outcome, seconds = lost(error), time.perf_counter() - began
     return Replicate(
         number,
-        outcome,
+        outcome._replace(numbers={"seconds": seconds, **outcome.numbers}),
         {} if simulation is None else simulation.truth,
         None if simulation is None else simulation.measured,
         None if result is None else result.tree,

@@ -19,7 +19,7 @@ from tactile_bayes.inference.contour_problem import ContourProblem, contour_prob
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.numerics.random_numbers import Seed, seed_words
-from tactile_bayes.record import bases_of, rod_of
+from tactile_bayes.record import rod_of
 from tactile_bayes.sweep import Drive
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee", "arviz-stats")
@@ -90,16 +90,6 @@ class SimulatedExperiment:
         drawn, assumed = self.simulated.own_family, self.assumed.own_family
         is_known = assumed.known.items() <= drawn.known.items()
         return drawn.name == assumed.name and is_known and self.truth.flat_spot is None
-
-    @property
-    def parameters(self) -> int:
-        """Number of inferred parameters."""
-        return len(self.assumed.priors)
-
-    @property
-    def pivots(self) -> int:
-        """Number of pivots."""
-        return len(bases_of(self.assumed.record))
 
     def problem_of(self, measured: xr.Dataset) -> ContourProblem:
         """Return the inference problem of a measured record."""

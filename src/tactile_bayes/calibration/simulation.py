@@ -16,7 +16,7 @@ from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.record_likelihood.likelihood import events_of
 from tactile_bayes.inference.record_likelihood.rig_values import RigValues
 from tactile_bayes.load_cell.corruption import corrupted_angles
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, bases_of
 
 _TRIALS = 200  # largest number of truths that are drawn until the simulated rig reaches one
 
@@ -43,7 +43,7 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     for _ in range(_TRIALS):
         point, _ = model.draw_prior(rng, 1)
         contour = truth.contour(model.contours(point))
-        rig = truth.shifted(model.rig(point), experiment.pivots)
+        rig = truth.shifted(model.rig(point), len(bases_of(experiment.assumed.record)))
         loads, reached = likelihood.predict(contour, rig)
         if reached[0]:
             break

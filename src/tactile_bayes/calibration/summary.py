@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 import xarray as xr
@@ -34,13 +34,6 @@ class Repeated(Protocol):
 
     @property
     def probability(self) -> float: ...
-
-
-class _Fault(NamedTuple):
-    """A quantity or claim at fault."""
-
-    p_value: float
-    message: str
 
 
 def summary(experiment: Repeated, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
@@ -99,7 +92,7 @@ def summary(experiment: Repeated, outcomes: Mapping[int, Outcome]) -> xr.Dataset
         "not_converged": tally.unconverged,
         "probability": experiment.probability,
     }
-    reason = _uniform_and_covered(data) if concluded == "calibrated" else "; ".join(fault.message for fault in faults)
+    reason = _uniform_and_covered(data) if concluded == "calibrated" else "; ".join(message for _, message in faults)
     lost = {number: row.message for number, row in zip(numbers, rows, strict=True) if row.is_lost}
     data.attrs["verdict"] = " ".join([statement(concluded, tally, reason), *_further(data, ranks_noticed, lost)])
     return data
@@ -121,12 +114,12 @@ def _uniformity(ranks: Index) -> float:
     return uniformity_p_value(known, DRAWS) if known.size >= FEWEST else np.nan
 
 
-def _faults(data: xr.Dataset, probability: float, level: float) -> list[_Fault]:
-    """Return the quantities and claims whose p-value is at most a level, the least probable first."""
+def _faults(data: xr.Dataset, probability: float, level: float) -> list[tuple[float, str]]:
+    """Return p-values at most a level, with what is at fault, the least probable first."""
     faults = []
     for name, p_value in zip(data.quantity.values, data.rank_p_value.values, strict=True):
         if p_value <= level:
-            faults.append(_Fault(float(p_value), f"{name}: {_off(data['ranks'].sel(quantity=name).values, str(name))}"))
+            faults.append((float(p_value), f"{name}: {_off(data['ranks'].sel(quantity=name).values, str(name))}"))
     for name in data.claim.values:
         shares = data[str(name)].values
         shares = shares[np.isfinite(shares)]
@@ -135,7 +128,7 @@ def _faults(data: xr.Dataset, probability: float, level: float) -> list[_Fault]:
         share = float(shares.mean())
         p_value = float(coverage_p_value(share, shares.size, probability, is_whole=_is_whole(shares)))
         if p_value <= level:
-            faults.append(_Fault(p_value, f"{CLAIMS[str(name)]}: {share:.0%} hold, not {probability:.0%}"))
+            faults.append((p_value, f"{CLAIMS[str(name)]}: {share:.0%} hold, not {probability:.0%}"))
     return sorted(faults)
 
 

@@ -68,7 +68,7 @@ def left_out(log_densities: Floats) -> LeftOut:
     Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4. A small k̂ is no proof beside a jump: see
     `left_out_from_wider`.
     """
-    logs = _checked(log_densities)
+    logs = np.asarray(log_densities, dtype=np.float64)
     chains, draws, samples = logs.shape
     if chains * draws < _LEAST_DRAWS:
         raise ParameterError(f"log_densities has {chains * draws} draws: give {_LEAST_DRAWS} at least")
@@ -96,34 +96,13 @@ def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
     draws without the samples E, log-densities (chains, draws, events), it is Σ_s w_s p(y_i | θ_s) / Σ_s w_s with w_s =
     Π_{j in E, j ≠ i} p(y_j | θ_s).
     """
-    logs = _checked(log_densities)
-    if not 0 <= chosen < logs.shape[-1]:
-        raise ParameterError(f"chosen is {chosen!r}: give the index of one of {logs.shape[-1]} samples, from 0 on")
-    return reweighted(np.delete(logs, chosen, axis=-1).sum(axis=-1), logs[..., chosen])
-
-
-def reweighted(log_weights: Floats, log_density: Floats) -> FromWider:
-    """Return a mean density over draws, (chains, draws), from a wider distribution, weighted towards a narrower one.
-
-    For correlated samples, weights are the likelihood of all samples except one over that of those that were given.
-    """
-    weights, density = np.asarray(log_weights, dtype=np.float64), np.asarray(log_density, dtype=np.float64)
-    if weights.ndim != 2 or weights.shape != density.shape or not weights.size:
-        raise ParameterError(
-            f"log_weights has shape {weights.shape} and log_density {density.shape}: give (chains, draws) of both"
-        )
-    for name, values in (("log_weights", weights), ("log_density", density)):
-        if not (values < np.inf).all():
-            chain, draw = np.argwhere(~(values < np.inf))[0].tolist()
-            raise ParameterError(
-                f"{name} is {float(values[chain, draw])!r} at draw {draw} of chain {chain}: give finite numbers, or "
-                "-inf where a draw is impossible"
-            )
-    if not np.isfinite(weights).any():
+    logs = np.asarray(log_densities, dtype=np.float64)
+    log_weights, log_density = np.delete(logs, chosen, axis=-1).sum(axis=-1), logs[..., chosen]
+    if not np.isfinite(log_weights).any():
         return FromWider(math.nan, math.inf, 0.0)
-    weights = weighed(weights.ravel())[0].reshape(weights.shape)
-    effective = float(effective_number(np.exp(weights.ravel())))
-    found, error = _weighed(weights, density)
+    log_weights = weighed(log_weights.ravel())[0].reshape(log_weights.shape)
+    effective = float(effective_number(np.exp(log_weights.ravel())))
+    found, error = _weighed(log_weights, log_density)
     return FromWider(found, error if effective >= _LEAST_EFFECTIVE else math.inf, effective)
 
 
@@ -133,11 +112,6 @@ def difference(one: Floats, other: Floats) -> Difference:
     Equation 24 of Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4; below 4 or so a difference says little,
     and its standard error is too small (Sivula et al. 2020, arXiv 2008.10296).
     """
-    one, other = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
-    if one.ndim != 1 or one.shape != other.shape or one.size < 2:
-        raise ParameterError(
-            f"the log-densities have shapes {one.shape} and {other.shape}: give those of the same samples, 2 at least"
-        )
     by_sample = one - other
     return Difference(float(by_sample.sum()), float(math.sqrt(by_sample.size) * by_sample.std(ddof=1)))
 
@@ -149,15 +123,7 @@ def stacking_weights(log_densities: Floats) -> Floats:
     10.1214/17-BA1091).
     """
     logs = np.asarray(log_densities, dtype=np.float64)
-    if logs.ndim != 2 or not logs.size:
-        raise ParameterError(f"log_densities has shape {logs.shape}: give (models, samples)")
-    if not (logs < np.inf).all():
-        model, sample = np.argwhere(~(logs < np.inf))[0].tolist()
-        raise ParameterError(f"model {model} has a log-density of {float(logs[model, sample])!r} of sample {sample}")
-    best = logs.max(axis=0)
-    if (best == -np.inf).any():
-        raise ParameterError(f"no model allows sample {int(np.argmin(best))}: remove it, or add one that does")
-    densities = np.exp(logs - best)
+    densities = np.exp(logs - logs.max(axis=0))
 
     def loss(weights: Floats) -> tuple[float, Floats]:
         mixture = weights @ densities
@@ -180,16 +146,6 @@ def stacking_weights(log_densities: Floats) -> Floats:
     if not off <= _OFF:
         raise InferenceError(f"stacking did not converge ({found.message}): its weights may be {off:.1e} off the best")
     return np.asarray(weights)
-
-
-# ---- importance sampling
-
-
-def _checked(log_densities: Floats) -> Floats:
-    logs = np.asarray(log_densities, dtype=np.float64)
-    if logs.ndim != 3 or not logs.size:
-        raise ParameterError(f"log_densities has shape {logs.shape}: give (chains, draws, samples)")
-    return logs
 
 
 def _smoothed(log_density: Floats) -> tuple[Floats, float]:

@@ -1,9 +1,7 @@
 """Plans of a measurement: how its errors grow, what load cell and rod it needs, and where to sweep next."""
 
-from tactile_bayes.planning.bands import Bands
-from tactile_bayes.planning.criterion import Criterion
-from tactile_bayes.planning.design import design, usual_drives
-from tactile_bayes.planning.error_map import error_map
+from tactile_bayes.planning.design import Criterion, design, usual_drives
+from tactile_bayes.planning.error_map import Bands, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise, required_rod
 from tactile_bayes.planning.rest_of_sweep import rest_of_sweep

@@ -7,14 +7,18 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
+    check_choice,
+    check_numbers,
+    check_probability,
     check_switch,
     check_whole_number,
     refused,
@@ -26,7 +30,6 @@ from tactile_bayes.inference.result import record_of
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words, words
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
-from tactile_bayes.planning.criterion import Criterion, CriterionName, criterion_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, mean_of_known
 from tactile_bayes.planning.knowledge import Knowledge, known_from_posterior, known_from_prior
 from tactile_bayes.record import rod_of
@@ -40,6 +43,44 @@ _GRID_POINTS = 25  # number of grid points of x over the span
 # Default positions of pivots, over the rod's length.
 _ACROSS, _ABOVE = np.linspace(-0.5, 0.5, 11), np.array([-0.1, 0.0, 0.1])
 _NESTED = 400  # number of draws of each nested posterior
+
+
+CriterionName = Literal["band", "gap", "information"]
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """Criterion of the best candidate of a design, and the band that is meant.
+
+    Parameters
+    ----------
+    name : {"band", "gap", "information"}
+        The narrowest band, the smallest gap, or the most information.
+    span : (float, float), optional
+        Interval of x in which the band matters [length]; by default between the outermost first contacts of the sweeps
+        so far, or, for a prior, of sweeps from the origin; medians over the draws.
+    probability : float
+        Probability of the pointwise band, in (0, 1).
+
+    Raises
+    ------
+    ParameterError
+        If there is no such criterion, the span is empty, or the probability is impossible.
+    """
+
+    name: CriterionName = "band"
+    span: tuple[float, float] | None = None
+    probability: float = 0.95
+
+    def __post_init__(self) -> None:
+        check_choice("criterion", self.name, ("band", "gap", "information"))
+        object.__setattr__(self, "probability", check_probability("probability", self.probability))
+        if self.span is not None:
+            correction = "give two values of x, the smaller first"
+            left, right = check_numbers("span", self.span, correction, shape=(2,)).tolist()
+            if not left < right:
+                raise refused("span", self.span, correction)
+            object.__setattr__(self, "span", (left, right))
 
 
 def design(
@@ -139,7 +180,7 @@ def design(
     >>> bool(found.width[1] > found.width[0])  # farther away
     True
     """
-    criterion = criterion_of(criterion)
+    criterion = criterion if isinstance(criterion, Criterion) else Criterion(criterion)
     check_whole_number("draws", draws, 2)
     check_switch("nested", nested)
     seed = seed_sequence(rng)

@@ -6,7 +6,7 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from itertools import product
 from typing import Any
@@ -20,15 +20,16 @@ from tactile_bayes.checks import (
     check_mapping,
     check_names,
     check_numbers,
+    check_probability,
     check_whole_number,
     refused,
 )
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
+from tactile_bayes.inference.family import Family
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng, seed_sequence, seed_words
 from tactile_bayes.planning.amplification import METHODS
-from tactile_bayes.planning.bands import Bands
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
 from tactile_bayes.planning.knowledge import unmeasured
@@ -48,10 +49,44 @@ _LENGTHS = (
     "posterior_touched_width",
     "posterior_gap_width",
 )
-_DRIVE, _BANDS = Rotation(drive_step=float(np.radians(2.0))), Bands()
 # Axes of the map beside the contours, with their usual values.
 _AXES = {"distance": (0.5,), "noise_factor": (0.1, 0.3, 1.0, 3.0)}
 _SHARES = ("posterior_touched_coverage", "posterior_gap_coverage", "posterior_failed")
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Bands of the contours of an error map, expected ones in every cell and those of posteriors in some.
+
+    Parameters
+    ----------
+    probability : float
+        Probability of the bands, in (0, 1).
+    family : Family, optional
+        As in `Plan`: that of all contours, with priors of its parameters.
+    posterior_cells : int
+        Number of cells, evenly over the map, in which posteriors are inferred; each takes seconds.
+    posterior_replicates : int
+        Number of posteriors in such a cell.
+
+    Raises
+    ------
+    ParameterError
+        If a number is impossible.
+    """
+
+    probability: float = 0.95
+    family: Family | None = None
+    posterior_cells: int = 0
+    posterior_replicates: int = 2
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "probability", check_probability("probability", self.probability))
+        for name, least in (("posterior_cells", 0), ("posterior_replicates", 1)):
+            object.__setattr__(self, name, check_whole_number(name, getattr(self, name), least))
+
+
+_DRIVE, _BANDS = Rotation(drive_step=float(np.radians(2.0))), Bands()
 
 
 def error_map(

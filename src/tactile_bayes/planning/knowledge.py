@@ -33,24 +33,13 @@ COARSE = float(np.radians(5.0))  # step of the drive for records of which only t
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """Draws of the possible truth, and models of records from other pivots.
+    """Draws of the possible truth, and models of records from other pivots."""
 
-    Attributes
-    ----------
-    experiment : Experiment
-        Experiment on an empty record of the drives so far, or of a rotation about the origin if there are none.
-    points : ndarray, shape (n, d)
-        Draws of the contour's parameters, the rig's and the noise's, in the order of the names of `model`.
-    precision : ndarray, shape (d, d)
-        Inverse of the covariance of the draws.
-    drives : tuple of Rotation or Carried
-        Drives of the sweeps so far.
-    """
-
+    # Experiment on an empty record of the drives so far, or of a rotation about the origin if there are none.
     experiment: Experiment
-    points: Floats
-    precision: Floats
-    drives: tuple[Drive, ...]
+    points: Floats  # draws of the parameters of contour, rig and noise, as `model` names them, shape (n, d)
+    precision: Floats  # inverse of the covariance of the draws, shape (d, d)
+    drives: tuple[Drive, ...]  # drives of the sweeps so far
 
     @property
     def bases(self) -> tuple[Base, ...]:

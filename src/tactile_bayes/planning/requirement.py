@@ -36,22 +36,17 @@ _LEAST_TOUCHED = 0.5  # least share of the grid points of the plan's own rod tha
 _LEAST, _MOST = 1e-6, 1e4  # range of factors on the noise in which the required one is sought
 
 
-class _Band:
-    """The expected width of a plan's band, as a function of a factor on its noise."""
+def _width_by_noise(plan: Plan, x: Floats, probability: float) -> Callable[[float], float]:
+    """Return the expected mean width of a plan's band over grid points [length], as a function of a noise factor."""
+    model, point = plan.model, plan.point
+    slopes, prior, wide = height_slopes(model, point, x), prior_precision(model), band_factor(probability)
 
-    def __init__(self, plan: Plan, x: Floats, probability: float) -> None:
-        model, point = plan.model, plan.point
-        self._plan = plan
-        self._slopes = height_slopes(model, point, x)
-        self._prior = prior_precision(model)
-        self._wide = band_factor(probability)
+    def width(factor: float) -> float:
+        cell = plan.with_noise(factor).cell
+        gained = record_information(model, point, slopes=plan.reading_slopes, load_cell=cell).matrix
+        return wide * float(deviation_of_heights(slopes, gained + prior).mean())
 
-    def width(self, factor: float) -> float:
-        """Return the mean width over the grid points [length]."""
-        plan, cell = self._plan, self._plan.with_noise(factor).cell
-        gained = record_information(plan.model, plan.point, slopes=plan.reading_slopes, load_cell=cell).matrix
-        spread = deviation_of_heights(self._slopes, gained + self._prior)
-        return self._wide * float(spread.mean())
+    return width
 
 
 def required_noise(
@@ -88,8 +83,8 @@ def required_noise(
     check_probability("probability", probability)
     several = band_width if np.iterable(band_width) else [band_width]
     wanted = check_numbers("band_width", several, "give a positive length, or several", shape=(None,), least=TINY)
-    band = _Band(plan, _grid_points(plan, where), probability)
-    least, most = band.width(_LEAST), band.width(_MOST)
+    width_at = _width_by_noise(plan, _grid_points(plan, where), probability)
+    least, most = width_at(_LEAST), width_at(_MOST)
     if np.any(wanted <= least):
         raise ParameterError(
             f"no noise gives a band of {wanted.min():g}: without any it would be {least:.3g} wide, by the unknowns "
@@ -99,19 +94,19 @@ def required_noise(
         math.inf
         if width >= most
         else math.exp(
-            brentq(lambda log, width=width: band.width(math.exp(log)) - width, math.log(_LEAST), math.log(_MOST))
+            brentq(lambda log, width=width: width_at(math.exp(log)) - width, math.log(_LEAST), math.log(_MOST))
         )
         for width in wanted
     ]
-    unit = {"units": "1" if plan.record.attrs["units"] == "dimensionless" else "m"}
     si = plan.record.attrs["units"] != "dimensionless"
+    unit = {"units": "m" if si else "1"}
     cell = plan.cell
     return xr.Dataset(
         {
             "noise_factor": ("band_width", np.array(factors)),
             "force_noise": ("band_width", np.array(factors) * cell.force_noise, {"units": "N" if si else "EI/L²"}),
             "moment_noise": ("band_width", np.array(factors) * cell.moment_noise, {"units": "N m" if si else "EI/L"}),
-            "present_width": ((), band.width(1.0), unit),
+            "present_width": ((), width_at(1.0), unit),
             "prior_width": ((), most, unit),
         },
         coords={"band_width": ("band_width", wanted, unit)},
@@ -226,7 +221,7 @@ def _judged(plan: Plan, elastic_strain: float, x: Floats, probability: float) ->
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StrainWarning)
             strain = max(sweep.largest_strain for sweep in plan.scan.sweeps)
-            width = _Band(plan, x, probability).width(1.0)
+            width = _width_by_noise(plan, x, probability)(1.0)
     except ReachError:
         return math.nan, strain, "does not reach"
     except (ContourError, ParameterError):

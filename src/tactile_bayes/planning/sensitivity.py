@@ -120,6 +120,6 @@ def sensitivity(
         "rod_flexural_rigidity": rod.flexural_rigidity,
         "force_noise": plan.cell.force_noise,
         "moment_noise": plan.cell.moment_noise,
-        "words": "\n".join(sensitivity_summary(tree, plan)),
+        "words": "\n".join(sensitivity_summary(tree, plan.record.attrs["units"] != "dimensionless")),
     }
     return tree

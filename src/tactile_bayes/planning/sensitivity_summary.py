@@ -8,18 +8,12 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.planning.plan import Plan
 
 _NAMES = {"holding_moment": "the moment", "force_x": "force_x", "force_y": "force_y", "drive_angle": "the drive angle"}
 
 
-def sensitivity_summary(tree: xr.DataTree, plan: Plan) -> tuple[str, ...]:
-    """Return sentences on the main results of a sensitivity analysis."""
-    si = plan.record.attrs["units"] != "dimensionless"
-    return tuple(_sentences(tree, si))
-
-
-def _sentences(tree: xr.DataTree, si: bool) -> Iterator[str]:
+def sensitivity_summary(tree: xr.DataTree, si: bool) -> Iterator[str]:
+    """Yield sentences on the main results of a sensitivity analysis."""
     if "amplification" in tree:
         grown = tree["amplification"].to_dataset()
         for method in grown.reconstruction.values:

@@ -10,7 +10,7 @@ import xarray as xr
 
 from tactile_bayes import plotting
 from tactile_bayes.calibration.calibrate import calibrate
-from tactile_bayes.calibration.store import REPLICATES
+from tactile_bayes.calibration.replicate import REPLICATES
 from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.names import CALIBRATION
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from tactile_bayes import plotting
 from tactile_bayes.diagnostics.inspection import Inspection
-from tactile_bayes.diagnostics.inspection.shown_rig import shown_rig
+from tactile_bayes.diagnostics.inspection.inspection import shown_rig
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.rig import Rig
 from tactile_bayes.rig.rig_file import file_of

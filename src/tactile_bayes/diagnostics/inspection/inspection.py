@@ -5,29 +5,35 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.checks import check_function, check_probability
 from tactile_bayes.diagnostics.inspection.fit import Fit, fit_of
-from tactile_bayes.diagnostics.inspection.known_cell import known_cell
-from tactile_bayes.diagnostics.inspection.messages import UNFIT, inspection_messages
+from tactile_bayes.diagnostics.inspection.messages import UNFIT, far_off, inspection_messages
 from tactile_bayes.diagnostics.inspection.stretches import unloaded_stretches
 from tactile_bayes.diagnostics.inspection.tables import channel_table, sample_table, sweep_table
 from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
-from tactile_bayes.errors import DriftWarning
+from tactile_bayes.diagnostics.verdicts import OFF_ZERO
+from tactile_bayes.errors import DriftWarning, RecordError
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import contacts_of
 from tactile_bayes.record import CHANNELS, present_channels, rows_of_sweeps, validate, with_rod
+from tactile_bayes.record.origin import column_entry
 from tactile_bayes.rig.corrected import corrected
 from tactile_bayes.rig.parameters import GROUPS
 from tactile_bayes.rig.rig import Rig, rig_of
 
 # Number of steps of an inspection: unloaded samples, Step 2, fit of contacts; each correction tried adds one.
 _STEPS = 3
+_MOVED = 1e-3  # probability that a zero which stays where it is seems to have moved as far between unloaded stretches
+_DIGITS = 3  # number of significant digits of a noise that is estimated
+
+CellSource = Literal["given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +187,22 @@ def inspect_record(
     )
 
 
+def known_cell(measured: xr.Dataset, given: LoadCell | None = None) -> tuple[LoadCell | None, CellSource]:
+    """Return the given load cell, or the record's data sheet, or an estimate from unloaded samples, and its source."""
+    if given is not None:
+        return given, "given"
+    stated = LoadCell.from_record(measured)
+    if stated is not None:
+        return stated, "data sheet"
+    try:
+        found = LoadCell.from_zero_load(measured)
+    except RecordError:
+        return None, "too few unloaded samples"
+    present = present_channels(measured)
+    noisy = all(found.standard_deviations[name] for name in present)
+    return (found, "unloaded samples") if noisy else (None, "nothing")
+
+
 def _with_zero(cell: LoadCell | None, found: xr.Dataset) -> LoadCell:
     """Return the load cell with the bias that the record shows; a message of its own reports a forgotten tare."""
     if not np.isfinite(found["bias"].values).any():
@@ -188,3 +210,33 @@ def _with_zero(cell: LoadCell | None, found: xr.Dataset) -> LoadCell:
     one, two, three = np.nan_to_num(found["bias"].values).tolist()
     uncertainty = np.nan_to_num(found["bias_uncertainty"].values).tolist()
     return replace(cell or LoadCell(), bias=(one, two, three), bias_uncertainty=tuple(uncertainty))
+
+
+def shown_rig(found: Inspection, rig: Rig) -> Rig:
+    """Return the rig of an inspected record, with what its unloaded samples show and nobody states.
+
+    That is the noise, and zeros that are clearly off and stay where they are: they are added to the columns of the
+    file.
+    """
+    columns = {name: column_entry(found.record[name], added=-zero) for name, zero in _zeros(found)}
+    columns = {name: text for name, text in columns.items() if text}
+    rig = replace(rig, file=replace(rig.format, columns={**rig.format.columns, **columns}))
+    cell = found.load_cell
+    if found.load_cell_source != "unloaded samples" or cell is None:
+        return rig
+    force_noise, moment_noise = (float(f"{noise:.{_DIGITS}g}") for noise in (cell.force_noise, cell.moment_noise))
+    stated = rig.load_cell or LoadCell()
+    return replace(rig, load_cell=replace(stated, force_noise=force_noise, moment_noise=moment_noise))
+
+
+def _zeros(found: Inspection) -> Iterator[tuple[str, float]]:
+    """Yield the channels whose zeros are off by many standard errors, or, beside a stated cell, more than it allows."""
+    is_stated = found.load_cell_source in ("given", "data sheet")
+    far = far_off(found.record, found.channels, found.load_cell if is_stated else None)
+    for name in found.channels.channel.values.tolist():
+        row = found.channels.sel(channel=name)
+        zero, error = float(row.bias), float(row.bias_uncertainty)
+        has_moved = float(row.same_bias_p_value) < _MOVED
+        is_off = abs(zero) > OFF_ZERO * error > 0.0 and not is_stated
+        if (name in far or is_off) and not has_moved:
+            yield name, zero
