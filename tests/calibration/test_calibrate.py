@@ -135,9 +135,9 @@ def test_a_failure_is_an_outcome_whatever_it_comes_from(with_lost):
     rows = json.loads((folder / REPLICATES.file).read_text(encoding="utf-8"))["replicates"]
     for number, (stage, words) in enumerate(STAGES.items()):
         row = rows[number]
-        assert (row["number"], row["ranks"], row["message"]) == (number, {}, f"_StrangeError: an error {words}")
+        assert (row["number"], row["ranks"], row["message"]) == (number, {}, f"StrangeError: an error {words}")
         assert f"{stage}(" in row["traceback"]
-        assert row["traceback"].endswith(f"_StrangeError: an error {words}\n")
+        assert row["traceback"].endswith(f"StrangeError: an error {words}\n")
         assert (str(found.message[number].values), str(found.traceback[number].values)) == (
             row["message"],
             row["traceback"],
@@ -159,7 +159,7 @@ def test_what_is_lost_is_named_with_the_way_to_it(with_lost):
     found, _ = with_lost
     said = found.attrs["verdict"]
     assert said.startswith("Too few replicates to judge: 1 posteriors, and at least 20 are needed. ")
-    assert "3 lost, in which no claim holds: 0, 1, 2 (_StrangeError). To see why, add --replicate 0 --debug" in said
+    assert "3 lost, in which no claim holds: 0, 1, 2 (StrangeError). To see why, add --replicate 0 --debug" in said
 
 
 def test_what_is_lost_is_kept(with_lost, monkeypatch):

@@ -2,18 +2,12 @@
 
 import pytest
 
+from helpers.tasks import StrangeError
 from tactile_bayes.calibration import replicate as module
 
 # Functions that fail in replicates 0, 1 and 2, and what their errors say.
 STAGES = {"simulate": "of the simulation", "sampled": "of inference", "_snap_offs": "of what comes after"}
 _REPLICATE = module.replicate
-
-
-class _StrangeError(Exception):
-    """Cannot be made again from its arguments: its class wants two."""
-
-    def __init__(self, one: str, two: str) -> None:
-        super().__init__(f"{one} {two}")
 
 
 def failing(task):
@@ -24,7 +18,7 @@ def failing(task):
     stage, words = list(STAGES.items())[number]
 
     def fail(*arguments, **options):
-        raise _StrangeError("an error", words)
+        raise StrangeError("an error", words)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, stage, fail)

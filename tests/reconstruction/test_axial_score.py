@@ -1,4 +1,6 @@
-"""Agreement of the force along the rod with the moment, of rods that vary along their length."""
+"""Agreement of the force along the rod with the moment, of straight rods and of such that vary along their length."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,33 +40,33 @@ def test_that_of_an_arc_is_the_same_by_its_first_integral_and_by_step_2(curvatur
         assert varied == pytest.approx(arc, abs=0.1 * share)
 
 
-@pytest.mark.parametrize(
-    ("count", "cell", "friction"),
-    [
-        (40, CELL, 0.0),
-        pytest.param(200, CELL, 0.0, marks=pytest.mark.slow),
-        pytest.param(200, CELL, 0.3, marks=pytest.mark.slow),
-        pytest.param(200, LoadCell(force_noise=0.15, moment_noise=0.06), 0.0, marks=pytest.mark.slow),
-        pytest.param(
-            200,
-            LoadCell(force_noise=0.05, moment_noise=0.02, frame="turning", drive_angle_noise=0.01),
-            0.0,
-            marks=pytest.mark.slow,
-        ),
-    ],
-)
-def test_that_of_a_tapered_rod_is_standard_normal(count, cell, friction):
+NOISY = {
+    "tapered, few": (TAPERED, 40, CELL, 0.0),
+    "tapered": (TAPERED, 200, CELL, 0.0),
+    "tapered, friction": (TAPERED, 200, CELL, 0.3),
+    "tapered, much noise": (TAPERED, 200, LoadCell(force_noise=0.15, moment_noise=0.06), 0.0),
+    "tapered, turning": (TAPERED, 200, replace(CELL, frame="turning", drive_angle_noise=0.01), 0.0),
+    "straight, few": (Rod(), 30, CELL, 0.0),
+    "straight, encoder": (Rod(), 30, replace(CELL, drive_angle_noise=0.01), 0.0),
+    "straight, turning": (Rod(), 30, replace(CELL, frame="turning", drive_angle_noise=0.01), 0.0),
+}
+
+
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=[] if "few" in k else [pytest.mark.slow]) for k in NOISY])
+def test_it_is_standard_normal(kind):
     """Mean within 4.5 standard errors, and spread within 4, of which normal numbers have 1e-4 together."""
-    record = swept(TAPERED, 8.0, friction)
+    rod, count, cell, friction = NOISY[kind]
+    record = swept(rod, 8.0, friction)
     scores = [score(record, seed, cell, friction=friction) for seed in range(count)]
     assert abs(np.mean(scores)) < 4.5 / np.sqrt(count)
     assert abs(np.std(scores) - 1.0) < 4.0 / np.sqrt(2.0 * count)
 
 
-def test_unstated_friction_makes_that_of_a_tapered_rod_negative():
-    record = swept(TAPERED, friction=0.3)
+@pytest.mark.parametrize(("rod", "friction"), [(TAPERED, 0.3), (Rod(), 0.1)])
+def test_unstated_friction_makes_it_negative(rod, friction):
+    record = swept(rod, friction=friction)
     assert score(record, 1) < -20.0
-    assert abs(score(record, 1, friction=0.3)) < 4.0
+    assert abs(score(record, 1, friction=friction)) < 4.0
 
 
 def test_a_straight_rod_taken_for_a_tapered_one_makes_it_large():

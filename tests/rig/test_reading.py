@@ -6,7 +6,7 @@ import xarray as xr
 
 from helpers.record_tables import WIRE, columns
 from helpers.refusals import refused
-from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.errors import RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.record import rod_of, with_rod, write_record
@@ -45,8 +45,3 @@ def test_a_rod_without_a_length_gives_the_shape_of_the_one_in_the_file(tmp_path)
     assert rod_of(with_rod(make_record(columns()), Rod(taper=0.4))) == Rod(taper=0.4)
     with refused(RecordError, "but"):
         read_record(tmp_path / "record.csv", Rig(rod=Rod(2 * WIRE.length, 1.0)))
-
-
-def test_what_is_no_rig_is_refused(path):
-    with refused(ParameterError, "rig"):
-        read_record(path, "rig.toml")

@@ -11,7 +11,7 @@ from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import rod_of
 from tactile_bayes.rig.parameters import GROUPS, parameter_named
-from tactile_bayes.rig.rig import rod_with
+from tactile_bayes.rig.stated import rod_with
 
 _NOISES = ("force_noise", "moment_noise", "relative_noise")
 

@@ -97,6 +97,12 @@ class Contour(ABC):
                 raise refused(name, values, wanted) from None
         return numbers
 
+    def _own(self, name: str, values: ArrayLike) -> Floats:
+        """Return the argument of a method that is the contour's own parameter, NaN beyond the ends."""
+        numbers, (lo, hi) = self._at(name, values), self.domain
+        with np.errstate(invalid="ignore"):
+            return np.where((numbers >= lo) & (numbers <= hi), numbers, np.nan)
+
     def end_name(self, side: Literal["left", "right"]) -> str:
         """Description of the end on one side, for messages."""
         return "where it ends"
@@ -327,9 +333,7 @@ class Graph(Contour):
         return np.asarray(-np.inf), np.asarray(np.inf)
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        x, (lo, hi) = self._at("x", x), self.domain
-        with np.errstate(invalid="ignore"):
-            return np.where((x >= lo) & (x <= hi), x, np.nan)
+        return self._own("x", x)
 
     @np.errstate(over="ignore", invalid="ignore")
     def locate(self, parameter: ArrayLike) -> Locus:

@@ -33,46 +33,24 @@ Values = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Flank:
-    """Contours with a vertex at height q above x_c and one formula, on one side of it or on both.
+    """Contours with a vertex at height q above x_c and one formula, on one side of it or on both."""
 
-    Parameters
-    ----------
-    contour : type
-        Class of the contours, which has the parameters as attributes.
-    table : mapping of str to FamilyParameter
-        Parameters of the flank by name.
-    start : callable
-        Maps a in y = a x² to parameters by name, in rod lengths, of a flank with about the same curvature.
-    miss : callable
-        Maps points relative to the vertex, and parameters by name, to their approximate distances from the flank.
-    build : callable, optional
-        Maps parameters by name, with q and x_c, to contours; by default the class.
-    is_always_clear : bool
-        Whether a rod is clear of every such contour after snap-off.
-    """
-
-    contour: type[Contour]
-    table: Mapping[str, FamilyParameter]
+    contour: type[Contour]  # class of the contours, which has the parameters as attributes
+    table: Mapping[str, FamilyParameter]  # parameters of the flank by name
+    # Maps a in y = a x² to parameters by name, in rod lengths, of a flank with about the same curvature.
     start: Callable[[float], dict[str, float]]
+    # Maps points relative to the vertex, and parameters by name, to their approximate distances from the flank.
     miss: Callable[[Floats, Floats, Values], Floats]
-    build: Callable[..., Contour] | None = None
-    is_always_clear: bool = False
+    build: Callable[..., Contour] | None = None  # maps parameters by name, with q and x_c, to contours; else the class
+    is_always_clear: bool = False  # whether a rod is clear of every such contour after snap-off
 
 
 @dataclass(frozen=True)
 class FlankFamily(ContourFamily):
-    """Family of contours with one flank on both sides, or with two different flanks.
-
-    Parameters
-    ----------
-    name : str
-        Name that users give.
-    flanks : mapping of str to Flank
-        Flanks by the prefix of the names of their parameters: "" for one flank, "left_" and "right_" for two.
-    """
+    """Family of contours with one flank on both sides, or with two different flanks."""
 
     name: str
-    flanks: Mapping[str, Flank]
+    flanks: Mapping[str, Flank]  # by the prefix of their parameters: "" for one flank, "left_" and "right_" for two
 
     @cached_property
     def table(self) -> dict[str, FamilyParameter]:  # type: ignore[override]

@@ -90,8 +90,7 @@ class Circle(_Oval):
         return Locus(x, y, alpha, radius, np.ones_like(alpha))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = self._at("slope_angle", slope_angle)
-        return np.where(np.abs(alpha) <= 0.5 * np.pi, alpha, np.nan)
+        return self._own("slope_angle", slope_angle)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,8 +65,7 @@ class Parabola(Vertexed):
         return Locus(*alike(x, y, alpha, radius, np.ones(alpha.shape)))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = self._at("slope_angle", slope_angle)
-        return np.where(np.abs(alpha) < 0.5 * np.pi, alpha, np.nan)
+        return self._own("slope_angle", slope_angle)
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         return np.asarray(np.arctan(2.0 * self.a * (self._at("x", x) - self.x_c)))

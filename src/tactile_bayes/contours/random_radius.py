@@ -32,21 +32,13 @@ class RandomRadius:
 
     The covariance of g is Matérn's with ν = 5/2 (Rasmussen & Williams 2006, equation 4.17), so that curvature changes
     smoothly; the mean over slope angles from −π/2 to π/2 is subtracted.
-
-    Parameters
-    ----------
-    shortest, longest : float
-        Range of the length scale [rad].
-    tolerance : float
-        Share of the variance of g that is neglected at the shortest length scale; it determines the number of terms.
-    nodes : int
-        Number of values that define a contour.
     """
 
-    shortest: float
+    shortest: float  # range of the length scale [rad]
     longest: float
+    # Share of the variance of g that is neglected at the shortest length scale; it determines the number of terms.
     tolerance: float
-    nodes: int = 64
+    nodes: int = 64  # number of values that define a contour
 
     @property
     def count(self) -> int:

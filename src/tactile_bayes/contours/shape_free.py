@@ -125,6 +125,4 @@ class ShapeFree(Tabled):
         return Locus(x, y, alpha, np.exp(log_radius), np.ones_like(alpha))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = self._at("slope_angle", slope_angle)
-        with np.errstate(invalid="ignore"):
-            return np.where((alpha >= self.slope_angles[0]) & (alpha <= self.slope_angles[-1]), alpha, np.nan)
+        return self._own("slope_angle", slope_angle)

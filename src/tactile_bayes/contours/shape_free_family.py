@@ -37,17 +37,10 @@ _POINTS = 500  # largest number of points of a fit, which is a first guess for a
 
 @dataclass(frozen=True)
 class ShapeFreeFamily(ContourFamily):
-    """Family of all smooth contours between vertical ends.
-
-    Parameters
-    ----------
-    name : str
-    radius : RandomRadius
-        Prior of the radius of curvature.
-    """
+    """Family of all smooth contours between vertical ends."""
 
     name: str
-    radius: RandomRadius
+    radius: RandomRadius  # prior of the radius of curvature
 
     @cached_property
     def table(self) -> dict[str, FamilyParameter]:  # type: ignore[override]

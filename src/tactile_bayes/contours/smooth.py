@@ -101,9 +101,7 @@ class Smooth(Tabled):
         return Locus(self.x_c + x, self.q + y, alpha, speed, np.ones_like(alpha))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = self._at("slope_angle", slope_angle)
-        with np.errstate(invalid="ignore"):
-            return np.where(np.abs(alpha) <= _UPRIGHT, alpha, np.nan)
+        return self._own("slope_angle", slope_angle)
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         x = self._at("x", x)

@@ -17,44 +17,23 @@ class SweepFrame:
     """A batch of n contours of one family, each in the frame of a sweep with its own pivot.
 
     The rod's centreline stays `standoff` (half the rod's diameter) outside the object: it traces the parallel curve,
-    which is strictly convex too. In this frame all sweeps are forward ones.
-
-    Parameters
-    ----------
-    contour : Contour
-        Contours whose parameters are all arrays of shape (n,).
-    base_x, base_y : ndarray, shape (n,)
-        Pivots, in the contour's unit of length.
-    length : float or ndarray, shape (n,)
-        Length of the rod, in the same unit.
-    standoff : float or ndarray, shape (n,)
-        Half the rod's diameter, in the same unit.
-    mirrored : ndarray of bool, shape (n,)
-        Whether the sweep is a backward one.
-    rest_curvature : float or ndarray, shape (n,)
-        Curvature of the unloaded rod in the laboratory frame, > 0 counter-clockwise [1/rod length]; of a rod whose
-        curvature varies along it, what is added to it.
-    taper : float or ndarray, shape (n,)
-        Taper of the rod.
-    stem : float or ndarray, shape (n,)
-        Rigid piece between pivot and rod [rod length].
-    way : float or ndarray, shape (n,)
-        Farthest that a drive carries the base to either side of the pivot [rod length].
-    rest_shape : float or ndarray, shape (n, modes)
-        Amplitudes of the modes of the rest curvature, in the laboratory frame.
+    which is strictly convex too. In this frame all sweeps are forward ones. Lengths are in the contour's unit, and what
+    is not an array of shape (n,) holds for all contours.
     """
 
-    contour: Contour
-    base_x: Floats
+    contour: Contour  # contours whose parameters are all arrays of shape (n,)
+    base_x: Floats  # pivots
     base_y: Floats
-    length: Parameter
+    length: Parameter  # of the rod
     standoff: Parameter
-    mirrored: Flags
+    mirrored: Flags  # whether the sweep is a backward one
+    # Curvature of the unloaded rod in the laboratory frame, > 0 counter-clockwise [1/rod length]; of a rod whose
+    # curvature varies along it, what is added to it.
     rest_curvature: Parameter = 0.0
     taper: Parameter = 0.0
-    stem: Parameter = 0.0
-    way: Parameter = 0.0
-    rest_shape: Parameter = 0.0
+    stem: Parameter = 0.0  # rigid piece between pivot and rod [rod length]
+    way: Parameter = 0.0  # farthest that a drive carries the base to either side of the pivot [rod length]
+    rest_shape: Parameter = 0.0  # amplitudes of the modes of the rest curvature, laboratory frame, (n, modes)
 
     @property
     def size(self) -> int:

@@ -67,17 +67,20 @@ def is_weak(loads: Floats, covariance: Floats) -> Flags:
         return np.asarray(squared < _WEAK**2 * noise)
 
 
+def squared_distance(x: Floats, y: Floats, covariance: Floats) -> Floats:
+    """Return the squared Mahalanobis distance of points in the plane, for covariances of shape (n, ≥ 2, ≥ 2)."""
+    xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
+    return np.asarray((yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy))
+
+
 def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, Floats]]) -> Flags:
     """Return where contacts one standard deviation aside contradict a covariance of first order.
 
     Shapes: place (n, 4), covariance (n, 4, 4), aside (n, ≥ 2) → (n,).
     """
-    xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
     bent = np.zeros(len(place), dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        area = xx * yy - xy * xy
         for more, less in aside:
             x, y = (0.5 * (more[:, axis] + less[:, axis]) - place[:, axis] for axis in (0, 1))
-            shift = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / area
-            bent |= ~((shift <= MOST_BEND**2) | (x * x + y * y < _ROUNDING**2))
+            bent |= ~((squared_distance(x, y, covariance) <= MOST_BEND**2) | (x * x + y * y < _ROUNDING**2))
     return bent

@@ -17,6 +17,7 @@ from tactile_bayes.reconstruction.estimate import (
     RIVAL,
     Estimate,
     is_weak,
+    squared_distance,
     unanswered,
 )
 from tactile_bayes.reconstruction.samples import Samples
@@ -63,6 +64,5 @@ def _is_ambiguous(fit: RawFit, has_noise: bool) -> Flags:
         if not has_noise:
             apart = np.hypot(x, y) > _APART[1]
             return np.asarray(apart & (fit.other_deviation**2 < (1.0 + RIVAL) * (fit.deviation + _ROUNDING) ** 2))
-        xx, yy, xy = fit.covariance[:, 0, 0], fit.covariance[:, 1, 1], fit.covariance[:, 0, 1]
-        squared = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
-        return np.asarray((squared > _APART[0] ** 2) & (fit.other_deviation**2 < fit.deviation**2 + RIVAL))
+        apart = squared_distance(x, y, fit.covariance) > _APART[0] ** 2
+        return np.asarray(apart & (fit.other_deviation**2 < fit.deviation**2 + RIVAL))

@@ -228,17 +228,15 @@ def _variables(
         with np.errstate(divide="ignore", invalid="ignore"):
             correlation = covariance[:, 0, 1] / (spread[0] * spread[1])
     length = rod.length_unit
-    columns = {
-        "contact_x": measured.base_x.values + place[:, 0] * length,
-        "contact_y": measured.base_y.values + place[:, 1] * length,
-        "contact_arclength": place[:, 3] * length,
-        "slope_angle": place[:, 2],
-    }
-    other_columns = {
-        "contact_x": measured.base_x.values + other[:, 0] * length,
-        "contact_y": measured.base_y.values + other[:, 1] * length,
-        "contact_arclength": other[:, 3] * length,
-    }
+    contact, other_contact = (
+        {
+            "contact_x": measured.base_x.values + one[:, 0] * length,
+            "contact_y": measured.base_y.values + one[:, 1] * length,
+            "contact_arclength": one[:, 3] * length,
+        }
+        for one in (place, other)
+    )
+    columns = contact | {"slope_angle": place[:, 2]}
     units = measured.attrs["units"]
     unit_of_length = COLUMNS["contact_x"].unit_in(units)
 
@@ -248,7 +246,7 @@ def _variables(
     variables: dict[str, tuple[str, object, object]] = {
         name: ("sample", values, column_attributes(name, units)) for name, values in columns.items()
     }
-    for name, values in other_columns.items():
+    for name, values in other_contact.items():
         variables[f"other_{name}"] = column(values, unit_of_length, f"{COLUMNS[name].long_name} of the other contact")
     variables["contact_phase"] = column(np.array(PHASE_NAMES).take(estimate.phase), "1", "phase of the contact")
     variables["status"] = column(np.array(STATUSES).take(estimate.status), "1", "what became of the sample")

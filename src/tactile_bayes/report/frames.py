@@ -16,7 +16,7 @@ from tactile_bayes.inference.stored_experiment import likelihood_of
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.record import rod_of, rows_of_sweeps
-from tactile_bayes.rig.rig import rod_with
+from tactile_bayes.rig.stated import rod_with
 from tactile_bayes.sweep import ManyUnits, to_lab_frame
 
 _MOST = 900  # largest number of samples shown; of a longer record every second, or third, and so on

@@ -43,8 +43,27 @@ class Parameter(NamedTuple):
     hidden: str = ""  # when no record shows it, or which one does not
 
 
+# Which records do not show some of them.
 _NO_MOMENT = "without the moment"
 _NO_TURN = "in sweeps of one direction, where drive_angle_offset has the same effect, and where the base is carried"
+_BESIDE_GAINS = "beside the gains of all channels, which have the same effect"
+_BESIDE_LEVER = "beside the lever where the base is only carried without turning"
+_UNTRACED = "unless the rod was traced"
+_UNMEASURED = "unless diameters were measured along the rod"
+_NO_GAUGE = "unless the contour is that of a gauge"
+_NO_NOISE, _NOISE = "unless the load cell states a noise", "where the load cell states its noise"
+
+_MOST_FRICTION = float(np.tan(MAX_FRICTION_ANGLE))
+_LEVER = "of the point to which the moment refers, from the pivot, in the cell's frame"
+_SHAPE = "of the rest curvature, in standard deviations of its trace"
+
+
+def _of_channels(what: str, meaning: str) -> Iterator[Parameter]:
+    """Yield a change of the zero of each channel, in tenths of its unit."""
+    for channel in _CHANNELS:
+        unit = "N m" if channel == "moment" else "N"
+        yield Parameter(f"{channel}_{what}", meaning.format(channel), unit, "normal", 0.1, of_moment=1)
+
 
 _ROWS = (
     Parameter(
@@ -55,32 +74,14 @@ _ROWS = (
         0.05,
         1.0,
         0.0,
-        hidden="beside the gains of all channels, which have the same effect",
+        hidden=_BESIDE_GAINS,
     ),
     Parameter(
         "drive_angle_offset", "reading of the encoder less the angle", "rad", "normal", _DEGREE, 0.0, -np.pi, np.pi
     ),
+    *_of_channels("bias", "reading of {} without load, in the middle of the record"),
     *(
-        Parameter(
-            f"{channel}_bias",
-            f"reading of {channel} without load, in the middle of the record",
-            "N m" if channel == "moment" else "N",
-            "normal",
-            0.1,
-            of_moment=1,
-        )
-        for channel in _CHANNELS
-    ),
-    *(
-        Parameter(
-            f"lever_{axis}",
-            f"{axis} of the point to which the moment refers, from the pivot, in the cell's frame",
-            "m",
-            "normal",
-            0.005,
-            of_length=1,
-            hidden=_NO_MOMENT,
-        )
+        Parameter(f"lever_{axis}", f"{axis} {_LEVER}", "m", "normal", 0.005, of_length=1, hidden=_NO_MOMENT)
         for axis in "xy"
     ),
     Parameter(
@@ -95,26 +96,9 @@ _ROWS = (
         hidden=_NO_TURN,
     ),
     Parameter(
-        "friction",
-        "Coulomb's coefficient between rod and object",
-        "1",
-        "half_normal",
-        0.3,
-        0.0,
-        0.0,
-        float(np.tan(MAX_FRICTION_ANGLE)),
+        "friction", "Coulomb's coefficient between rod and object", "1", "half_normal", 0.3, 0.0, 0.0, _MOST_FRICTION
     ),
-    *(
-        Parameter(
-            f"{channel}_drift",
-            f"change of the zero of {channel} from the first sample to the last, linear",
-            "N m" if channel == "moment" else "N",
-            "normal",
-            0.1,
-            of_moment=1,
-        )
-        for channel in _CHANNELS
-    ),
+    *_of_channels("drift", "change of the zero of {} from the first sample to the last, linear"),
     *(
         Parameter(f"{channel}_gain", f"reading of {channel} over the load", "1", "normal", 0.02, 1.0, 0.0)
         for channel in _CHANNELS
@@ -151,23 +135,11 @@ _ROWS = (
     ),
     Parameter("rest_curvature", "mean curvature of the unloaded rod", "1/m", "normal", 0.05, None, of_length=-1),
     *(
-        Parameter(
-            f"rest_shape_{k}",
-            f"amplitude of mode {k} of the rest curvature, in standard deviations of its trace",
-            "1",
-            "normal",
-            1.0,
-            hidden="unless the rod was traced",
-        )
+        Parameter(f"rest_shape_{k}", f"amplitude of mode {k} {_SHAPE}", "1", "normal", 1.0, hidden=_UNTRACED)
         for k in range(1, MOST_MODES + 1)
     ),
     Parameter(
-        "taper_error",
-        "error of the measured taper, in its standard deviations",
-        "1",
-        "normal",
-        1.0,
-        hidden="unless diameters were measured along the rod",
+        "taper_error", "error of the measured taper, in its standard deviations", "1", "normal", 1.0, hidden=_UNMEASURED
     ),
     Parameter("taper", "part by which the diameter falls to the tip", "1", "normal", 0.05, None, 0.0, STEEPEST_TAPER),
     Parameter(
@@ -179,20 +151,14 @@ _ROWS = (
         None,
         0.0,
         of_length=1,
-        hidden="beside the lever where the base is only carried without turning",
+        hidden=_BESIDE_LEVER,
     ),
     Parameter("length", "length of the rod", "m", "normal", 0.01, None, 0.0, of_length=1),
     *(
         Parameter(
-            f"gauge_{axis}",
-            f"{axis} of the gauge less the stated one",
-            "m",
-            "normal",
-            0.01,
-            of_length=1,
-            hidden="unless the contour is that of a gauge",
+            f"gauge_{a}", f"{a} of the gauge less the stated one", "m", "normal", 0.01, of_length=1, hidden=_NO_GAUGE
         )
-        for axis in "xy"
+        for a in "xy"
     ),
     Parameter(
         "discrepancy_scale",
@@ -220,7 +186,7 @@ _ROWS = (
         0.5,
         1.0,
         0.0,
-        hidden="unless the load cell states a noise",
+        hidden=_NO_NOISE,
     ),
     Parameter(
         "moment_noise",
@@ -231,7 +197,7 @@ _ROWS = (
         None,
         0.0,
         of_moment=1,
-        hidden="where the load cell states its noise",
+        hidden=_NOISE,
     ),
     Parameter(
         "force_noise",
@@ -242,7 +208,7 @@ _ROWS = (
         None,
         0.0,
         of_moment=1,
-        hidden="where the load cell states its noise",
+        hidden=_NOISE,
     ),
 )
 

@@ -18,12 +18,13 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rods.rod import Rod
 from tactile_bayes.numerics.random_numbers import Rng
 from tactile_bayes.record import rod_of, validate
+from tactile_bayes.rig.corrected import measured_by
 from tactile_bayes.rig.drawn import drawn_numbers
 from tactile_bayes.rig.file_format import FileFormat
-from tactile_bayes.rig.measured import measured_by
 from tactile_bayes.rig.parameters import GROUPS, STANDARD, members
 from tactile_bayes.rig.rig_file import named_in_errors, read_tables, stated_in, tables_of, text_of, write_file
 from tactile_bayes.rig.rig_prior import RigPrior
+from tactile_bayes.rig.stated import rod_with
 from tactile_bayes.rig.unknown import DEFAULT, Unknown, checked_unknown, expanded
 from tactile_bayes.tasks.documents import read_toml
 
@@ -303,12 +304,3 @@ def rig_of(rig: Rig | None) -> Rig:
     """Return a rig, by default one that says nothing."""
     check_optional("rig", rig, Rig, "give Rig(rod=..., load_cell=...), or Rig.read(path)")
     return rig or Rig()
-
-
-def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
-    """Return a rod of the shape that unknowns of the rig by name give it, others than those of shape without effect."""
-    names = GROUPS["rest_shape"][: len(rod.rest_shape_modes)]
-    rod, length = rod.shaped([rig.get(name, 0.0) for name in names]), rig.get("length", rod.length)
-    curvature = rig.get("rest_curvature", rod.mean_rest_curvature * rod.length / length)
-    taper = rig.get("taper", float(rod.tapered_by(rig.get("taper_error", 0.0))))
-    return rod.reshaped(curvature, taper, rig.get("stem"), length)

@@ -22,28 +22,16 @@ class RigPrior:
     """Joint prior of parameters of a rig: marginals, joined by a normal copula.
 
     With normal and log-normal marginals it is a multivariate normal distribution of the parameters or their logarithms.
-
-    Parameters
-    ----------
-    priors : mapping of str to frozen scipy.stats distribution
-        Marginals by name: normal, log-normal, or truncated normal where a parameter may be zero but not negative.
-    correlation : ndarray, shape (parameters, parameters)
-        Correlations of the parameters' normal scores.
-    error : float
-        Largest difference between quantiles of draws and density, along each parameter and each principal axis, in
-        standard deviations; with several records of gauges, that of the worst density.
-    source : str
-        SHA-256 of the record of the gauge, or of all of them with blanks between.
-    stated : mapping
-        Attributes of the posterior that state rod, load cell, frame and units, of which the parameters are deviations.
-    posterior : xr.DataTree, optional
-        The posterior itself.
     """
 
+    # Marginals by name: normal, log-normal, or truncated normal where a parameter may be zero but not negative.
     priors: Mapping[str, Distribution]
-    correlation: Floats
+    correlation: Floats  # of the parameters' normal scores, shape (parameters, parameters)
+    # Largest difference between quantiles of draws and density, along each parameter and each principal axis, in
+    # standard deviations; with several records of gauges, that of the worst density.
     error: float
-    source: str
+    source: str  # SHA-256 of the record of the gauge, or of all of them with blanks between
+    # Attributes of the posterior that state rod, load cell, frame and units, of which the parameters are deviations.
     stated: Mapping[str, Any] = field(default_factory=dict)
     posterior: xr.DataTree | None = None
 

@@ -118,3 +118,12 @@ def cell_with(cell: LoadCell, rig: Mapping[str, float]) -> LoadCell:
         drive_angle_offset=cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
         drive_angle_backlash=cell.drive_angle_backlash + rig.get("backlash", 0.0),
     )
+
+
+def rod_with(rod: Rod, rig: Mapping[str, float]) -> Rod:
+    """Return a rod of the shape that unknowns of the rig by name give it, others than those of shape without effect."""
+    names = GROUPS["rest_shape"][: len(rod.rest_shape_modes)]
+    rod, length = rod.shaped([rig.get(name, 0.0) for name in names]), rig.get("length", rod.length)
+    curvature = rig.get("rest_curvature", rod.mean_rest_curvature * rod.length / length)
+    taper = rig.get("taper", float(rod.tapered_by(rig.get("taper_error", 0.0))))
+    return rod.reshaped(curvature, taper, rig.get("stem"), length)

@@ -29,7 +29,8 @@ from tactile_bayes.inference.stored_experiment import contact_points
 from tactile_bayes.numerics.random_numbers import Rng
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import carried_sweeps, rod_of, validate, with_rod
-from tactile_bayes.rig.rig import Rig, rig_of, rod_with
+from tactile_bayes.rig.rig import Rig, rig_of
+from tactile_bayes.rig.stated import rod_with
 from tactile_bayes.runs.folder import Folder, panels
 from tactile_bayes.runs.names import INFERENCE, OF_POSTERIOR, WATCH_PAGE
 from tactile_bayes.sweep import Scan, recorded_drives, scan

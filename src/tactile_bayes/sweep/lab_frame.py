@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,18 +10,10 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.paths import States
+from tactile_bayes.rig.stated import Units
 
 
-class RodUnits(Protocol):
-    """Units of dimensionless loads: a `Rod`, or arrays for many rods."""
-
-    @property
-    def moment_unit(self) -> Any: ...
-    @property
-    def force_unit(self) -> Any: ...
-
-
-def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
+def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: Units) -> dict[str, NDArray[Any]]:
     """Convert states to the laboratory frame, with units. Shapes: index (...) → (...)."""
     mirrored = sweep_frame.mirrored[index]
     sign = np.where(mirrored, -1.0, 1.0)

@@ -138,7 +138,8 @@ def equilibria(
     >>> states.drive_angle.values.round(6), states.contact_phase.values.tolist()
     (array([3.154275, 1.994616]), ['tip', 'tangential'])
     """
-    alpha = np.atleast_1d(_floats(slope_angles))
+    numbers = as_numbers(slope_angles)
+    alpha = np.atleast_1d(np.nan if numbers is None else numbers)
     if alpha.ndim != 1 or not np.all(np.abs(alpha) < 0.5 * np.pi):
         raise ParameterError("slope_angles must be a list of angles in (−π/2, π/2) radians")
     pivots = check_pivots("base", base)
@@ -254,8 +255,10 @@ def scan(
     >>> round(result.events["forward"].snap_off.drive_angle, 6)
     3.154275
     """
-    acts, short = acting(rig), {"direction": direction, "drive_step": drive_step, "drive_angles": drive_angles}
-    drives = _rotations(base, short) if drive is None else drives_of(drive)
+    acts = acting(rig)
+    short: dict[str, Any] = {"direction": direction, "drive_step": drive_step, "drive_angles": drive_angles}
+    pivots: list[Drive] = [Rotation(pivot, **short) for pivot in check_pivots("base", base)] if drive is None else []
+    drives = pivots or drives_of(drive)
     if drive is not None and (given := _given(base, short)):
         raise ParameterError(
             f"{given} is for rotations without a drive: give it to the drive, as in Rotation({given}=…)"
@@ -305,11 +308,6 @@ def _shifted(drives: list[Drive], rig: Rig) -> list[Drive]:
         elif isinstance(one, Rotation | Translation):
             found.append(replace(one, base=(place[0] + x, place[1] + y)))
     return found
-
-
-def _rotations(base: Any, options: Mapping[str, Any]) -> list[Drive]:
-    """Return a rotation about each pivot."""
-    return [Rotation(pivot, **options) for pivot in check_pivots("base", base)]
 
 
 def _given(base: Any, options: Mapping[str, Any]) -> str | None:
@@ -375,12 +373,6 @@ def _within_a_turn(drive: Rotation, every: Floats, sweep: SweepEvents) -> Index:
             stacklevel=4,
         )
     return np.asarray(chosen[kept][:: int(sense)])
-
-
-def _floats(values: ArrayLike) -> Floats:
-    """Return numbers as an array, or NaN if they are not numbers."""
-    numbers = as_numbers(values)
-    return np.asarray(np.nan) if numbers is None else numbers
 
 
 def _warn_of(sweep: SweepEvents, drive: Drive, rod: Rod) -> None:

@@ -18,6 +18,7 @@ from tactile_bayes.inference.result import contour_draws, posterior_draws, recor
 from tactile_bayes.inference.stored_experiment import likelihood_of
 from tactile_bayes.mechanics.contacts.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
+from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS, record_hash, validate
 from tactile_bayes.record.schema import column_attributes
@@ -149,9 +150,8 @@ def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> 
     inferred, angle = unknowns.names, likelihood.segments.drive_angles
     contours = contours_of(picked, posterior.attrs["family"])
     values = {name: picked[name].values.ravel() for name in inferred}
-    every = np.arange(contours.shape[0])
     parts = []
-    for block in np.array_split(every, -(-every.size // _BLOCK)):
+    for block in blocks(contours.shape[0], 1, _BLOCK):
         rig = unknowns.rig({name: of_draws[block] for name, of_draws in values.items()})
         parts.append(contacts_of(likelihood, contours.take(block), rig, angle))
     shape = (picked.sizes["chain"], picked.sizes["draw"], -1)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.roots import bound_ends, falling_root
 from tactile_bayes.uncertainty.band import contours_drawn, grid_points, length_unit
 from tactile_bayes.uncertainty.quantiles import quantile_band
@@ -116,11 +117,9 @@ def normal_offsets(contours: Contour, x: Floats, y: Floats, slope_angle: Floats)
     """
     count = contours.shape[0]
     contours = contours.broadcast_to((count,))
-    step = max(1, _BLOCK // max(1, x.size))
     offsets = np.full((count, x.size), np.nan)
     given = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(slope_angle))
-    for begin in range(0, count, step):
-        row = np.arange(begin, min(begin + step, count))
+    for row in blocks(count, x.size, _BLOCK // max(1, x.size) or 1):
         many = contours.take(np.repeat(row, given.size))
         feet = [np.tile(values[given], row.size) for values in (x, y, slope_angle)]
         offsets[row[:, None], given] = _offsets(many, *feet).reshape(row.size, given.size)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_probability
 from tactile_bayes.inference.result import refuse_no_contour
+from tactile_bayes.uncertainty.quantiles import central_levels
 
 
 def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
@@ -43,11 +43,10 @@ def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr
     (5.0, 95.0)
     """
     refuse_no_contour(posterior, "posterior_predictive")
-    check_probability("probability", probability)
-    levels = {"lower": 0.5 * (1.0 - probability), "upper": 0.5 * (1.0 + probability)}
+    lower, _, upper = central_levels(probability)
     out = {}
     for name, values in posterior["posterior_predictive"].to_dataset().items():
-        for bound, level in levels.items():
+        for bound, level in (("lower", lower), ("upper", upper)):
             edge = np.quantile(values.values, level, axis=(0, 1))
             out[f"{name}_{bound}"] = ("sample", edge, values.attrs)
     frame = {name: posterior.attrs[name] for name in ("load_cell_frame",) if name in posterior.attrs}

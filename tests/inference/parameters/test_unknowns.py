@@ -26,7 +26,7 @@ from tactile_bayes.record import CHANNELS
 from tactile_bayes.record.attributes import same_rod
 from tactile_bayes.rig import NOTHING, Rig, make_record
 from tactile_bayes.rig.parameters import GROUPS
-from tactile_bayes.rig.rig import rod_with
+from tactile_bayes.rig.stated import rod_with
 from tactile_bayes.sweep import Translation, scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
