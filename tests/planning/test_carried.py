@@ -50,12 +50,16 @@ def test_distances_are_along_the_drive():
     travel = 0.8 - found.base_x.values
     np.testing.assert_allclose(found.after_first_contact, travel - sweep.first_contact.travel, atol=1e-12)
     np.testing.assert_allclose(found.before_snap_off, sweep.snap_off.travel - travel, atol=1e-12)
+    assert {found[name].attrs["units"] for name in ("after_first_contact", "before_snap_off")} == {"1"}
+    both = amplification(Plan(CIRCLE, Rig(load_cell=CELL), drive=[tb.Rotation(), SHIFTS[0]]))
+    assert both.before_snap_off.attrs["units"] == "rad, 1"
 
 
 def test_noise_shares_are_of_either_kind_of_drive():
     shares = noise_shares(Plan(CIRCLE, Rig(load_cell=CELL), drive=SHIFTS), rng=1, samples=16, states=4)
     assert shares.sizes["sample"] == 8
     assert np.all(shares.after_first_contact >= 0.0)
+    assert shares.after_first_contact.attrs["units"] == "1"
     with refused(ParameterError, "noise_shares"):
         noise_shares(Plan(CIRCLE, Rig(load_cell=CELL), drive=[tb.Rotation(), SHIFTS[0]]), rng=1, samples=16, states=4)
 

@@ -312,6 +312,8 @@ def _left_out(predicted: Sequence[PredictedSamples | None]) -> dict[str, Any]:
     sampled = np.array([of_family is not None for of_family in predicted])
     logs = np.array([of_family.log_density for of_family in known])
     common = np.isfinite(logs).all(axis=0)
+    if np.count_nonzero(common) < 2:
+        raise ParameterError("fewer than two samples are possible under all families: they cannot be compared")
     elpd = logs[:, common].sum(axis=1)
     apart = [difference(of_family, logs[np.argmax(elpd), common]) for of_family in logs[:, common]]
     columns = {

@@ -20,7 +20,7 @@ from tactile_bayes.mechanics.contacts.contact_coordinates import (
 from tactile_bayes.mechanics.rods.profile import Rods
 from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.record import CHANNELS, carried_sweeps, travels_of
+from tactile_bayes.record import CHANNELS, carried_sweeps, travel_unit, travels_of
 from tactile_bayes.record.frame import to_fixed_axes
 from tactile_bayes.rig.stated import cell_with
 from tactile_bayes.sweep import Rotation
@@ -90,14 +90,15 @@ def amplification(plan: Plan) -> xr.Dataset:
         ]
     )
     unit = {"units": "1" if record.attrs["units"] == "dimensionless" else "m"}
+    along = {"units": travel_unit(record)}
     dims = ("reconstruction", "sample")
     gain, sd = np.array(both) * per_unit, np.array(deviations) * rod.length
     return xr.Dataset(
         {
             **{name: ("sample", chosen[name].values, chosen[name].attrs) for name in _COLUMNS},
             **{name: ("sample", chosen[f"truth_{name}"].values, chosen[f"truth_{name}"].attrs) for name in _TRUTHS},
-            "after_first_contact": ("sample", distances[0], {"units": "rad"}),
-            "before_snap_off": ("sample", distances[1], {"units": "rad"}),
+            "after_first_contact": ("sample", distances[0], along),
+            "before_snap_off": ("sample", distances[1], along),
             "gain_along": ((*dims, "source"), gain[:, 0]),
             "gain_across": ((*dims, "source"), gain[:, 1]),
             "sd_along": (dims, sd[:, 0], unit),

@@ -231,6 +231,9 @@ def _gaps(known: Knowledge, candidate: Candidate, usable: Flags) -> Floats:
     gaps = []
     for of_draw in ends:
         arcs = sorted(map(tuple, of_draw[np.isfinite(of_draw).all(axis=1)]))
+        if not arcs:
+            gaps.append(np.nan)
+            continue
         reach, open_width = arcs[0][1], 0.0
         for begin, end in arcs[1:]:
             open_width += max(0.0, begin - reach)

@@ -17,7 +17,7 @@ from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence,
 from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.reconstruction import turned_sweeps
-from tactile_bayes.record import carried_sweeps, travels_of
+from tactile_bayes.record import carried_sweeps, travel_unit, travels_of
 
 _STATES = 15  # default number of states in each sweep
 _ERRORS = ("along", "across")
@@ -65,6 +65,7 @@ def noise_shares(
         for out, index in zip((first, total), found, strict=True):
             out[m] = np.where(answered[..., None], index.reshape(shape[1:]), np.nan)
     length = {"units": "1" if quiet.attrs["units"] == "dimensionless" else "m"}
+    along = {"units": travel_unit(quiet)}
     dims = ("reconstruction", "sample", "error")
     columns = ("sweep", "direction", "drive_angle", "base_x", "base_y")
     sweeps = plan.scan.sweeps
@@ -77,7 +78,7 @@ def noise_shares(
             **{name: ("sample", chosen[name].values, chosen[name].attrs) for name in columns},
             "contact_phase": ("sample", chosen.truth_contact_phase.values),
             **{
-                name: ("sample", np.abs(chosen.travel.values - of[chosen.sweep.values]), {"units": "rad"})
+                name: ("sample", np.abs(chosen.travel.values - of[chosen.sweep.values]), along)
                 for name, of in events.items()
             },
             "share": ((*dims, "source"), first),

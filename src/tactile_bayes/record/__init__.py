@@ -17,7 +17,7 @@ from tactile_bayes.record.schema import (
     column_of,
     present_channels,
 )
-from tactile_bayes.record.sweep import base_of_sample, bases_of, carried_sweeps, rows_of_sweeps, travels_of
+from tactile_bayes.record.sweep import base_of_sample, bases_of, carried_sweeps, rows_of_sweeps, travel_unit, travels_of
 from tactile_bayes.record.units import rod_of, to_dimensionless, to_si, with_rod
 from tactile_bayes.record.validation import validate
 
@@ -45,6 +45,7 @@ __all__ = [
     "rows_of_sweeps",
     "to_dimensionless",
     "to_si",
+    "travel_unit",
     "travels_of",
     "turned",
     "validate",

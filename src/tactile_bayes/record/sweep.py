@@ -149,6 +149,13 @@ def travels_of(record: xr.Dataset) -> Floats:
     return travels
 
 
+def travel_unit(record: xr.Dataset) -> str:
+    """Return the unit of travels: "rad", that of lengths, or both for drives of either kind."""
+    carried = len(carried_sweeps(record))
+    lengths = "1" if record.attrs["units"] == "dimensionless" else "m"
+    return lengths if carried == len(np.unique(record.sweep)) else f"rad, {lengths}" if carried else "rad"
+
+
 def bases_of(record: xr.Dataset) -> list[tuple[float, float]]:
     """Return the pivots (x, y) of a record, and where drives that carry the base begin [length], in its order."""
     return base_of_sample(record)[0]
