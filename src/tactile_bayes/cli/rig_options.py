@@ -93,7 +93,8 @@ class NoiseOptions:
     """Noise of a load cell."""
 
     force_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²], in place of one that is stated.")
+        float | None,
+        typer.Option(help="Standard deviation of the forces [N, or EI/L²], in place of one that is stated."),
     ] = None
     moment_noise: Annotated[
         float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; likewise.")
