@@ -20,7 +20,7 @@ from tactile_bayes.mechanics.contacts.contact_coordinates import (
 from tactile_bayes.mechanics.rods.profile import Rods
 from tactile_bayes.mechanics.rods.surface import Surface
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.record import CHANNELS, carried_sweeps, travel_unit, travels_of
+from tactile_bayes.record import CHANNELS, COLUMNS, carried_sweeps, travel_unit, travels_of
 from tactile_bayes.record.frame import to_fixed_axes
 from tactile_bayes.rig.stated import cell_with
 from tactile_bayes.sweep import Rotation
@@ -89,7 +89,7 @@ def amplification(plan: Plan) -> xr.Dataset:
             for of_method in deviations
         ]
     )
-    unit = {"units": "1" if record.attrs["units"] == "dimensionless" else "m"}
+    unit = {"units": COLUMNS["base_x"].unit_in(record.attrs["units"])}
     along = {"units": travel_unit(record)}
     dims = ("reconstruction", "sample")
     gain, sd = np.array(both) * per_unit, np.array(deviations) * rod.length

@@ -10,7 +10,7 @@ from tactile_bayes.inference.contour_groups import unit_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, record_information
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, COLUMNS
 
 
 def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
@@ -45,7 +45,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
         for kind in ("touched", "gap")
     }
     units = [unit_of(model, name) for name in model.names]
-    length = {"units": "1" if plan.record.attrs["units"] == "dimensionless" else "m"}
+    length = {"units": COLUMNS["base_x"].unit_in(plan.record.attrs["units"])}
     columns = ("sweep", "direction", "drive_angle", "base_x", "base_y")
     present = [name for name, there in zip(CHANNELS, model.present, strict=True) if there]
     return xr.Dataset(

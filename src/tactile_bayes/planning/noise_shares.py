@@ -17,7 +17,7 @@ from tactile_bayes.numerics.random_numbers import Rng, generator, seed_sequence,
 from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.reconstruction import turned_sweeps
-from tactile_bayes.record import carried_sweeps, travel_unit, travels_of
+from tactile_bayes.record import COLUMNS, carried_sweeps, travel_unit, travels_of
 
 _STATES = 15  # default number of states in each sweep
 _ERRORS = ("along", "across")
@@ -64,7 +64,7 @@ def noise_shares(
         answered = np.asarray(~np.any(missing, axis=-1))
         for out, index in zip((first, total), found, strict=True):
             out[m] = np.where(answered[..., None], index.reshape(shape[1:]), np.nan)
-    length = {"units": "1" if quiet.attrs["units"] == "dimensionless" else "m"}
+    length = {"units": COLUMNS["base_x"].unit_in(quiet.attrs["units"])}
     along = {"units": travel_unit(quiet)}
     dims = ("reconstruction", "sample", "error")
     columns = ("sweep", "direction", "drive_angle", "base_x", "base_y")

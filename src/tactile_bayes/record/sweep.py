@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.record.quantity import unit_of
 from tactile_bayes.record.rig_entry import file_entry
-from tactile_bayes.record.schema import DIRECTIONS, LARGEST_DRIVE_ANGLE
+from tactile_bayes.record.schema import COLUMNS, DIRECTIONS, LARGEST_DRIVE_ANGLE
 from tactile_bayes.record.table import Source
 
 
@@ -152,7 +152,7 @@ def travels_of(record: xr.Dataset) -> Floats:
 def travel_unit(record: xr.Dataset) -> str:
     """Return the unit of travels: "rad", that of lengths, or both for drives of either kind."""
     carried = len(carried_sweeps(record))
-    lengths = "1" if record.attrs["units"] == "dimensionless" else "m"
+    lengths = COLUMNS["base_x"].unit_in(record.attrs["units"])
     return lengths if carried == len(np.unique(record.sweep)) else f"rad, {lengths}" if carried else "rad"
 
 

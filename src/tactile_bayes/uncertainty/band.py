@@ -17,6 +17,7 @@ from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.numerics.selection import evenly_spread
+from tactile_bayes.record import COLUMNS
 from tactile_bayes.uncertainty.averaged_contours import averaged_heights, family_weights
 from tactile_bayes.uncertainty.quantiles import quantile_band
 from tactile_bayes.uncertainty.rod_reach import BEYOND_REACH, beyond_reach
@@ -129,4 +130,4 @@ def grid_points(x: ArrayLike) -> Floats:
 
 def length_unit(posterior: xr.DataTree | xr.Dataset) -> dict[str, Any]:
     """Attributes of lengths in the record's unit."""
-    return {"units": "1" if posterior.attrs["units"] == "dimensionless" else "m"}
+    return {"units": COLUMNS["base_x"].unit_in(posterior.attrs["units"])}
