@@ -3,13 +3,12 @@
 import json
 from functools import partial
 
-import numpy as np
 import pytest
 from PIL import Image
 
 from helpers import commands
+from tactile_bayes import paper_figures
 from tactile_bayes.paper_figures import caption
-from tactile_bayes.sweep import Motion, Translation
 
 QUICK = ["--only", "3", "--only", "7", "--distance", "0.5", "--drive-step", "5", "--rods", "3"]
 
@@ -63,27 +62,6 @@ def test_noise_is_said_in_the_caption(tmp_path):
     assert "measured with noise (seed 4)" in result.stdout
 
 
-def test_a_base_is_carried_along_a_line_or_poses(tmp_path):
-    poses = tmp_path / "poses.csv"
-    poses.write_text("x,y,drive_angle\n1.4,0,90\n-1.4,0,90\n")
-    quick = ["--out", tmp_path, *QUICK[:6], "--rods", 3, "--format", "png", "--drive-step", 0.1]
-    drives = {
-        "translation": ("--carry", "1.4,0,180,90,2.8", Translation((1.4, 0.0), np.pi, 0.5 * np.pi, 2.8)),
-        "motion": ("--carry", poses, Motion([1.4, -1.4], 0.0, 0.5 * np.pi)),
-    }
-    for name, (option, value, drive) in drives.items():
-        result = run(*quick, option, value)
-        assert result.exit_code == 0, result.output
-        assert result.stdout.splitlines() == [
-            line
-            for number in (3, 7)
-            for line in (
-                f"Figure {number}: {caption(number, distances=[0.5], drive=drive)}",
-                f"    {tmp_path / f'figure_{number:02d}_{name}.png'}",
-            )
-        ]
-
-
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
@@ -94,9 +72,6 @@ def test_a_base_is_carried_along_a_line_or_poses(tmp_path):
         (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
         (["--only", "3", "--drive-step", "90"], "--drive-step is 90"),
         (["--only", "2", "--distance", "0.3"], "figure 2 shows tip contact"),
-        (["--only", "3", "--carry", "1.4,0,180", "--drive-step", 0.1], "5 numbers"),
-        (["--only", "3", "--carry", "1.4,0,180,90,2.8", "--carry", "1,0,180,90,2"], "figures show one drive"),
-        (["--only", "3", "--carry", "1.4,0,180,90,2.8", "--distance", "1.2"], "profile I at the distance q = 1.2"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
@@ -105,9 +80,7 @@ def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
 
 
 def test_an_interrupt_says_what_is_there(tmp_path, monkeypatch):
-    from tactile_bayes.paper_figures import files
-
-    make, made = files.figure, []
+    make, made = paper_figures.figure, []
 
     def interrupted(number, **options):
         if made:
@@ -115,7 +88,7 @@ def test_an_interrupt_says_what_is_there(tmp_path, monkeypatch):
         made.append(number)
         return make(number, **options)
 
-    monkeypatch.setattr(files, "figure", interrupted)
+    monkeypatch.setattr(paper_figures, "figure", interrupted)
     result = run("--out", tmp_path, *QUICK, "--format", "svg")
     assert result.exit_code == 130
     assert f"1 of 2 figures are in {tmp_path}: the same command draws all of them again" in result.stderr

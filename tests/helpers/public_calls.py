@@ -695,7 +695,6 @@ def _figure_calls(folder: Path) -> dict[str, Call]:
     figure = {
         "number": 3,
         "distances": [0.5],
-        "drive": None,
         "drive_step": 0.1,
         "rods": 3,
         "load_cell": None,

@@ -76,18 +76,18 @@ class DriveOptions(CarryOptions):
                 "--drive-step: rotations and drives that carry the base have their default steps in one record; leave "
                 "it out, or scan them one by one"
             )
-        step = self.rotation_step
+        step = rotation_step(self.drive_step)
         return [*(Rotation(pivot, direction, step) for pivot in pivots_in(base)), *self.carried()]
 
-    @property
-    def rotation_step(self) -> float | None:
-        """The step of rotations [rad]; ParameterError if no rotation has it."""
-        from tactile_bayes.errors import ParameterError
 
-        (low, high), step = _STEPS, self.drive_step
-        if step is not None and not low <= step <= high:
-            raise ParameterError(f"--drive-step is {step:g}: give a step of rotations from {low:g} to {high:g} degrees")
-        return None if step is None else math.radians(step)
+def rotation_step(step: float | None) -> float | None:
+    """Return the step of rotations [rad] that is asked for in degrees; ParameterError if no rotation has it."""
+    from tactile_bayes.errors import ParameterError
+
+    low, high = _STEPS
+    if step is not None and not low <= step <= high:
+        raise ParameterError(f"--drive-step is {step:g}: give a step of rotations from {low:g} to {high:g} degrees")
+    return None if step is None else math.radians(step)
 
 
 def _is_file(text: str) -> bool:

@@ -8,7 +8,7 @@ import typer
 
 from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Seed, Writes
-from tactile_bayes.cli.drive_options import DriveOptions
+from tactile_bayes.cli.drive_options import rotation_step
 from tactile_bayes.cli.progress import resumable_bar
 from tactile_bayes.cli.rig_options import NoiseOptions
 from tactile_bayes.runs.names import FIGURES
@@ -28,7 +28,7 @@ def figures(
         list[float] | None,
         typer.Option(help="Height of the profile above the origin, q [L]; may be repeated; default the figure's own."),
     ] = None,
-    drive: DriveOptions,
+    drive_step: Annotated[float | None, typer.Option(help="Step of the drive [degrees], by default 1.")] = None,
     rods: Annotated[int, typer.Option(help="Number of rods drawn of a sweep in figures 7 to 10.", min=1)] = 15,
     noise: NoiseOptions,
     seed: Seed = 1,
@@ -42,23 +42,18 @@ def figures(
 ) -> Answer:
     """Draw Figures 2 to 11 of Merker et al. 2018 (doi 10.1155/2018/1613945) from our own computation.
 
-    The drive turns the rod about the origin, as in the paper, or carries its base (--carry, once). Numbers are in units
-    of the rod (L, EI/L, EI/L²). Noise is that of the loads in figure 11, by default none.
+    Numbers are in units of the rod (L, EI/L, EI/L²). Noise is that of the loads in figure 11, by default none.
     """
     from tactile_bayes.errors import ParameterError
     from tactile_bayes.paper_figures import NUMBERS, caption, draw_all
     from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
     from tactile_bayes.tasks import TaskProgress
 
-    carried = drive.carried(drive.drive_step)
-    if len(carried) > 1:
-        raise ParameterError(f"figures show one drive, and there are {len(carried)}: give --carry once")
     if (not noise.force_noise) != (not noise.moment_noise):
         raise ParameterError("--force-noise and --moment-noise go together, above zero: give both, or neither")
     options: dict[str, Any] = {
         "distances": distance or None,
-        "drive": carried[0] if carried else None,
-        "drive_step": None if carried else drive.rotation_step,
+        "drive_step": rotation_step(drive_step),
         "rods": rods,
         "load_cell": noise.in_place_of(None),
         "rng": seed,

@@ -26,8 +26,6 @@ COARSE = np.radians(4.0)
 COARSER = np.radians(12.0)
 PROFILES = ("I", "II", "III", "IV")
 
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
-
 
 def made(number, **options):
     with style("print"):
@@ -353,7 +351,7 @@ def test_nothing_is_written_where_something_is_wrong(tmp_path, options, named):
 def test_what_was_there_stays_when_a_figure_fails(tmp_path, monkeypatch):
     path = draw_all(tmp_path, only=[3], formats=["svg"], distances=[0.5], drive_step=COARSER)[3]["svg"]
     before = path.read_bytes()
-    monkeypatch.setattr(paper_figures.files, "_save", lambda made, path, *rest: path.write_text("half") and 1 / 0)
+    monkeypatch.setattr(paper_figures, "_save", lambda made, path, *rest: path.write_text("half") and 1 / 0)
     with pytest.raises(ZeroDivisionError):
         draw_all(tmp_path, only=[3], formats=["svg"], distances=[0.4], drive_step=COARSER)
     assert [found.name for found in tmp_path.iterdir()] == [path.name]
