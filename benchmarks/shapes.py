@@ -112,7 +112,7 @@ def record(task: tuple[str, str, int]) -> Outcome:
     if truth.family is not None:
         known = tb.infer_contour(measured, family=truth.family, rig=rig, rng=number, settings=SETTINGS)
         _, known_width, _ = compared(known, contour, gap)
-    passed = bool(tb.diagnostics.check_record(result).attrs["passed"])
+    passed = bool(tb.check(result).predictive.passed)
     return Outcome(in_gap, out_of_gap, width, off, known_width, seconds, bool(result.attrs["converged"]), passed)
 
 

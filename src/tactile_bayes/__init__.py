@@ -44,6 +44,7 @@ _HOMES = {
     "Translation": "sweep",
     "calibrate": "calibration.calibrate",
     "calibrate_rig": "inference.contour",
+    "check": "diagnostics.result_check",
     "compare_families": "comparison.families",
     "contour_band": "uncertainty.band",
     "design": "planning.design",
@@ -63,7 +64,6 @@ _HOMES = {
     "sensitivity": "planning.sensitivity",
     "to_arviz": "inference.result",
     "trust": "assessment.trust",
-    "verdicts": "diagnostics.verdicts",
     "write_record": "record",
     "write_report": "report",
     "write_result": "inference.result",
@@ -90,7 +90,7 @@ if TYPE_CHECKING:
     from tactile_bayes.calibration.calibrate import calibrate as calibrate
     from tactile_bayes.comparison.families import compare_families as compare_families
     from tactile_bayes.diagnostics.inspection import inspect_record as inspect_record
-    from tactile_bayes.diagnostics.verdicts import verdicts as verdicts
+    from tactile_bayes.diagnostics.result_check import check as check
     from tactile_bayes.inference.contact_posterior import infer_contacts as infer_contacts
     from tactile_bayes.inference.contour import calibrate_rig as calibrate_rig
     from tactile_bayes.inference.contour import infer_contour as infer_contour

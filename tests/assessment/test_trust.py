@@ -60,7 +60,7 @@ def test_a_narrow_prior_of_the_vertex_sets_the_gap():
     found = trust(tree, rng=1, replicates=0, assumptions=False)
     assert found.attrs["conclusion"] == "holds, but the prior sets the gap"
     assert "The band in the gap is set by the prior, that of the contour." in found.attrs["words"]
-    *_, said, _ = tb.verdicts(tree, trust=found)  # the last one names q, of which the record adds little
+    *_, said, _ = tb.check(tree, trust=found).messages  # the last one names q, of which the record adds little
     assert said.startswith("The band of probability 0.95 holds beside the gap")
 
 
@@ -72,11 +72,11 @@ def test_replicates_give_ranks_coverage_and_factors():
     assert "corrected_lower" not in found
 
 
-def test_verdicts_use_it():
+def test_the_check_uses_it():
     found = right()
-    assert tb.verdicts(posterior(), trust=found) == tb.verdicts(posterior())
+    assert tb.check(posterior(), trust=found).messages == tb.check(posterior()).messages
     against = found.assign_attrs(conclusion="do not rely on it", summary="Do not rely on the band, because of this.")
-    assert tb.verdicts(posterior(), trust=against)[0] == "Do not rely on the band, because of this."
+    assert tb.check(posterior(), trust=against).messages[0] == "Do not rely on the band, because of this."
 
 
 def test_a_band_is_corrected_about_its_median_where_it_is_too_narrow():

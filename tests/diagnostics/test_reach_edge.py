@@ -6,7 +6,7 @@ import pytest
 from helpers.contour_posteriors import posterior
 from tactile_bayes.diagnostics import reach_edge
 from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
-from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.inference.record_likelihood.likelihood import RecordLikelihood
 
 
@@ -29,9 +29,9 @@ def walled(monkeypatch):
 
 def test_a_wall_among_the_draws_is_found_and_said_first(walled):
     assert cut_off_parameters(posterior())["q"] == "above"
-    first = verdicts(posterior())[0]
-    assert "CUT OFF" in first
-    assert "q (above " in first
+    first = check(posterior()).messages[0]
+    assert first.kind == "cut-off posterior"
+    assert "q (above " in first.values["ends"]
 
 
 def test_ends_of_a_prior_are_no_wall(walled, monkeypatch):

@@ -22,6 +22,7 @@ from tactile_bayes import datasets
 from tactile_bayes.cli.app import _message
 from tactile_bayes.contours import Parabola
 from tactile_bayes.datasets import shard
+from tactile_bayes.diagnostics import Check
 from tactile_bayes.diagnostics.inspection import inspect_record
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.coordinates.base import Coordinates
@@ -104,14 +105,14 @@ def cheap(monkeypatch):
         (contour, "contour_band", data),
         (contour, "reach", data),
         (contour, "gap_if_any", lambda k: None),
-        (contour, "verdicts", lambda k: (f"verdict {k}",)),
+        (contour, "check", lambda k: Check((f"message {k}",), False, None)),
         (contour, "summary", data),
         (calibration, "calibrate", lambda k: data(k).assign(ranks=("rank", [k - 1]))),
         (design, "design", lambda k: designed(k)),
         (design, "design_messages", lambda k: (f"best {k}",)),
         (trust, "trust", lambda k: data(k).rename(family="assumption") if k == 0 else data(k)),
         (rig, "calibrate_rig", lambda k: Rig(calibration=replace(CALIBRATION, posterior=tree(k)))),
-        (rig, "verdicts", lambda k: (f"verdict {k}",)),
+        (rig, "check", lambda k: Check((f"message {k}",), False, None)),
         (rig, "summary", data),
         (reconstruction, "validate", record),
         (reconstruction, "known_cell", lambda k: (None, "nothing")),

@@ -422,8 +422,8 @@ def _record_calls(folder: Path) -> dict[str, Call]:
             tb.inspect_record,
             {"record": measured(), "rig": STATED, "false_alarm": 1e-3, "progress": None},
         ),
-        "check_units_and_signs": Call(
-            tb.diagnostics.check_units_and_signs, {"measured": measured(), "load_cell": CELL}
+        "unit_and_sign_findings": Call(
+            tb.diagnostics.unit_and_sign_findings, {"measured": measured(), "load_cell": CELL}
         ),
         "read_result": Call(tb.read_result, {"path": posterior_file}),
         "write_result": Call(tb.write_result, {"result": posterior(), "path": folder / "out.nc"}),
@@ -578,7 +578,7 @@ def _summary_calls() -> dict[str, Call]:
             tb.uncertainty.contact_region, {"posterior": contacts_drawn(), "sample": 20, "probability": 0.9}
         ),
         "check_record": Call(tb.diagnostics.check_record, {"posterior": posterior(), "false_alarm": 1e-3}),
-        "verdicts": Call(tb.verdicts, {"posterior": posterior(), "contacts": contacts(), "trust": None}),
+        "check": Call(tb.check, {"posterior": posterior(), "contacts": contacts(), "trust": None, "false_alarm": 1e-3}),
         "trust": Call(
             tb.trust,
             {

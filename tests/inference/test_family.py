@@ -15,8 +15,8 @@ from helpers.report_pages import analysed_quickly
 from helpers.tasks import through_a_pipe
 from tactile_bayes import plotting
 from tactile_bayes.contours import Ellipse
-from tactile_bayes.diagnostics.record_check import check_record
-from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.diagnostics.predictive_check import predictive_check
+from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.family import Family, family_of
@@ -152,9 +152,8 @@ def test_bands_and_summaries_of_it_are_numbers(tree):
     assert list(found["quantity"].values) == ["a", "q", "noise_scale"]
     assert all(np.isfinite(found[name]).all() for name in ("median", "lower", "upper", "r_hat", "ess_bulk"))
     assert implied_contacts(tree, draws=10)["posterior"].sizes["draw"] >= 5
-    assert 0.0 <= check_record(tree).overall_p_value <= 1.0
-    assert verdicts(tree)
-    assert not [words for words in verdicts(tree) if "x_c" in words]
+    assert 0.0 <= predictive_check(tree).overall_p_value <= 1.0
+    assert not [words for words in check(tree).messages if "x_c" in words]
 
 
 @pytest.mark.parametrize("figure", ["pairs", "trace", "posterior_contours", "prior_contours"])

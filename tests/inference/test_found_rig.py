@@ -198,4 +198,4 @@ def test_a_stiffer_rod_that_was_inferred_raises_no_alarm():
     assert tb.reconstruct(measured, method="constrained", rig=Rig(load_cell=CELL)).attrs["misfit_probability"] < 1e-6
     contacts = contact_points(measured, posterior, CELL)
     assert contacts.attrs["misfit_probability"] > 1e-3
-    assert tb.verdicts(posterior, contacts)[0].startswith("All is well")
+    assert tb.check(posterior, contacts).is_well

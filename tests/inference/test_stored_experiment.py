@@ -3,7 +3,7 @@ import pytest
 from scipy import stats
 
 from helpers.contour_posteriors import BRIEF, CELL, infer_as_stated, measured, only, posterior
-from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.family import Family
@@ -59,8 +59,8 @@ def test_priors_that_are_no_text_must_be_given_and_be_the_same():
     with pytest.raises(ParameterError, match="does not state its rig"):
         experiment_of(of_rig)
     assert_same_density(of_rig, rig=rig)
-    assert verdicts(of_family)
-    assert verdicts(of_rig)
+    assert check(of_family).messages
+    assert check(of_rig).messages
 
 
 @pytest.mark.parametrize("name", ["rig", "family_parameters"])

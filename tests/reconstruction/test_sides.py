@@ -10,7 +10,7 @@ from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola, paper_profile
-from tactile_bayes.diagnostics.verdicts import doubtful_sides
+from tactile_bayes.diagnostics.result_check import doubtful_sides
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings

@@ -333,7 +333,7 @@ def test_samples_near_the_edge_are_at_the_edge(swept):
     """About the change from tip to tangential contact, and nowhere else."""
     record = in_contact(swept)
     words = np.stack([reconstruct(m, method="constrained").status.values for m in noisy_records(record, FAMILIAR, 20)])
-    share = (words == "at the edge").mean(axis=0)
+    share = (words == "between phases").mean(axis=0)
     assert share.max() > 0.5
     ideal = reconstruct(record, method="constrained", rig=Rig(load_cell=FAMILIAR))
     assert (share[ideal.edge_distance.values > 6.0] == 0.0).all()

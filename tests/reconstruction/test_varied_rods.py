@@ -43,7 +43,7 @@ def test_a_scan_without_noise_gives_its_contacts_back(name, friction, method):
     record = swept(name, friction)
     found = tb.reconstruct(record, method=method, rig=Rig(load_cell=CELL, unknown={"friction": friction}))
     loaded = record["truth_contact_phase"].values != "none"
-    assert set(found["status"].values[loaded]) <= {"ok", "at the edge"}
+    assert set(found["status"].values[loaded]) <= {"ok", "between phases"}
     ends = [found[f"{end}_slope_angle"].values[loaded] for end in ("least", "greatest")]
     slope = record["truth_slope_angle"].values[loaded]
     assert np.all((ends[0] - 1e-9 <= slope) & (slope <= ends[1] + 1e-9))

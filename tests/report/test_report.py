@@ -214,7 +214,7 @@ def test_what_is_worked_out_again_is_what_the_run_has_written(folder, findings):
     band = pd.read_csv(folder / "band.csv", index_col="x")
     np.testing.assert_allclose(findings.band["upper"], band["upper"], rtol=1e-13)
     lines = (folder / "summary.txt").read_text(encoding="utf-8").splitlines()
-    assert findings.verdicts == tuple(lines[: lines.index("")])
+    assert findings.checked.messages == tuple(lines[: lines.index("")])
     assert findings.probability == 0.9
 
 
@@ -254,14 +254,14 @@ def test_the_verdicts_come_first_and_say_whether_to_trust(page, folder, text):
 @pytest.fixture(scope="module")
 def told(findings):
     """What the page says of the same run: as it is, without a complaint, and where the record rejects the contour."""
-    rejecting = findings.check.assign_attrs(passed=False)
-    passing = findings.check.assign_attrs(passed=True)
+    rejecting = findings.checked.predictive.assign_attrs(passed=False)
+    passing = findings.checked.predictive.assign_attrs(passed=True)
     kinds = {
-        "as it is": dataclasses.replace(findings, check=passing),
-        "well": dataclasses.replace(findings, check=passing, verdicts=("All is well: the ensembles agree.",)),
-        "rejected": dataclasses.replace(findings, check=rejecting, verdicts=("The family does not describe it.",)),
+        "as it is": tb.diagnostics.Check(findings.checked.messages, False, passing),
+        "well": tb.diagnostics.Check(("All is well: the ensembles agree.",), True, passing),
+        "rejected": tb.diagnostics.Check(("The family does not describe it.",), False, rejecting),
     }
-    return {kind: page_of(found, "run") for kind, found in kinds.items()}
+    return {kind: page_of(dataclasses.replace(findings, checked=found), "run") for kind, found in kinds.items()}
 
 
 def test_a_contour_is_known_to_within_its_band_only_where_all_is_well(told):

@@ -34,7 +34,7 @@ def assert_every_file_is_there(run, folder):
 
 def test_a_run_writes_every_file_it_names(analysed):
     run, folder = analysed
-    assert list(run.files) == ["posterior", "contacts", "band", "verdicts", "summary", *FIGURES]
+    assert list(run.files) == ["posterior", "contacts", "band", "messages", "summary", *FIGURES]
     assert_every_file_is_there(run, folder)
 
 
@@ -59,11 +59,11 @@ def test_the_files_hold_what_the_run_returns(analysed, measured):
     assert table["unit"].tolist() == ["1/m", "m", "m", "1", "m"]
 
 
-def test_the_summary_begins_with_the_verdicts(analysed):
+def test_the_summary_begins_with_the_messages(analysed):
     run, _ = analysed
-    lines = run.files["verdicts"].read_text(encoding="utf-8").splitlines()
-    assert tuple(lines[: lines.index("")]) == run.verdicts
-    assert run.verdicts[0].startswith("NOT CONVERGED, the steps allowed ran out after 30 steps: largest R̂ ")
+    lines = run.files["messages"].read_text(encoding="utf-8").splitlines()
+    assert tuple(lines[: lines.index("")]) == run.messages
+    assert run.messages[0].startswith("NOT CONVERGED, the steps allowed ran out after 30 steps: largest R̂ ")
     table = lines[lines.index("") + 1 : -2]
     assert [line.split()[0] for line in table] == ["median", "quantity", "a", "q", "x_c", "noise_scale", "gap"]
     assert lines[-1] == run.posterior.attrs["message"]
@@ -109,7 +109,7 @@ def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
     measured["force_x"][:] = measured["force_y"][:] = np.nan
     run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK, rng=1)
     assert run.contacts is None
-    assert list(run.files) == ["posterior", "band", "verdicts", "summary", *(f for f in FIGURES if f != "gap")]
+    assert list(run.files) == ["posterior", "band", "messages", "summary", *(f for f in FIGURES if f != "gap")]
     assert_every_file_is_there(run, tmp_path)
     assert summary(run.posterior).quantity.values.tolist() == ["a", "q", "x_c", "noise_scale"]
 
@@ -215,7 +215,7 @@ def broken(*arguments, **options):
         pytest.param("contact_points", "contacts", "contacts.csv", marks=pytest.mark.slow),
         pytest.param("contour_band", "band", "band.csv", marks=pytest.mark.slow),
         pytest.param("gap_if_any", "gap", None, marks=pytest.mark.slow),
-        ("verdicts", "verdicts", None),
+        ("check", "check", None),
     ],
 )
 @pytest.mark.usefixtures("drawn_before")
@@ -227,10 +227,10 @@ def test_what_fails_is_named_and_left_out_and_all_else_is_there(function, what, 
     assert list(run.left_out) == [what]
     assert str(run.left_out[what]) == "it broke"
     said = f"Left out: {what}. Unexpected error, RuntimeError: it broke"
-    assert run.verdicts == ((said,) if what == "verdicts" else (*whole.verdicts, said))
-    lines = run.files["verdicts"].read_text(encoding="utf-8").splitlines()
-    assert tuple(lines[: lines.index("")]) == run.verdicts
-    assert list(run.files) == [name for name in whole.files if name != what or what == "verdicts"]
+    assert run.messages == ((said,) if what == "check" else (*whole.messages, said))
+    lines = run.files["messages"].read_text(encoding="utf-8").splitlines()
+    assert tuple(lines[: lines.index("")]) == run.messages
+    assert list(run.files) == [name for name in whole.files if name != what or what == "check"]
     assert_every_file_is_there(run, tmp_path)  # of the former run, too, nothing is there that is not of this one
     assert read_result(run.files["posterior"])["posterior"].to_dataset().equals(run.posterior["posterior"].to_dataset())
     gap_row = "gap width" in run.summary.quantity
@@ -249,7 +249,7 @@ def test_a_figure_that_fails_is_named_and_the_others_are_drawn(measured, tmp_pat
     assert list(run.left_out) == [f"figure {name}" for name in failed]
     assert list(run.files)[5:] == [name for name in FIGURES if name not in failed]
     assert_every_file_is_there(run, tmp_path)
-    text = run.files["verdicts"].read_text(encoding="utf-8")
+    text = run.files["messages"].read_text(encoding="utf-8")
     assert all(f"\nLeft out: figure {name}. Unexpected error, RuntimeError: it broke\n" in text for name in failed)
 
 
@@ -258,10 +258,10 @@ def test_a_posterior_outlives_its_predictions(measured, tmp_path, monkeypatch):
     monkeypatch.setattr("tactile_bayes.inference.contour.predicted_groups", broken)
     monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
     run = analyse(measured, tmp_path, rig=Rig(unknown="nothing"), settings=QUICK, rng=1)
-    assert list(run.left_out) == ["predictions", "band", "gap", "verdicts"]
-    assert run.verdicts[0] == "Left out: predictions. Unexpected error, RuntimeError: it broke"
-    assert run.verdicts[1].startswith("Left out: band. the posterior holds no events")
-    assert list(run.files) == ["posterior", "contacts", "verdicts", "summary"]
+    assert list(run.left_out) == ["predictions", "band", "gap", "check"]
+    assert run.messages[0] == "Left out: predictions. Unexpected error, RuntimeError: it broke"
+    assert run.messages[1].startswith("Left out: band. the posterior holds no events")
+    assert list(run.files) == ["posterior", "contacts", "messages", "summary"]
     assert_every_file_is_there(run, tmp_path)
     stored = read_result(run.files["posterior"])
     assert stored["posterior"].sizes["draw"] == 300

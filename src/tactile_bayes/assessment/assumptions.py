@@ -13,7 +13,7 @@ import xarray as xr
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.comparison.families import SHAPES
-from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import ParameterError, StudyError, TactileBayesError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem
@@ -159,7 +159,7 @@ def _inferred(task: tuple[_Study, int]) -> _Outcome:
         found = sampled(problem, seed=seed, settings=study.settings, with_prior=False)
         found.draws.refuse_interrupted(study.alternatives[number].name)
         band = contour_band(found.tree, study.x, study.probability)
-        fits = bool(check_record(found.tree).attrs["passed"])
+        fits = bool(predictive_check(found.tree).attrs["passed"])
     except TactileBayesError as error:
         return _Outcome((), False, False, f"{type(error).__name__}: {error}")
     edges = tuple(tuple(band[name].values.tolist()) for name in _EDGES)

@@ -23,7 +23,7 @@ from tactile_bayes.checks import (
     check_switch,
     check_whole_number,
 )
-from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.family import Family
 from tactile_bayes.inference.result import contour_draws, read_result
@@ -105,7 +105,7 @@ def trust(
         distance of the medians over the width of the band there; over "grid" too: other_lower, other_median,
         other_upper, moved, see `band_by_assumption`.
 
-        check_p_value of `check_record`. Attributes: conclusion, "holds", "holds, but the prior sets the gap" or "do not
+        check_p_value of `check`. Attributes: conclusion, "holds", "holds, but the prior sets the gap" or "do not
         rely on it"; summary, a sentence with the reasons; words, all sentences, one in a line; probability;
         draws_sha256 of the posterior.
 
@@ -162,7 +162,7 @@ def trust(
         found = sampling_error(posterior, x, chance)
         band = contour_band(posterior, x, chance)
         found = found.assign({name: band[name] for name in ("lower", "median", "upper")})
-        check = check_record(posterior)
+        check = predictive_check(posterior)
         if check.attrs["not_checked"]:
             raise InferenceError(f"there is nothing to judge this posterior by: {check.attrs['not_checked']}")
         found["check_p_value"] = check.overall_p_value

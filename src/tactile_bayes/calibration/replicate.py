@@ -14,7 +14,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
-from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import CalibrationError, InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
@@ -331,7 +331,7 @@ def _checks(tree: xr.DataTree, simulation: Simulation, experiment: SimulatedExpe
     """Apply the checks that users see: of the posterior's predictions, and of the loads of single samples."""
     numbers = {"check_p_value": np.nan, "check_passed": np.nan, "misfit_probability": np.nan, "axial_score": np.nan}
     try:
-        check = check_record(tree)
+        check = predictive_check(tree)
         if not check.attrs["not_checked"]:
             numbers |= {"check_p_value": float(check.overall_p_value), "check_passed": float(check.attrs["passed"])}
     except InferenceError:  # a run that was cut short has too few predictions

@@ -195,7 +195,7 @@ def demo(
 def answer_of(
     ctx: typer.Context, run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float], go_on: str
 ) -> Answer:
-    """Return the answer; verdicts name what is left out, and with --debug its traceback goes to stderr."""
+    """Return the answer; messages name what is left out, and with --debug its traceback goes to stderr."""
     if run.left_out:
         _trace_back(run, in_full=ctx.find_root().params["debug"])
     interrupted = "interrupted" in run.posterior.attrs["message"]
@@ -223,7 +223,7 @@ def _numbers(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, flo
     if truth:
         rows = [{**row, "truth": truth.get(str(row["quantity"]))} for row in rows]
     answer: dict[str, Any] = {
-        "words": run.verdicts,
+        "words": run.messages,
         "converged": bool(attrs["converged"]),
         "message": attrs["message"],
         "family": attrs["family"],
@@ -242,11 +242,11 @@ def _numbers(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, flo
 
 
 def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float]) -> Iterator[Any]:
-    yield from run.verdicts
+    yield from run.messages
     yield ""
     yield quantities(run.summary, truth)
     attrs = run.posterior.attrs
-    if attrs["converged"]:  # else the verdicts contain it
+    if attrs["converged"]:  # else the messages contain it
         yield attrs["message"]
     if run.contacts is not None:
         fates = Counter(run.contacts.status.values.tolist()).most_common()
@@ -255,7 +255,7 @@ def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float
         if chance is not None and chance == chance:
             words += f"; noise of the inferred scale explains their misfit with probability {chance:.2g}"
         yield words
-    elif "contacts" not in run.left_out:  # else the verdicts say so
+    elif "contacts" not in run.left_out:  # else the messages say so
         yield "No contact points: Step 2 needs all three load channels."
     yield ""
     yield files

@@ -177,7 +177,7 @@ def _as_options(rig: _FileOptions) -> str:
 
 def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
     """Return the contents of the file, except its sweeps and channels; origins are those of the rig's file."""
-    from tactile_bayes.diagnostics.inspection.messages import quantity
+    from tactile_bayes.diagnostics.findings import quantity
     from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
 
     record, rod = found.record, rod_of(found.record)
@@ -251,7 +251,7 @@ def _travel(value: float, unit: str) -> str:
 
 def _channels(channels: xr.Dataset) -> Table:
     """Return the table of channels, each in one unit; the last column is the correlation of unloaded neighbours."""
-    from tactile_bayes.diagnostics.inspection.messages import prefix_of
+    from tactile_bayes.diagnostics.findings import prefix_of
 
     rows = []
     for row in columns_of(channels, "channel"):

@@ -295,8 +295,8 @@ def _answer(ctx: typer.Context, follower: _Follower, reason: str) -> Answer:
     run = follower.watched.finish()
     left_out = f", one of {last.every} that were measured" if last.every > 1 else ""
     said = f"Ended after {last.samples:,} samples{left_out}: {reason}"
-    words = [*run.verdicts, *_families(last), f"{sentence(_band(last))}."]
-    follower.write_page(said, words, is_well=run.verdicts[0].startswith("All is well"), is_last=True)
+    words = [*run.messages, *_families(last), f"{sentence(_band(last))}."]
+    follower.write_page(said, words, is_well=run.checked is not None and run.checked.is_well, is_last=True)
     folder = follower.watched.folder.path
     files = {**run.files, "stream": follower.watched.state, "page": folder / _PAGE}
     answer = answer_of(ctx, run, files, {}, "")

@@ -19,7 +19,7 @@ from tactile_bayes.comparison.left_out import PredictedSamples, predicted_sample
 from tactile_bayes.comparison.verdict import verdict_on
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE
-from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
@@ -126,7 +126,7 @@ def compare_families(
             Largest Pareto k̂ of the importance sampling; above 0.7 its density is unreliable (Vehtari et al. 2024,
             JMLR 25(72)).
         p_value, fits
-            Overall p-value of `check_record`, and True if the check passes; NaN and False where it was not made.
+            Overall p-value of `check`, and True if the check passes; NaN and False where it was not made.
         log_likelihood
             Largest log-likelihood among the starting points of the walkers, which is near the family's maximum.
         sampled
@@ -206,7 +206,7 @@ def compare_families(
         except InferenceError:
             evidence = None
         predicted = predicted_samples(problem, found, seed=of_family[3], settings=settings) if leave_one_out else None
-        check = check_record(found.tree, false_alarm=false_alarm)
+        check = predictive_check(found.tree, false_alarm=false_alarm)
         p_value, passed = float(check.overall_p_value), bool(check.attrs["passed"])
         tried[name] = _Tried(ceiling, found.draws, evidence, predicted, p_value, passed)
     asked = {name: problem.about[name] for name in ("nuisances", "friction")}

@@ -14,7 +14,7 @@ from tactile_bayes.mechanics.fitting import fit_contacts
 from tactile_bayes.mechanics.rods.profile import Rods
 from tactile_bayes.reconstruction.estimate import (
     AMBIGUOUS,
-    AT_EDGE,
+    BETWEEN_PHASES,
     EITHER_PHASE,
     NO_FIT,
     NO_ZERO,
@@ -65,7 +65,7 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
         rivalled = found & (fit.rival < RIVAL)
         twice = rivalled & (fit.other_phase == fit.phase)
         kinds = (~found, fit.misfit > _MISFIT, twice, fit.clearance < _CLEARANCE, rivalled, bent)
-        status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AMBIGUOUS, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
+        status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AMBIGUOUS, BETWEEN_PHASES, EITHER_PHASE, NONLINEAR), OK)
         has_other = rivalled & ((status[where] == AMBIGUOUS) | (status[where] == EITHER_PHASE))
         other[where] = np.where(has_other[:, None], contact_states(fit.other, *given).place.T, np.nan)
     return Estimate(place, covariance, phase, status, other, misfit, distance)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats
 
-NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE, EITHER_PHASE, NO_FIT, AMBIGUOUS = range(10)
+NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, BETWEEN_PHASES, EITHER_PHASE, NO_FIT, AMBIGUOUS = range(10)
 
 # Statuses of a sample, by code.
 STATUSES = (
@@ -19,7 +19,7 @@ STATUSES = (
     "ok",
     "nonlinear",
     "beyond the tip",
-    "at the edge",
+    "between phases",
     "either phase",
     "does not fit",
     "ambiguous",

@@ -114,7 +114,7 @@ def reconstruct(
         beyond the tip
             The curvature vanishes only beyond the rod's end, at the point that is returned; under noise this happens to
             about half of the tip contacts. With method="raw" only.
-        at the edge
+        between phases
             Within 2 standard deviations of the change between tip and tangential contact: the phase is uncertain, and
             standard deviations are not valid. `infer_contacts` weights both phases. With method="constrained" only.
         either phase

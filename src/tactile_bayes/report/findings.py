@@ -11,8 +11,7 @@ from pathlib import Path
 import xarray as xr
 
 from tactile_bayes.assessment.trust import draws_digest
-from tactile_bayes.diagnostics.record_check import check_record
-from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.diagnostics.result_check import Check, check
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.result import read_result, record_of
 from tactile_bayes.inference.stored_experiment import contact_points
@@ -41,8 +40,7 @@ class Findings(ContourFindings):
 
     interval: xr.Dataset  # posterior predictive, of the readings
     numbers: xr.Dataset  # parameters, from `uncertainty.summary`
-    verdicts: tuple[str, ...]
-    check: xr.Dataset | None  # of the record; None if there are too few draws
+    checked: Check
     zero: xr.Dataset  # unloaded stretches, from `zero_load`
     comparison: xr.Dataset | None  # of families
     trust: xr.Dataset | None  # from `tactile-bayes trust`
@@ -52,7 +50,8 @@ class Findings(ContourFindings):
     @property
     def is_rejected(self) -> bool:
         """True if the record fails its check, so that the contour must not be used."""
-        return self.check is not None and not self.check.attrs["passed"] and not self.check.attrs["not_checked"]
+        attrs = {} if self.checked.predictive is None else self.checked.predictive.attrs
+        return not attrs.get("passed", True) and not attrs["not_checked"]
 
 
 def findings_of(
@@ -77,14 +76,11 @@ def findings_of(
     progress(1)
     contacts = contact_points(record, posterior)
     progress(2)
-    try:
-        check = check_record(posterior)
-    except InferenceError:  # too few draws, which is among the verdicts
-        check = None
+    checked = check(posterior, contacts, trust)
     progress(3)
     edges = gap_if_any(posterior, probability)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DriftWarning)  # as the verdicts do
+        warnings.simplefilter("ignore", DriftWarning)  # as the check does
         zero = zero_load(record)
     found = Findings(
         posterior=posterior,
@@ -94,8 +90,7 @@ def findings_of(
         interval=predictive_interval(posterior, probability),
         edges=edges,
         numbers=summary(posterior, probability, edges),
-        verdicts=verdicts(posterior, contacts, trust),
-        check=check,
+        checked=checked,
         zero=zero,
         comparison=comparison,
         trust=trust,

@@ -20,8 +20,6 @@ from tactile_bayes.report.reproduction import command_of, hindrances, python_lin
 from tactile_bayes.report.trust import check_messages, check_table, contacts_messages, convergence, trust_tables
 from tactile_bayes.report.wording import PageTable, chance, fixed, percent, sentence, shown_as, spread
 
-_WELL = "All is well"  # beginning of the first verdict if nothing is wrong
-
 
 def page_of(findings: Findings, name: str) -> dict[str, Any]:
     """Return the values of the template's variables; `name` is that of the run."""
@@ -52,7 +50,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "shapes": _shapes(findings.comparison),
         "parameters": _parameters(findings, mute=True),
         "is_well": _is_well(findings),
-        "verdicts": findings.verdicts,
+        "verdicts": findings.checked.messages,
         "trust": [] if findings.trust is None else str(findings.trust.attrs["words"]).splitlines(),
         "trust_summary": "" if findings.trust is None else str(findings.trust.attrs["summary"]),
         "trust_tables": trust_tables(findings),
@@ -78,7 +76,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
 
 
 def _is_well(findings: Findings) -> bool:
-    return findings.verdicts[0].startswith(_WELL)
+    return findings.checked.is_well
 
 
 def _answer(findings: Findings) -> str:

@@ -16,7 +16,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import InferenceError, ParameterError, TactileBayesError
 from tactile_bayes.inference.result import record_of
 from tactile_bayes.inference.stored_experiment import contact_points
@@ -55,7 +55,7 @@ class _Found:
             contour_band(posterior, reach(posterior), probability),
             contacts,
             summary(posterior, probability, gap_if_any(posterior, probability)),
-            verdicts(posterior, contacts)[0],
+            check(posterior, contacts).messages[0],
         )
 
     @property

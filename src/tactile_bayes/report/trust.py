@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from tactile_bayes.calibration.summary import CLAIMS
-from tactile_bayes.diagnostics.record_check import DISCREPANCIES
+from tactile_bayes.diagnostics.predictive_check import DISCREPANCIES
 from tactile_bayes.inference.result import is_streamed
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, carried_sweeps, present_channels
@@ -82,7 +82,7 @@ def trust_tables(findings: Findings) -> list[PageTable]:
 
 def check_messages(findings: Findings) -> list[str]:
     """Return sentences on the check of the record."""
-    check = findings.check
+    check = findings.checked.predictive
     if check is None:
         return ["There are too few draws for a check of the record."]
     if check.attrs["not_checked"]:
@@ -109,7 +109,7 @@ def check_messages(findings: Findings) -> list[str]:
 
 def check_table(findings: Findings) -> PageTable | None:
     """Return the misfit by channel; None if there are too few draws."""
-    check = findings.check
+    check = findings.checked.predictive
     if check is None:
         return None
     record, rows = findings.record, []

@@ -12,7 +12,7 @@ import xarray as xr
 
 from tactile_bayes import plotting
 from tactile_bayes.comparison.families import compare_families
-from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
+from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.rig.rig import Rig, rig_of
@@ -43,7 +43,7 @@ def compare_into(
     try:
         comparison = compare_families(measured, rig=rig, progress=note, **options)
     except InferenceError as error:
-        raise type(error)(" ".join((str(error), *check_units_and_signs(measured, rig_of(rig).load_cell)))) from error
+        raise type(error)(" ".join((str(error), *unit_and_sign_findings(measured, rig_of(rig).load_cell)))) from error
     return Run(comparison, write_comparison(comparison, path))
 
 

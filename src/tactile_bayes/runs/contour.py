@@ -20,8 +20,8 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
-from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.diagnostics.result_check import Check, check
+from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.result import known_of, posterior_draws, record_of, write_result
@@ -55,7 +55,8 @@ class ContourRun:
     contacts: xr.Dataset | None
     band: xr.Dataset | None
     summary: xr.Dataset
-    verdicts: tuple[str, ...]  # as of `tactile_bayes.verdicts`; last, what is left out, and why
+    checked: Check | None
+    messages: tuple[str, ...]  # of the check; last, what is left out, and why
     files: Mapping[str, Path]  # by content
     left_out: Mapping[str, Exception]  # by the part that failed after sampling, which is None, or has no file
 
@@ -133,7 +134,7 @@ def analyse(
         keep(infer_contour(measured, rig=rig, rng=rng, keep=keep, **options))
     except Exception as error:
         if not drawn and isinstance(error, InferenceError):
-            raise type(error)(" ".join((str(error), *check_units_and_signs(measured, rig.load_cell)))) from error
+            raise type(error)(" ".join((str(error), *unit_and_sign_findings(measured, rig.load_cell)))) from error
         if not drawn:
             raise
         folder.left_out["predictions"] = error
@@ -166,7 +167,7 @@ def _completed(
     if "blocks" in result.attrs:
         measured, rig = record_of(result), replace(rig, load_cell=None)
     with folder:
-        contacts, band, edges, found = None, None, None, tuple[str, ...]()
+        contacts, band, edges, checked = None, None, None, None
         with folder.attempt("contacts", "contacts.csv"):
             contacts = contact_points(measured, result, rig.load_cell)
             if contacts is not None:
@@ -176,14 +177,15 @@ def _completed(
             folder.write_table("band", "band.csv", band)
         with folder.attempt("gap", "gap.png"):
             edges = gap_if_any(result, probability)
-        with folder.attempt("verdicts", "summary.txt"):
-            found = verdicts(result, contacts)
+        with folder.attempt("check", "summary.txt"):
+            checked = check(result, contacts)
         numbers = summary(result, probability, edges)
+        found = () if checked is None else checked.messages
 
         def write_summary() -> None:
             table = numbers.to_dataframe().to_string()
             lines = (*found, *folder.messages, "", table, "", result.attrs["message"])
-            folder.write_lines("verdicts", "summary.txt", lines)
+            folder.write_lines("messages", "summary.txt", lines)
             folder.write_table("summary", "summary.csv", numbers)
 
         write_summary()
@@ -191,7 +193,9 @@ def _completed(
         _draw(_Figures(measured, result, contacts, band, edges, numbers, truth), folder)
         if len(folder.left_out) > before:
             write_summary()
-        return ContourRun(result, contacts, band, numbers, (*found, *folder.messages), folder.files, folder.left_out)
+        return ContourRun(
+            result, contacts, band, numbers, checked, (*found, *folder.messages), folder.files, folder.left_out
+        )
 
 
 def origin_of(measured: xr.Dataset, probability: float, command: Sequence[str]) -> dict[str, Any]:

@@ -108,7 +108,7 @@ def infer_contours(
     Returns
     -------
     xr.Dataset
-        By `record` (names of the folders): `verdict`, the first line of the verdicts, `converged`, `error` (the reason
+        By `record` (names of the folders): `verdict`, the first message of `check`, `converged`, `error` (the reason
         of a failure, else ""), `seconds`, `band_width` (median over what was touched), and by
         `quantity` the `median`, `lower` and `upper` end of the interval, with `unit`; NaN where a record has none.
 
@@ -246,7 +246,7 @@ def _analysed(task: _Task) -> dict[str, Any]:
     numbers = run.summary
     width = float("nan") if run.band is None else float((run.band.upper - run.band.lower).median())
     row = {
-        "verdict": run.verdicts[0],
+        "verdict": run.messages[0],
         "converged": bool(run.posterior.attrs["converged"]),
         "error": "",
         "seconds": time.monotonic() - began,

@@ -13,9 +13,9 @@ import xarray as xr
 
 from tactile_bayes import plotting
 from tactile_bayes.arrays import Floats
+from tactile_bayes.diagnostics.findings import Finding
 from tactile_bayes.diagnostics.inspection import CellSource, known_cell
-from tactile_bayes.diagnostics.verdicts import CONTRADICTION, doubtful_sides
-from tactile_bayes.inference.misfit import CHECK_RIG
+from tactile_bayes.diagnostics.result_check import CONTRADICTION, doubtful_sides
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, contacts_of
 from tactile_bayes.record import bases_of, carried_sweeps, validate, with_rod
@@ -67,7 +67,7 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
     sentences = [
         f"{found} contact point{'s' * (found != 1)} by the {contacts.attrs['method']} method; samples: {fates}."
     ]
-    against = doubtful_sides(contacts.attrs)
+    against: list[str] = [*doubtful_sides(contacts.attrs)]
     samples = int(contacts.attrs.get("misfit_samples", 0))
     if samples:
         total, chance = (float(contacts.attrs[name]) for name in ("misfit_sum", "misfit_probability"))
@@ -75,10 +75,8 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
         if math.isnan(chance):
             sentences.append(f"{words}; they share an unknown bias, so that no probability can be stated.")
         elif chance < CONTRADICTION:
-            against.append(
-                f"The loads of single samples contradict one another, {words[0].lower()}{words[1:]} (noise explains it "
-                f"with probability {chance:.1g}): {CHECK_RIG}."
-            )
+            sentences.append(f"{words}.")
+            against.append(Finding("contradiction", chance=f"{chance:.1g}", dragging=""))
         else:
             sentences.append(f"{words}, which noise explains with probability {chance:.2g}.")
         score = float(contacts.attrs["axial_score"])

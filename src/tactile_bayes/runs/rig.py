@@ -11,7 +11,7 @@ import xarray as xr
 
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
-from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.inference.contour import calibrate_rig
 from tactile_bayes.rig.rig import Rig
 from tactile_bayes.rig.rig_prior import RigPrior
@@ -45,7 +45,7 @@ def calibrate_rig_into(
         prior = cast(RigPrior, rig.calibration)
         found = cast(xr.DataTree, prior.posterior)
         which = f"Record {number}: " if len(records) > 1 else ""
-        messages += [f"{which}{verdict}" for verdict in verdicts(found)]
+        messages += [f"{which}{message}" for message in check(found).messages]
     assert prior is not None
     numbers = summary(found, probability)
     messages.append(
@@ -57,6 +57,6 @@ def calibrate_rig_into(
             rig.write(temporary)
         folder.write_netcdf("posterior", "rig.nc", found)
         table = numbers.to_dataframe().to_string()
-        folder.write_lines("verdicts", "summary.txt", (*messages, "", table, "", found.attrs["message"]))
+        folder.write_lines("messages", "summary.txt", (*messages, "", table, "", found.attrs["message"]))
         folder.write_table("summary", "summary.csv", numbers)
     return RigRun(rig, folder.files, numbers, tuple(messages))

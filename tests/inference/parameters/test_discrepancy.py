@@ -13,7 +13,8 @@ from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import calibrate, experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola
-from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.diagnostics.predictive_check import predictive_check
+from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.experiment import Experiment
@@ -166,11 +167,11 @@ def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
     x = np.linspace(-0.2, 0.2, 5)
     draw = {"rng": 1, "settings": MODEST}
     blind, smooth = (infer_as_stated(record, unknown=only(*asked), **draw) for asked in ((), SMOOTH))
-    before, after = check_record(blind), check_record(smooth)
-    assert not before.passed
-    assert 'discrepancy = "default"' in before.attrs["suggestion"]
-    assert after.passed
-    assert after.attrs["suggestion"] == ""
+    before, after = check(blind), check(smooth)
+    assert not before.predictive.passed
+    assert "smooth misfit" in [message.kind for message in before.messages]
+    assert after.predictive.passed
+    assert "smooth misfit" not in [message.kind for message in after.messages]
     assert json.loads(smooth.attrs["nuisances"]) == list(GROUPS["discrepancy"])
     scale, length = (smooth["posterior"][name] for name in GROUPS["discrepancy"])
     assert 0.005 < float(scale.median()) < 0.05
@@ -185,10 +186,8 @@ def test_smooth_residuals_suggest_it_and_with_it_the_record_is_described():
 
 @pytest.mark.slow
 def test_a_good_record_suggests_nothing():
-    assert (
-        check_record(infer_contour(measured(), rig=Rig(unknown="nothing"), rng=1, settings=MODEST)).attrs["suggestion"]
-        == ""
-    )
+    found = predictive_check(infer_contour(measured(), rig=Rig(unknown="nothing"), rng=1, settings=MODEST))
+    assert np.isnan(found.smooth).all()
 
 
 @pytest.mark.slow

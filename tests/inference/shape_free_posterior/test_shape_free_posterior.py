@@ -9,7 +9,7 @@ from scipy.special import gamma, kv
 from helpers.contour_posteriors import only
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
 from tactile_bayes.contours.random_radius import RandomRadius
-from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
@@ -161,7 +161,7 @@ def test_a_smooth_contour_is_within_its_band(profile, unknown, evaluations):
     inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)
     assert inside.sum() >= 8
     assert float((band.upper - band.lower).max()) < 0.02
-    assert check_record(result).passed
+    assert predictive_check(result).passed
 
 
 @pytest.mark.slow
@@ -287,4 +287,4 @@ def test_other_rigs(what):
     inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)
     assert inside.sum() >= 8, band
     assert float((band.upper - band.lower).max()) < 0.1 * scale
-    assert check_record(result).passed
+    assert predictive_check(result).passed

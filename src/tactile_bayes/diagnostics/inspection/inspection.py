@@ -13,12 +13,13 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.checks import check_function, check_probability
+from tactile_bayes.diagnostics.findings import Finding
+from tactile_bayes.diagnostics.inspection.findings import UNFIT, far_off, inspection_findings
 from tactile_bayes.diagnostics.inspection.fit import Fit, fit_of
-from tactile_bayes.diagnostics.inspection.messages import UNFIT, far_off, inspection_messages
 from tactile_bayes.diagnostics.inspection.stretches import unloaded_stretches
 from tactile_bayes.diagnostics.inspection.tables import channel_table, sample_table, sweep_table
-from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
-from tactile_bayes.diagnostics.verdicts import OFF_ZERO
+from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
+from tactile_bayes.diagnostics.zeros import OFF_ZERO
 from tactile_bayes.errors import DriftWarning, RecordError
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import contacts_of
@@ -44,8 +45,9 @@ class Inspection:
     ----------
     record : xr.Dataset
         The record.
-    messages : tuple of str
-        What looks wrong, the most serious first, or "Nothing looks wrong.".
+    messages : tuple of Finding
+        What looks wrong, the most serious first, or "Nothing looks wrong.": sentences, each with its `kind` and
+        `values`.
     is_suspect : bool
         True if anything looks wrong.
     sweeps : xr.Dataset
@@ -75,7 +77,7 @@ class Inspection:
     """
 
     record: xr.Dataset
-    messages: tuple[str, ...]
+    messages: tuple[Finding, ...]
     is_suspect: bool
     sweeps: xr.Dataset
     channels: xr.Dataset
@@ -124,7 +126,7 @@ def inspect_record(
     Notes
     -----
     The messages report, in this order: a record without contact; channels that never change; loads that no such rod can
-    have (`check_units_and_signs`); samples whose loads fit no contact, with the sign, the frame, the exchange of forces
+    have; samples whose loads fit no contact, with the sign, the frame, the exchange of forces
     or the friction that would correct them, if one does; readings cut off at the end of a range; a sweep without
     contact; readings that are stuck or stored twice; outliers; a zero that moved, and one that differs from the data
     sheet; noise that is not white, and noise that is not as stated; uneven steps of the drive; sweeps that begin or end
@@ -140,8 +142,8 @@ def inspect_record(
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.1, 0.0, 0.0))
     >>> measured = cell.measure(scan(paper_profile("II", q=0.5)).record, rng=1)
-    >>> inspect_record(measured).messages
-    ('Nothing looks wrong.',)
+    >>> print(*inspect_record(measured).messages)
+    Nothing looks wrong.
     >>> knocked = measured.holding_moment.copy()
     >>> knocked[5] += 1.0
     >>> for message in inspect_record(measured.assign(holding_moment=knocked)).messages:
@@ -180,10 +182,10 @@ def inspect_record(
     else:
         samples["status"] = ("sample", np.full(record.sizes["sample"], ""), {"long_name": "none: a channel is missing"})
     table = sweep_table(record, found, sweeps)
-    of_loads = check_units_and_signs(record, _with_zero(cell, found)) if found["contact"].values.any() else ()
-    against = inspection_messages(record, table, channels, samples, of_loads, fit, cell, source, false_alarm)
+    of_loads = unit_and_sign_findings(record, _with_zero(cell, found)) if found["contact"].values.any() else ()
+    against = inspection_findings(record, table, channels, samples, of_loads, fit, cell, source, false_alarm)
     return Inspection(
-        record, against or ("Nothing looks wrong.",), bool(against), table, channels, samples, statuses, cell, source
+        record, against or (Finding("nothing wrong"),), bool(against), table, channels, samples, statuses, cell, source
     )
 
 

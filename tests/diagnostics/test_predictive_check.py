@@ -8,7 +8,7 @@ from scipy import stats
 from helpers.predicted_records import CELL, SHORT, ideal, predicted, taken_for_a_parabola, with_readings
 from helpers.refusals import refused
 from tactile_bayes.contours import paper_profile
-from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.diagnostics.predictive_check import predictive_check
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
@@ -48,7 +48,7 @@ def test_p_values_are_uniform_where_the_posterior_is_a_point(name):
     cell = CELLS[name]
     tree = predicted(cell, chains=1, draws=300)
     p_values = [
-        float(check_record(with_readings(tree, **readings(cell, seed))).overall_p_value) for seed in range(100, 130)
+        float(predictive_check(with_readings(tree, **readings(cell, seed))).overall_p_value) for seed in range(100, 130)
     ]
     assert stats.kstest(p_values, "uniform").pvalue > 1e-3
 
@@ -58,9 +58,9 @@ def test_the_size_of_the_noise_does_not_matter():
     quiet = {
         name: tree["observed_data"].to_dataset()[name].values - 0.8 * mean_residual(tree, name) for name in CHANNELS
     }
-    other = check_record(with_readings(tree, **quiet))
+    other = predictive_check(with_readings(tree, **quiet))
     assert other.passed
-    np.testing.assert_allclose(other.score, check_record(tree).score, atol=0.05)
+    np.testing.assert_allclose(other.score, predictive_check(tree).score, atol=0.05)
 
 
 def test_walkers_that_are_lost_predict_nothing():
@@ -71,18 +71,18 @@ def test_walkers_that_are_lost_predict_nothing():
     predictive["force_x"][0, :5] = 0.0
     other = tree.copy()
     other["sample_stats"], other["posterior_predictive"] = xr.DataTree(stats_of_draws), xr.DataTree(predictive)
-    check = check_record(other)
+    check = predictive_check(other)
     assert check.attrs["predictions"] == 995
     assert check.score.max() < 5.0
     bump = np.where(ideal("holding_moment") != 0.0, 0.2, 0.0)
-    assert not check_record(with_readings(other, force_x=readings(CELL, 7)["force_x"] + bump)).passed
+    assert not predictive_check(with_readings(other, force_x=readings(CELL, 7)["force_x"] + bump)).passed
 
 
 def test_a_smooth_misfit_fails_and_is_found_where_it_is():
     tree = predicted()
     angle, sweep = ideal("drive_angle"), ideal("sweep")
     bump = (sweep == 0) & (angle > 1.8) & (angle < 2.4)
-    check = check_record(with_readings(tree, force_y=readings(CELL, 7)["force_y"] + 0.15 * bump))
+    check = predictive_check(with_readings(tree, force_y=readings(CELL, 7)["force_y"] + 0.15 * bump))
     assert not check.passed
     assert check.overall_p_value == pytest.approx(1.0 / 1001.0)
     assert check.score.sel(discrepancy="runs").idxmax().item() == "force_y"
@@ -105,7 +105,7 @@ def test_each_discrepancy_has_its_cause(discrepancy, change):
     tree = predicted()
     loaded = ideal("holding_moment") != 0.0
     other = with_readings(tree, force_x=readings(CELL, 7)["force_x"] + 0.05 * change(loaded))
-    check = check_record(other)
+    check = predictive_check(other)
     assert not check.passed
     scores = check.score.sel(channel="force_x")
     assert scores.idxmax().item() == discrepancy
@@ -115,22 +115,22 @@ def test_each_discrepancy_has_its_cause(discrepancy, change):
 def test_a_channel_that_was_not_measured_is_left_out():
     tree = predicted()
     tree["posterior_predictive"] = tree["posterior_predictive"].to_dataset().drop_vars("force_x")
-    check = check_record(with_readings(tree, force_x=np.full(ideal("force_x").size, np.nan)))
+    check = predictive_check(with_readings(tree, force_x=np.full(ideal("force_x").size, np.nan)))
     assert check.channel.values.tolist() == ["holding_moment", "force_y"]
     assert check.passed
 
 
 def test_few_predictions_say_so_or_bound_the_false_alarms():
-    assert check_record(predicted(chains=1, draws=199)).attrs["false_alarm"] == 1.0 / 200.0
+    assert predictive_check(predicted(chains=1, draws=199)).attrs["false_alarm"] == 1.0 / 200.0
     with refused(InferenceError, "20 predictions"):
-        check_record(predicted(chains=1, draws=20))
+        predictive_check(predicted(chains=1, draws=20))
     with refused(ParameterError, false_alarm=1.0):
-        check_record(predicted(chains=1, draws=100), false_alarm=1.0)
+        predictive_check(predicted(chains=1, draws=100), false_alarm=1.0)
 
 
 @pytest.mark.parametrize(("profile", "passes"), [("II", True), pytest.param("III", False, marks=pytest.mark.slow)])
 def test_a_parabola_is_told_from_what_is_none(profile, passes):
-    check = check_record(taken_for_a_parabola(profile))
+    check = predictive_check(taken_for_a_parabola(profile))
     assert check.passed == passes
     assert check.attrs["false_alarm"] < 2e-3
 
@@ -147,7 +147,7 @@ def test_records_of_the_right_family_pass(name):
             measured, rig=Rig(load_cell=CELLS[name], unknown="nothing"), rng=seed, settings=CONVERGED
         )
         assert result.attrs["converged"]
-        p_values.append(float(check_record(result).overall_p_value))
+        p_values.append(float(predictive_check(result).overall_p_value))
     assert min(p_values) > 5e-3
 
 
@@ -158,4 +158,4 @@ def test_profile_iv_is_no_parabola(noise):
         cell = LoadCell(force_noise=noise, moment_noise=0.4 * noise)
         measured = cell.measure(scan(paper_profile("IV", q=0.5), drive_step=np.radians(2.0)).record, rng=seed)
         result = infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), rng=seed, settings=SHORT)
-        assert not check_record(result).passed
+        assert not predictive_check(result).passed

@@ -1,6 +1,7 @@
-"""Verdicts: the cause comes first, and what is right is said to be."""
+"""The check of a result: the cause comes first, and what is right is said to be."""
 
-import re
+import copy
+import pickle
 
 import numpy as np
 import pytest
@@ -10,10 +11,10 @@ from helpers.contour_posteriors import QUICK
 from helpers.predicted_records import ideal, predicted, taken_for_a_parabola, with_readings
 from tactile_bayes.assessment.trust import trust
 from tactile_bayes.contours import Parabola
-from tactile_bayes.diagnostics.record_check import check_record
-from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.diagnostics.result_check import check
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.result import to_arviz
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
@@ -35,92 +36,85 @@ def readings(tree):
     return {name: tree["observed_data"].to_dataset()[name].values for name in CHANNELS}
 
 
+def kinds(found):
+    return [message.kind for message in found.messages]
+
+
 def test_of_a_good_result_all_is_well():
-    found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.3}))
-    assert len(found) == 1
-    assert found[0].startswith("All is well: the ensembles agree, and the record agrees with their predictions (p = 0.")
+    found = check(predicted(), xr.Dataset(attrs={"misfit_probability": 0.3}))
+    assert kinds(found) == ["all is well"]
+    assert found.is_well
+    assert float(found.messages[0].values["p_value"]) == pytest.approx(float(found.predictive.overall_p_value), rel=0.1)
+
+
+def test_messages_are_copied_and_sent_between_processes_with_their_kind():
+    (message,) = check(predicted()).messages
+    for other in (copy.deepcopy(message), pickle.loads(pickle.dumps(message))):
+        assert (str(other), other.kind, other.values) == (str(message), message.kind, message.values)
 
 
 @pytest.mark.slow
 def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
-    found = verdicts(taken_for_a_parabola("IV"))
-    assert re.match(
-        "The family parabola and the rig as assumed do not describe the record: none of [0-9]+ records that the "
-        "posterior predicts is so far off. The worst channel is (holding_moment|force_x|force_y), whose ",
-        found[0],
-    )
-    assert found[0].endswith(
-        "Do not use this contour. It may be the family or the rig. Try another family (--family shape-free, or "
-        'compare), or infer more of the rig ("default" under [unknown] of rig.toml: friction, gain, drift, lever, '
-        "backlash, suspension_compliance, rest_curvature, taper, stem, length)."
-    )
-    assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 60 steps")
-    assert found[2].startswith("The noise is ")
-    assert found[2].endswith(" as stated: the rest is misfit, not noise.")
+    found = check(taken_for_a_parabola("IV"))
+    assert kinds(found)[:3] == ["not described", "not converged", "misfit as noise"]
+    values = found.messages[0].values
+    assert values["like"] == "none"
+    assert values["channel"] in CHANNELS
+    assert values["advice"] == what_to_try(["parabola"])
+    assert found.messages[2].values["alike"] == "as stated"
 
 
 def test_a_forgotten_tare_is_told_with_its_size():
     tree = predicted()
-    found = verdicts(with_readings(tree, force_y=readings(tree)["force_y"] + 0.3))
-    assert found[0].startswith("Without load the cell does not read what is stated: force_y is off by 0.3")
-    assert found[0].endswith("or give LoadCell.from_zero_load(record).")
-    assert found[1].startswith("The family parabola and the rig as assumed do not describe the record")
-    assert "sweep" in found[1]
+    found = check(with_readings(tree, force_y=readings(tree)["force_y"] + 0.3))
+    assert kinds(found)[:2] == ["zero off", "not described"]
+    assert found.messages[0].values["off"].startswith("force_y is off by 0.3")
 
 
 def test_forces_in_another_unit_come_first():
     tree = predicted()
     thousandfold = {name: 1e3 * readings(tree)[name] for name in ("force_x", "force_y")}
-    found = verdicts(with_readings(tree, **thousandfold))
-    assert found[0].startswith("Forces reach 1.1")
-    assert found[1].startswith("The family parabola and the rig as assumed do not describe the record")
+    assert kinds(check(with_readings(tree, **thousandfold)))[:2] == ["large loads", "not described"]
 
 
 def test_a_flipped_moment_comes_first():
     tree = predicted()
-    found = verdicts(with_readings(tree, holding_moment=-readings(tree)["holding_moment"]))
-    assert found[0].startswith("The holding moment has the sign of contacts on the other side in every sweep")
+    found = check(with_readings(tree, holding_moment=-readings(tree)["holding_moment"]))
+    assert kinds(found)[0] == "moment sign"
 
 
 def test_what_has_not_converged_is_said_even_where_there_is_nothing_to_compare_with():
     tree = predicted(chains=1, draws=20)
     tree.attrs |= {"converged": 0, "message": "not converged, the steps allowed ran out"}
-    assert verdicts(tree) == ("NOT CONVERGED, the steps allowed ran out.",)
+    assert check(tree).messages == ("NOT CONVERGED, the steps allowed ran out.",)
 
 
 @pytest.mark.parametrize(
-    ("factor", "scatter", "words"),
-    [
-        (4.0, 4.0, "The noise is 4 times what the load cell states, and neighbouring samples scatter alike: state the"),
-        (0.25, 0.25, "The noise is 0.25 times what the load cell states, and neighbouring samples scatter alike: st"),
-        (4.0, 1.0, "The noise is 4 times what the load cell states, but neighbouring samples scatter as stated: the"),
-    ],
+    ("factor", "scatter", "kind"),
+    [(4.0, 4.0, "larger noise"), (0.25, 0.25, "larger noise"), (4.0, 1.0, "misfit as noise")],
 )
-def test_noise_that_is_not_as_stated(factor, scatter, words):
+def test_noise_that_is_not_as_stated(factor, scatter, kind):
     tree = changed(predicted(), "posterior", noise_scale=np.full((4, 250), factor))
     predictive = tree["posterior_predictive"].to_dataset()
     for name in CHANNELS:
         predictive[name] = ideal(name) + factor * (predictive[name] - ideal(name))
     tree["posterior_predictive"] = xr.DataTree(predictive)
-    found = verdicts(
+    found = check(
         with_readings(tree, **{name: ideal(name) + scatter * (v - ideal(name)) for name, v in readings(tree).items()})
     )
-    assert len(found) == 1
-    assert found[0].startswith(words)
+    assert kinds(found) == [kind]
+    assert float(found.messages[0].values["factor"]) == factor
 
 
 def test_loads_that_contradict_one_another_unless_noise_does_it():
-    found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0}))
-    assert found[0].startswith("The loads of single samples contradict one another, whatever the contour (noise expl")
-    assert "below 1e-99" in found[0]
-    assert "with friction" not in found[0]
-    dragged = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
-    assert dragged[0].endswith('with friction: infer it (friction = "default" under [unknown] of rig.toml).')
-    assert "too small by 20 standard errors" in dragged[0]
+    (first, *_) = check(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0})).messages
+    assert (first.kind, first.values) == ("contradiction", {"chance": "below 1e-99", "dragging": ""})
     sought = predicted()
     sought.attrs |= {"nuisances": '["friction"]'}
-    dragged = verdicts(sought, xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
-    assert dragged[0].endswith("too small by 20 standard errors, as with more friction than was inferred.")
+    for tree, words in ((predicted(), 'friction = "default" under [unknown]'), (sought, "more friction than")):
+        dragged = check(tree, xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0})).messages[0]
+        assert "too small by 20 standard errors" in dragged.values["dragging"]
+        assert words in dragged.values["dragging"]
 
 
 def test_a_prior_that_is_largest_at_its_end_allows_what_is_there():
@@ -129,7 +123,7 @@ def test_a_prior_that_is_largest_at_its_end_allows_what_is_there():
     shape = tree["posterior"].noise_scale.shape
     tree = changed(tree, "posterior", friction=np.abs(rng.normal(0.0003, 0.0001, shape)))
     tree = changed(tree, "prior", friction=np.abs(rng.normal(0.0, 0.3, (1, 1000))))
-    assert verdicts(tree)[0].startswith("All is well")
+    assert check(tree).is_well
 
 
 def test_what_the_prior_forbids_and_what_it_says_alone():
@@ -138,13 +132,12 @@ def test_what_the_prior_forbids_and_what_it_says_alone():
     tree = changed(predicted(), "prior", **prior, x_c=rng.normal(size=(1, 1000)))
     noise = np.ones((4, 250))
     far = {"rigidity_scale": rng.normal(1.3, 0.01, (4, 250)), "x_c": rng.normal(0.0, 0.9, (4, 250))}
-    found = verdicts(changed(tree, "posterior", noise_scale=noise, **far))
-    assert found[0].startswith("The record contradicts the prior: rigidity_scale = 1.3 (prior: 0.8")
-    assert found[1] == "The record adds little to the prior of x_c."
+    found = check(changed(tree, "posterior", noise_scale=noise, **far))
+    assert kinds(found) == ["beyond the prior", "set by the prior"]
+    assert found.messages[0].values["values"].startswith("rigidity_scale = 1.3 (prior: 0.8")
+    assert found.messages[1].values["names"] == "x_c"
     near = {**far, "rigidity_scale": rng.normal(1.0, 0.01, (4, 250))}
-    found = verdicts(changed(tree, "posterior", noise_scale=noise, **near))
-    assert found[0].startswith("All is well")
-    assert found[1] == "The record adds little to the prior of x_c."
+    assert kinds(check(changed(tree, "posterior", noise_scale=noise, **near))) == ["all is well", "set by the prior"]
 
 
 def drifted(tree, sizes=(0.0, 0.2, 0.0)):
@@ -157,23 +150,20 @@ def drifted(tree, sizes=(0.0, 0.2, 0.0)):
 
 
 def test_a_zero_that_moved_is_told():
-    found = verdicts(drifted(predicted()))
-    (said,) = (words for words in found if words.startswith("The zero moved"))
-    assert re.match(
-        r"The zero moved from one unloaded stretch to another, of force_x \(p = [\d.e-]+ if it had not\)", said
-    )
-    assert 'drift = "default" under [unknown]' in said
+    (moved,) = (message for message in check(drifted(predicted())).messages if message.kind == "zero moved")
+    assert moved.values["moved"].startswith("force_x (p = ")
+    assert moved.values["entry"] == 'drift = "default" under [unknown] of rig.toml'
 
 
 def test_a_zero_that_moved_is_not_told_where_that_is_inferred_or_stated():
     tree = drifted(predicted())
     inferred = tree.copy()
     inferred.attrs = tree.attrs | {"nuisances": '["force_x_drift"]'}
-    assert not [words for words in verdicts(inferred) if words.startswith("The zero moved")]
+    assert "zero moved" not in kinds(check(inferred))
     stated = tree.copy()
     cell = LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.01))
     stated.attrs = stated.attrs | {f"load_cell_{name}": value for name, value in cell.entries().items()}
-    assert not [words for words in verdicts(stated) if words.startswith("The zero moved")]
+    assert "zero moved" not in kinds(check(stated))
 
 
 def hardly_loaded():
@@ -185,25 +175,25 @@ def hardly_loaded():
 
 
 def test_a_check_that_was_not_made_is_not_passed():
-    check = check_record(hardly_loaded())
-    assert "too few" in check.attrs["not_checked"]
-    assert not check.attrs["passed"]
-    assert np.isnan(check.overall_p_value)
-    first = verdicts(hardly_loaded())[0]
-    assert "All is well" not in first
-    assert "nan" not in first
-    assert check.attrs["not_checked"] in first
+    found = check(hardly_loaded())
+    assert "too few" in found.predictive.attrs["not_checked"]
+    assert not found.predictive.attrs["passed"]
+    assert not found.is_well
+    assert np.isnan(found.predictive.overall_p_value)
+    first = found.messages[0]
+    assert (first.kind, first.values["reason"]) == ("not checked", found.predictive.attrs["not_checked"])
 
 
 def test_too_few_predictions_are_the_reason_given():
-    first = verdicts(predicted(chains=1, draws=20))[0]
-    assert "All is well" not in first
-    assert "20 predictions" in first
+    found = check(predicted(chains=1, draws=20))
+    assert found.messages[0].kind == "not checked"
+    assert "20 predictions" in found.messages[0].values["reason"]
+    assert found.predictive is None
+    assert not found.is_well
 
 
 READERS = {
-    "verdicts": verdicts,
-    "check_record": check_record,
+    "check": check,
     "contour_band": lambda tree: contour_band(tree, [0.0]),
     "normal_band": lambda tree: normal_band(tree, [0.0]),
     "to_arviz": to_arviz,
@@ -227,7 +217,7 @@ def test_a_prediction_that_is_no_number_is_named():
     predictive["force_x"][0, 3, 5] = np.nan
     tree["posterior_predictive"] = xr.DataTree(predictive)
     with pytest.raises(InferenceError, match=r"predicted force_x .* chain 0, draw 3"):
-        verdicts(tree)
+        check(tree)
 
 
 @pytest.mark.parametrize("has_way_forth", [False, pytest.param(True, marks=pytest.mark.slow)])
@@ -241,4 +231,4 @@ def test_a_sweep_that_goes_back_in_contact_is_named_if_its_way_forth_is_missing(
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record.assign(columns), rng=1)
     measured = measured if has_way_forth else measured.isel(sample=np.flatnonzero(back | ~turned))
     posterior = infer_contour(measured, rig=rig, rng=1, settings=QUICK)
-    assert ("Sweep 2 went back in contact" in verdicts(posterior)[-1]) is not has_way_forth
+    assert (kinds(check(posterior))[-1] == "no way forth") is not has_way_forth

@@ -1,23 +1,26 @@
-"""Verdicts: messages on what is wrong with a result, and what to do."""
+"""The check of a result: what is wrong with it, and what to do."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections.abc import Container, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.checks import check_optional, refused
+from tactile_bayes.checks import check_optional, check_probability, refused
 from tactile_bayes.contours.families import family_named
+from tactile_bayes.diagnostics.findings import Finding, of_sweeps
+from tactile_bayes.diagnostics.predictive_check import Residuals, predictive_check, residuals_of
 from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
-from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
-from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
+from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
+from tactile_bayes.diagnostics.zeros import NOISE_FACTOR, OFF_ZERO, moved_zero, zero_off
 from tactile_bayes.errors import DriftWarning, InferenceError
-from tactile_bayes.inference.misfit import CHECK_RIG, GAUGE, is_inferred, what_to_try
+from tactile_bayes.inference.misfit import GAUGE, is_inferred, what_to_try
 from tactile_bayes.inference.result import is_streamed, posterior_draws, record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM, contact_sides, drive_histories
@@ -30,8 +33,6 @@ from tactile_bayes.tasks.documents import read_json
 _HOLDS, _NOT = "holds", "do not rely on it"  # conclusions of `trust`; another one is a reservation
 _NOISES = ("noise_scale", "moment_noise", "force_noise", *GROUPS["discrepancy"])
 
-NOISE_FACTOR = 2.0  # ratio of found to stated noise beyond which it is reported: data sheets are no more accurate
-OFF_ZERO = 5.0  # standard errors by which a zero must differ from the stated one to be reported
 CONTRADICTION = 1e-4  # probability of the misfit of single samples below which it is reported
 _FEWEST_PRIOR_DRAWS = 500
 
@@ -57,10 +58,61 @@ _CAUSES = {
 }
 
 
-def verdicts(
-    posterior: xr.DataTree, contacts: xr.Dataset | None = None, trust: xr.Dataset | None = None
-) -> tuple[str, ...]:
-    """Judge a posterior of a contour or a rig: what is wrong, the most serious first, or that all is well.
+@dataclass(frozen=True, eq=False)
+class Check:
+    """Result of `check`.
+
+    Attributes
+    ----------
+    messages : tuple of Finding
+        What is wrong, the most serious first, or that all is well: sentences, each with its `kind` and `values`.
+    is_well : bool
+        True if nothing is wrong, and the record was compared with what the posterior predicts.
+    predictive : xr.Dataset or None
+        That comparison, over "discrepancy" and "channel" (those that were measured); None if the tree holds fewer than
+        100 predictions.
+
+        p_value
+            Share of records, predictions and the real one, that are at least as discrepant as the real one; NaN where
+            there are too few samples.
+        score
+            Discrepancy above its median over predictions, over the same of their 95 % quantile: 1 is unusual, some
+            tens are a visible misfit.
+        worst_sweep, worst_from, worst_to (channel)
+            Sweep and drive angles [rad] of the stretch whose mean residual is largest, in standard errors. If the drive
+            carries the base in some sweep, also worst_from_travel and worst_to_travel, as in the group `events`.
+        worst_residual (channel)
+            That mean, in the record's units.
+        neighbour_noise (channel)
+            Standard deviation of white noise, estimated from second differences of neighbouring residuals, in the
+            record's units: the noise if everything smooth is misfit.
+        smooth (channel)
+            Loaded residuals over that noise, if the check fails because they are smooth and larger, and no discrepancy
+            is inferred; else NaN.
+        overall_p_value
+            Share of records of which the largest score is at least that of the real one; NaN if the check was not made.
+
+        Attributes: `passed` (0 or 1; 0 also if the check was not made), `not_checked`, why it was not made (there are
+        too few loaded samples), else empty, `false_alarm` (the probability in effect), `predictions` (their number).
+    """
+
+    messages: tuple[Finding, ...]
+    is_well: bool
+    predictive: xr.Dataset | None
+
+
+def check(
+    posterior: xr.DataTree,
+    contacts: xr.Dataset | None = None,
+    trust: xr.Dataset | None = None,
+    *,
+    false_alarm: float = 1e-3,
+) -> Check:
+    """Check a posterior of a contour or a rig: what is wrong with it, or with its record.
+
+    The noise that is inferred beside the contour absorbs misfit from any cause, such as a contour outside the family, a
+    wrong rod or a forgotten tare, so that the size of the residuals is uninformative. Their pattern is not: misfit is
+    smooth in the drive angle and absent from unloaded samples; noise is neither.
 
     Parameters
     ----------
@@ -70,23 +122,45 @@ def verdicts(
         From `reconstruct` by method="constrained", whose misfits show whether the loads of a sample agree.
     trust : xr.Dataset, optional
         From `tactile_bayes.trust` for this posterior.
+    false_alarm : float
+        Largest probability that the record of a right model is found unlike its predictions, in (0, 1); all
+        discrepancies and channels together. With fewer than 1/false_alarm − 1 predictions it is 1/(1 + predictions).
 
     Returns
     -------
-    tuple of str
-        One or more sentences, of which the first says that all is well only if the record was checked. They report:
-        loads that such a rod cannot have (`check_units_and_signs`); a zero that is off, or that moved; a record unlike
-        the predictions of the posterior (`check_record`); reasons not to rely on the band (`trust`); ensembles that
-        have not converged; noise twice as large as stated, or half; loads of a sample that contradict one another;
-        unknowns of the rig that are nearly impossible under their prior; smooth residuals, which a discrepancy can
-        describe; parameters that are cut off where the model has no path of the rod; a check that was not made, with
-        the reason. The last, which are no faults, say that the prior sets the gap, and name parameters that the record
-        hardly determines.
+    Check
+        Its messages report: loads that such a rod cannot have; a zero that is off, or that moved; a record unlike the
+        predictions of the posterior; reasons not to rely on the band (`trust`); ensembles that have not converged;
+        noise twice as large as stated, or half; loads of a sample that contradict one another; unknowns of the rig that
+        are nearly impossible under their prior; smooth residuals, which a discrepancy can describe; parameters that are
+        cut off where the model has no path of the rod; a check that was not made, with the reason. The last, which are
+        no faults, say that the prior sets the gap, and name parameters that the record hardly determines.
 
     Raises
     ------
     InferenceError
         If the tree is not such a result with its record and predictions, or has numbers that are not finite.
+    ParameterError
+        If `false_alarm` is not in (0, 1), or an argument is of another kind.
+
+    Notes
+    -----
+    Residuals are readings less the median of the predicted ones, over half the width of their central 95 % interval
+    (over 1.96), for the real record and for all predicted ones alike; so drift, correlated noise, outliers and
+    resolution need no treatment of their own. Draws of lost walkers are left out. In each channel:
+
+    - runs: mean square of the running mean over an eighth of the loaded part of a sweep, over that of the differences
+      of neighbours;
+    - neighbours: mean square of loaded residuals, over the same (von Neumann's ratio);
+    - largest: largest residual over the root mean square;
+    - loaded: mean square of loaded samples over that of unloaded ones;
+    - zero: mean of the unloaded samples over their root mean square.
+
+    All except `largest` clip residuals at 4. None depends on the size of the noise. The p-values are those of Gelman,
+    Meng and Stern 1996 (Statistica Sinica 6, 733) with residuals about one centre. The posterior is inferred from the
+    same record, so they are conservative: under a true model they are rarely small, and the more rarely the more
+    parameters there are per sample. A record that passes is not proven right: misfit below the noise over √(samples in
+    a stretch) remains undetected.
 
     Examples
     --------
@@ -95,10 +169,11 @@ def verdicts(
     >>> cell = LoadCell(force_noise=0.02, moment_noise=0.008)
     >>> measured = cell.measure(scan(paper_profile("III", q=0.5), drive_step=0.03).record, rng=1)
     >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=50)
-    >>> found = verdicts(infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), rng=1, settings=quick))
-    >>> print(found[0].split(":")[0])
-    The family parabola and the rig as assumed do not describe the record
+    >>> found = check(infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), rng=1, settings=quick))
+    >>> print(found.messages[0].split(":")[0], found.messages[0].kind, bool(found.predictive.passed), sep=" | ")
+    The family parabola and the rig as assumed do not describe the record | not described | False
     """
+    check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
     refuse_no_contour(posterior, "posterior")
     posterior_draws(posterior)
     record = record_of(posterior)
@@ -106,45 +181,47 @@ def verdicts(
     if trust is not None and "conclusion" not in getattr(trust, "attrs", {}):
         raise refused("trust", trust, "give what trust returned, or None")
     try:
-        check = check_record(posterior)
-        not_checked = str(check.attrs["not_checked"])
+        predictive = predictive_check(posterior, false_alarm=false_alarm)
+        not_checked = str(predictive.attrs["not_checked"])
     except InferenceError as error:  # there are too few draws
-        check, not_checked = None, str(error)
+        predictive, not_checked = None, str(error)
     residuals = residuals_of(posterior)  # after the check has released its own: those of a long record are large
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DriftWarning)  # a message reports it
+        warnings.simplefilter("ignore", DriftWarning)  # a finding reports it
         unloaded = zero_load(record)
     against = [
-        *check_units_and_signs(record),
+        *unit_and_sign_findings(record),
         *doubtful_sides(posterior.attrs),
         *_off_zero(record, unloaded, residuals),
         *_moved_zero(posterior, record, unloaded),
     ]
-    if check is not None and not check.attrs["passed"] and not not_checked:
-        against.append(_not_described(posterior, check))
+    if predictive is not None and not predictive.attrs["passed"] and not not_checked:
+        against.append(_not_described(posterior, predictive))
     if trust is not None and trust.attrs["conclusion"] == _NOT:
-        against.append(str(trust.attrs["summary"]))
+        against.append(Finding("not reliable", summary=trust.attrs["summary"]))
     if not posterior.attrs["converged"]:
-        against.append(posterior.attrs["message"].replace("not converged", "NOT CONVERGED", 1) + ".")
-    noisier = 1.0 if check is None else _neighbours_over_stated(record, check)
+        message = posterior.attrs["message"].replace("not converged", "NOT CONVERGED", 1)
+        against.append(Finding("not converged", message=message))
+    noisier = 1.0 if predictive is None else _neighbours_over_stated(record, predictive)
     beyond = _beyond_prior(posterior)
     against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
-    against += _beyond_message(beyond, record, posterior)
-    against += _cut_off_message(posterior)
-    if check is not None and check.attrs["suggestion"]:
-        against.append(check.attrs["suggestion"])
+    against += [*_beyond_findings(beyond, record, posterior), *_cut_off(posterior)]
+    if predictive is not None:
+        against += _smooth(predictive)
     drawn = "particles no longer depend on where they began" if is_streamed(posterior.attrs) else "ensembles agree"
     if not_checked and posterior.attrs["converged"]:
         but = "" if against else f"The {drawn}, but this does not say that the result is right. "
-        against.append(f"{but}The record was NOT CHECKED against the predictions of the posterior: {not_checked}.")
-    if check is not None and not against:
-        p_value = float(check.overall_p_value)
-        against.append(f"All is well: the {drawn}, and the record agrees with their predictions (p = {p_value:.2g}).")
-    doubts = [] if trust is None or trust.attrs["conclusion"] in (_NOT, _HOLDS) else [str(trust.attrs["summary"])]
-    return (*against, *doubts, *_prior_dominated(posterior, known=beyond), *_going_back(posterior, record))
+        against.append(Finding("not checked", but=but, reason=not_checked))
+    is_well = predictive is not None and not against
+    if predictive is not None and is_well:
+        against.append(Finding("all is well", drawn=drawn, p_value=f"{float(predictive.overall_p_value):.2g}"))
+    if trust is not None and trust.attrs["conclusion"] not in (_NOT, _HOLDS):
+        against.append(Finding("reservation", summary=trust.attrs["summary"]))
+    against += [*_prior_dominated(posterior, known=beyond), *_going_back(posterior, record)]
+    return Check(tuple(against), is_well, predictive)
 
 
-def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
+def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[Finding]:
     """Report sweeps about a pivot that go back in contact, where friction acts the other way, without a way forth.
 
     If all seem to, it is the sign of the moment.
@@ -159,11 +236,8 @@ def _going_back(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
     sweeps = sorted(set(record["sweep"].values[back & (history == 0)].tolist()))
     if not sweeps:
         return []
-    named = f"{'Sweeps' if len(sweeps) > 1 else 'Sweep'} {', '.join(map(str, sweeps))}"
-    return [
-        f"{named} went back in contact after no sweep on that side, so that friction is taken as on the way forth: add "
-        f"the way forth to the record, or infer without friction ({rig_entry('friction', 0, 'unknown')}), and compare."
-    ]
+    entry = rig_entry("friction", 0, "unknown")
+    return [Finding("no way forth", sweeps=of_sweeps(sweeps, "go", past="went back"), entry=entry)]
 
 
 def _inferred(posterior: xr.DataTree) -> list[str]:
@@ -172,23 +246,20 @@ def _inferred(posterior: xr.DataTree) -> list[str]:
     return names
 
 
-def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
-    """Return a message on sweeps whose side of contact is in doubt, from attributes of a posterior or of contacts."""
+def doubtful_sides(attrs: Mapping[Any, Any]) -> list[Finding]:
+    """Report sweeps whose side of contact is in doubt, from attributes of a posterior or of contacts."""
     if "doubtful_sides" not in attrs:
         return []
     sides = read_json(attrs["doubtful_sides"], "doubtful_sides")
     taken = ", ".join(f"sweep {sweep} as a {side} one" for sweep, side in sides.items())
     probability = attrs.get("sides_probability")
     sure = "" if probability is None else f", with probability {probability:.2g}"
-    return [
-        f"The moment leaves the side of contact in doubt; taken is {taken}{sure}. Is the sign of "
-        "the moment right, and the direction, and was the load cell tared?"
-    ]
+    return [Finding("doubtful side", taken=taken, sure=sure)]
 
 
-def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
+def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[Finding]:
     """Report channels whose unloaded readings differ from what the posterior expects."""
-    off, entries = [], {}
+    off, entries = {}, {}
     for name, of_channel in residuals.items():
         unloaded = found.unloaded.values & ~of_channel.loaded
         uncertainty = float(found.bias_uncertainty.sel(channel=name))
@@ -197,37 +268,24 @@ def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residu
         means = (of_channel.values * of_channel.scale)[:, unloaded].mean(axis=1)
         error = math.hypot(uncertainty, float(np.std(means[1:])))
         if abs(means[0]) > OFF_ZERO * error > 0.0:
-            unit = _unit(record, name)
-            off.append(f"{name} is off by {means[0]:.3g}{unit} ({abs(means[0]) / error:.0f} standard errors)")
+            off[name] = float(means[0]), error, str(record[name].attrs.get("units", "1"))
             entries[name] = column_entry(record[name], added=-float(means[0]))
-    if not off:
-        return []
     how = f" as they are read ({rig_entries(entries)})" if all(entries.values()) else ""
-    return [
-        f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? Take it out of "
-        f"the readings{how}, or give LoadCell.from_zero_load(record)."
-    ]
+    return zero_off(off, f"Take it out of the readings{how}, or give LoadCell.from_zero_load(record).")
 
 
-def _moved_zero(posterior: xr.DataTree, record: xr.Dataset, found: xr.Dataset) -> list[str]:
+def _moved_zero(posterior: xr.DataTree, record: xr.Dataset, found: xr.Dataset) -> list[Finding]:
     """Report channels whose zero moved although no drift is stated or inferred."""
     cell = LoadCell.from_record(record)
-    inferred = _inferred(posterior)
-    level = found.attrs["false_alarm"] / max(int(np.isfinite(found.same_bias_p_value).sum()), 1)
-    moved = [
-        f"{name} (p = {p_value:.1g} if it had not)"
-        for name, p_value in zip(found.channel.values.tolist(), found.same_bias_p_value.values.tolist(), strict=True)
-        if p_value < level and f"{name.removeprefix('holding_')}_drift" not in inferred
-    ]
-    if not moved or (cell is not None and cell.drift is not None):
+    if cell is not None and cell.drift is not None:
         return []
-    return [
-        f"The zero moved from one unloaded stretch to another, of {', '.join(moved)}: infer it, too "
-        f"({rig_entry('drift', 'default', 'unknown')}), state the drift of the load cell, or tare before each sweep."
-    ]
+    p_values = dict(zip(found.channel.values.tolist(), found.same_bias_p_value.values.tolist(), strict=True))
+    inferred = {name.removesuffix("_drift") for name in _inferred(posterior)}
+    known = {name for name in CHANNELS if name.removeprefix("holding_") in inferred}
+    return moved_zero(p_values, found.attrs["false_alarm"], known)
 
 
-def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
+def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> Finding:
     score = check.score.fillna(-np.inf)
     place = score.argmax(("discrepancy", "channel"))
     channel, cause = (str(score[dim].values[int(place[dim])]) for dim in ("channel", "discrepancy"))
@@ -237,13 +295,19 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
     described, result = ("gauge", "rig") if family == GAUGE else (f"family {family}", "contour")
     # The share of predictions alone: the record itself is no prediction.
     like = round(float(check.overall_p_value) * (predictions + 1)) - 1
-    return (
-        f"The {described} and the rig as assumed do not describe the record: {like or 'none'} of {predictions} "
-        f"records that the posterior predicts {'are' if like > 1 else 'is'} so far off. The worst channel is "
-        f"{channel}, {_CAUSES[cause]}; in sweep {int(worst.worst_sweep)} from {_stretch(posterior, worst)} "
-        f"it is off the prediction by {float(worst.worst_residual):+.2g}{unit}. "
-        f"Do not use this {result}. "
-        + what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0))
+    return Finding(
+        "not described",
+        family=described,
+        like=like or "none",
+        predictions=predictions,
+        are="are" if like > 1 else "is",
+        channel=channel,
+        cause=_CAUSES[cause],
+        sweep=int(worst.worst_sweep),
+        stretch=_stretch(posterior, worst),
+        residual=f"{float(worst.worst_residual):+.2g}{unit}",
+        result=result,
+        advice=what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0)),
     )
 
 
@@ -271,23 +335,22 @@ def _neighbours_over_stated(record: xr.Dataset, check: xr.Dataset) -> float:
     return float(np.median(ratios)) if ratios else 1.0
 
 
-def _noise(posterior: xr.DataTree, noisier: float) -> list[str]:
+def _noise(posterior: xr.DataTree, noisier: float) -> list[Finding]:
     draws = posterior_draws(posterior)
     if "noise_scale" not in draws:
         return []
     factor = float(draws["noise_scale"].median())
     if 1.0 / NOISE_FACTOR <= factor <= NOISE_FACTOR:
         return []
-    said = f"The noise is {factor:.3g} times what the load cell states"
     if noisier < 0.5 * factor and factor > NOISE_FACTOR:
         alike = f"{noisier:.2g} times as much as stated" if abs(math.log(noisier)) > 0.2 else "as stated"
-        return [f"{said}, but neighbouring samples scatter {alike}: the rest is misfit, not noise."]
-    return [f"{said}, and neighbouring samples scatter alike: state the noise that it has, or are the units right?"]
+        return [Finding("misfit as noise", factor=f"{factor:.3g}", alike=alike)]
+    return [Finding("larger noise", factor=f"{factor:.3g}")]
 
 
 def _contradictions(
     posterior: xr.DataTree, record: xr.Dataset, contacts: xr.Dataset | None, noisier: float
-) -> list[str]:
+) -> list[Finding]:
     """Report loads of single samples that contradict one another, under normal noise; outliers enlarge misfits."""
     cell = LoadCell.from_record(record) or LoadCell()
     if contacts is None or math.isfinite(cell.degrees_of_freedom):
@@ -295,11 +358,9 @@ def _contradictions(
     chance = float(contacts.attrs.get("misfit_probability", math.nan))
     if not chance < CONTRADICTION or noisier > 0.75 * NOISE_FACTOR:  # more noise than stated explains it
         return []
+    dragging = _dragging(posterior, float(contacts.attrs.get("axial_score", math.nan)))
     words = f"{chance:.1g}" if chance > 1e-99 else "below 1e-99"
-    return [
-        "The loads of single samples contradict one another, whatever the contour (noise explains it with probability "
-        f"{words}): {CHECK_RIG}.{_dragging(posterior, float(contacts.attrs.get('axial_score', math.nan)))}"
-    ]
+    return [Finding("contradiction", chance=words, dragging=dragging)]
 
 
 def _dragging(posterior: xr.DataTree, axial_score: float) -> str:
@@ -327,7 +388,7 @@ def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
     return said
 
 
-def _beyond_message(beyond: Mapping[str, str], record: xr.Dataset, posterior: xr.DataTree) -> list[str]:
+def _beyond_findings(beyond: Mapping[str, str], record: xr.Dataset, posterior: xr.DataTree) -> list[Finding]:
     if not beyond:
         return []
     draws = posterior_draws(posterior)
@@ -338,35 +399,34 @@ def _beyond_message(beyond: Mapping[str, str], record: xr.Dataset, posterior: xr
     }
     is_known = bool(zeros) and all(zeros.values())
     subtract = f"subtract a zero as its column is read ({rig_entries(zeros)}), " if is_known else ""
-    return [
-        f"The record contradicts the prior: {', '.join(beyond.values())}. Check the stated rod and drive "
-        f"angle, {subtract}or give a wider prior (under [unknown] of rig.toml, or in the family)."
-    ]
+    return [Finding("beyond the prior", values=", ".join(beyond.values()), subtract=subtract)]
 
 
-def _cut_off_message(posterior: xr.DataTree) -> list[str]:
+def _cut_off(posterior: xr.DataTree) -> list[Finding]:
     """Report parameters that are cut off where the model has no equilibria."""
-    cut_off = cut_off_parameters(posterior)
-    if not cut_off:
-        return []
-    draws = posterior_draws(posterior)
-    least_most = {"above": 1.0, "below": 0.0}
-    ends = [f"{name} ({end} {float(draws[name].quantile(least_most[end])):.3g})" for name, end in cut_off.items()]
-    return [
-        f"The posterior is CUT OFF where the model has no path of the rod, not by the record: {', '.join(ends)}. "
-        "Intervals are too narrow on that side: is the family right, and the rod?"
+    draws, quantile = posterior_draws(posterior), {"above": 1.0, "below": 0.0}
+    ends = [
+        f"{name} ({end} {float(draws[name].quantile(quantile[end])):.3g})"
+        for name, end in cut_off_parameters(posterior).items()
     ]
+    return [Finding("cut-off posterior", ends=", ".join(ends))] * bool(ends)
 
 
-def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[str]:
+def _smooth(predictive: xr.Dataset) -> list[Finding]:
+    """Suggest a discrepancy where residuals are smooth and larger than the noise."""
+    smooth = predictive["smooth"].dropna("channel")
+    named = [f"{name} ({ratio:.2g} times)" for name, ratio in zip(smooth.channel.values, smooth.values, strict=True)]
+    entry = rig_entry("discrepancy", "default", "unknown")
+    return [Finding("smooth misfit", channels=" and ".join(named), entry=entry)] * bool(named)
+
+
+def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[Finding]:
     draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
     family = posterior.attrs.get("family", GAUGE)
     mute = {*_NOISES, *(() if family == GAUGE else family_named(family).roughness)}
     names = [str(name) for name in draws.data_vars if name not in mute and name not in known]
     names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
-    if not names:
-        return []
-    return [f"The record adds little to the prior of {', '.join(names)}."]
+    return [Finding("set by the prior", names=", ".join(names))] * bool(names)
 
 
 def _width(values: Floats) -> float:

@@ -16,7 +16,6 @@ from tactile_bayes.inference.stored_experiment import segments_of
 from tactile_bayes.load_cell.blocks import are_blocks
 from tactile_bayes.numerics.scatter import rough_noise
 from tactile_bayes.record import carried_sweeps, rows_of_sweeps, travels_of
-from tactile_bayes.record.rig_entry import rig_entry
 from tactile_bayes.rig.parameters import GROUPS
 
 # Ways in which a record can differ from those that the posterior predicts.
@@ -40,88 +39,8 @@ class Residuals(NamedTuple):
     sweeps: tuple[Index, ...]  # rows of each sweep, in the order of measurement
 
 
-def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dataset:
-    """Check a record against those that the posterior predicts (posterior predictive check).
-
-    The noise that is inferred beside the contour absorbs misfit from any cause, such as a contour outside the family, a
-    wrong rod or a forgotten tare, so that the size of the residuals is uninformative. Their pattern is not: misfit is
-    smooth in the drive angle and absent from unloaded samples; noise is neither.
-
-    Parameters
-    ----------
-    posterior : xr.DataTree
-        From `infer_contour`.
-    false_alarm : float
-        Largest probability that the check fails for a record which the model describes, in (0, 1); all discrepancies
-        and channels together. With fewer than 1/false_alarm − 1 predictions in the tree it is 1/(1 + predictions).
-
-    Returns
-    -------
-    xr.Dataset
-        Over "discrepancy" and "channel" (those that were measured):
-
-        p_value
-            Share of records, predictions and the real one, that are at least as discrepant as the real one; NaN where
-            there are too few samples.
-        score
-            Discrepancy above its median over predictions, over the same of their 95 % quantile: 1 is unusual, some
-            tens are a visible misfit.
-        worst_sweep, worst_from, worst_to (channel)
-            Sweep and drive angles [rad] of the stretch whose mean residual is largest, in standard errors. If the drive
-            carries the base in some sweep, also worst_from_travel and worst_to_travel, as in the group `events`.
-        worst_residual (channel)
-            That mean, in the record's units.
-        neighbour_noise (channel)
-            Standard deviation of white noise, estimated from second differences of neighbouring residuals, in the
-            record's units: the noise if everything smooth is misfit.
-        overall_p_value
-            Share of records of which the largest score is at least that of the real one; NaN if the check was not made.
-
-        Attributes: `passed` (0 or 1; 0 also if the check was not made), `not_checked`, why it was not made (there are
-        too few loaded samples), else empty, `false_alarm` (the probability in effect), `predictions` (their number),
-        and `suggestion`, a sentence if the check fails because residuals are smooth and larger than the noise, and no
-        discrepancy is inferred; else empty.
-
-    Raises
-    ------
-    InferenceError
-        If the tree is not a result of `infer_contour`, or holds fewer than 100 predictions.
-    ParameterError
-        If `false_alarm` is not in (0, 1).
-
-    Notes
-    -----
-    Residuals are readings less the median of the predicted ones, over half the width of their central 95 % interval
-    (over 1.96), for the real record and for all predicted ones alike; so drift, correlated noise, outliers and
-    resolution need no treatment of their own. Draws of lost walkers are left out. In each channel:
-
-    - runs: mean square of the running mean over an eighth of the loaded part of a sweep, over that of the differences
-      of neighbours;
-    - neighbours: mean square of loaded residuals, over the same (von Neumann's ratio);
-    - largest: largest residual over the root mean square;
-    - loaded: mean square of loaded samples over that of unloaded ones;
-    - zero: mean of the unloaded samples over their root mean square.
-
-    All except `largest` clip residuals at 4. None depends on the size of the noise. The p-values are those of Gelman,
-    Meng and Stern 1996 (Statistica Sinica 6, 733) with residuals about one centre. The posterior is inferred from the
-    same record, so they are conservative: under a true model they are rarely small, and the more rarely the more
-    parameters there are per sample. A record that passes is not proven right: misfit below the noise over √(samples in
-    a stretch) remains undetected.
-
-    Examples
-    --------
-    >>> from tactile_bayes import LoadCell, Rig, SamplerSettings, infer_contour, scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> cell = LoadCell(force_noise=0.02, moment_noise=0.008)
-    >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=100)
-    >>> for profile in ("II", "III"):
-    ...     ideal = scan(paper_profile(profile, q=0.5), drive_step=0.03).record
-    ...     measured = cell.measure(ideal, rng=1)
-    ...     result = infer_contour(measured, rig=Rig(load_cell=cell, unknown="nothing"), rng=1, settings=quick)
-    ...     print(profile, bool(check_record(result).passed))
-    II True
-    III False
-    """
+def predictive_check(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dataset:
+    """Check a record against those that the posterior predicts: see `tactile_bayes.check`."""
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
     residuals = residuals_of(posterior)
     channels = list(residuals)
@@ -166,6 +85,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
                 "channel",
                 [_neighbour_noise(of_channel, per_reading) for of_channel in residuals.values()],
             ),
+            "smooth": ("channel", [np.nan if described else smooth.get(name, np.nan) for name in channels]),
             "overall_p_value": np.nan if not_checked else overall,
         },
         coords={
@@ -178,7 +98,6 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             "not_checked": not_checked,
             "false_alarm": false_alarm,
             "predictions": predictions,
-            "suggestion": "" if described else _suggestion(smooth),
         },
     )
 
@@ -271,17 +190,6 @@ def _smooth(residuals: dict[str, Residuals], p_values: Floats, false_alarm: floa
         if size > _EXCESS * noise:
             smooth[name] = size / noise
     return smooth
-
-
-def _suggestion(smooth: dict[str, float]) -> str:
-    if not smooth:
-        return ""
-    named = " and ".join(f"{name} ({ratio:.2g} times)" for name, ratio in smooth.items())
-    return (
-        f"In contact the residuals of {named} are larger than the noise between neighbouring samples, and smooth: "
-        "where neither another family nor more of the rig describes them, infer a discrepancy of the model "
-        f"({rig_entry('discrepancy', 'default', 'unknown')})."
-    )
 
 
 def _width(samples: int) -> int:
