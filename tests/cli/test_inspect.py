@@ -260,7 +260,7 @@ def test_friction_that_is_not_stated_comes_first(tmp_path, rig_file):
     measured = LOAD_CELL.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD, unknown={"friction": 0.3})).record, rng=1)
     write_record(measured, tmp_path / "r.csv")
     lines = call("reconstruct", tmp_path / "r.csv", "--out", tmp_path).stdout.splitlines()
-    assert lines[0].startswith("The loads of single samples contradict one another, misfit ")
+    assert lines[0].startswith("The loads of single samples contradict one another, whatever the contour")
     assert "as with friction: state it (as in friction = 0.2 under [unknown] of rig.toml)" in lines[1]
     rubbing = rig_file("[unknown]\nfriction = 0.3\n")
     mended = call("reconstruct", tmp_path / "r.csv", "--rig", rubbing, "--out", tmp_path)

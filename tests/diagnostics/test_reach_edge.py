@@ -31,7 +31,7 @@ def test_a_wall_among_the_draws_is_found_and_said_first(walled):
     assert cut_off_parameters(posterior())["q"] == "above"
     first = check(posterior()).messages[0]
     assert first.kind == "cut-off posterior"
-    assert "q (above " in first.values["ends"]
+    assert "q (above " in first.details["ends"]
 
 
 def test_ends_of_a_prior_are_no_wall(walled, monkeypatch):

@@ -44,31 +44,33 @@ def test_of_a_good_result_all_is_well():
     found = check(predicted(), xr.Dataset(attrs={"misfit_probability": 0.3}))
     assert kinds(found) == ["all is well"]
     assert found.is_well
-    assert float(found.messages[0].values["p_value"]) == pytest.approx(float(found.predictive.overall_p_value), rel=0.1)
+    assert float(found.messages[0].details["p_value"]) == pytest.approx(
+        float(found.predictive.overall_p_value), rel=0.1
+    )
 
 
 def test_messages_are_copied_and_sent_between_processes_with_their_kind():
     (message,) = check(predicted()).messages
     for other in (copy.deepcopy(message), pickle.loads(pickle.dumps(message))):
-        assert (str(other), other.kind, other.values) == (str(message), message.kind, message.values)
+        assert (str(other), other.kind, other.details) == (str(message), message.kind, message.details)
 
 
 @pytest.mark.slow
 def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
     found = check(taken_for_a_parabola("IV"))
     assert kinds(found)[:3] == ["not described", "not converged", "misfit as noise"]
-    values = found.messages[0].values
+    values = found.messages[0].details
     assert values["like"] == "none"
     assert values["channel"] in CHANNELS
     assert values["advice"] == what_to_try(["parabola"])
-    assert found.messages[2].values["alike"] == "as stated"
+    assert found.messages[2].details["alike"] == "as stated"
 
 
 def test_a_forgotten_tare_is_told_with_its_size():
     tree = predicted()
     found = check(with_readings(tree, force_y=readings(tree)["force_y"] + 0.3))
     assert kinds(found)[:2] == ["zero off", "not described"]
-    assert found.messages[0].values["off"].startswith("force_y is off by 0.3")
+    assert found.messages[0].details["off"].startswith("force_y is off by 0.3")
 
 
 def test_forces_in_another_unit_come_first():
@@ -103,18 +105,18 @@ def test_noise_that_is_not_as_stated(factor, scatter, kind):
         with_readings(tree, **{name: ideal(name) + scatter * (v - ideal(name)) for name, v in readings(tree).items()})
     )
     assert kinds(found) == [kind]
-    assert float(found.messages[0].values["factor"]) == factor
+    assert float(found.messages[0].details["factor"]) == factor
 
 
 def test_loads_that_contradict_one_another_unless_noise_does_it():
     (first, *_) = check(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0})).messages
-    assert (first.kind, first.values) == ("contradiction", {"chance": "below 1e-99", "dragging": ""})
+    assert (first.kind, first.details) == ("contradiction", {"chance": "below 1e-99", "dragging": ""})
     sought = predicted()
     sought.attrs |= {"nuisances": '["friction"]'}
     for tree, words in ((predicted(), 'friction = "default" under [unknown]'), (sought, "more friction than")):
         dragged = check(tree, xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0})).messages[0]
-        assert "too small by 20 standard errors" in dragged.values["dragging"]
-        assert words in dragged.values["dragging"]
+        assert "too small by 20 standard errors" in dragged.details["dragging"]
+        assert words in dragged.details["dragging"]
 
 
 def test_a_prior_that_is_largest_at_its_end_allows_what_is_there():
@@ -134,8 +136,8 @@ def test_what_the_prior_forbids_and_what_it_says_alone():
     far = {"rigidity_scale": rng.normal(1.3, 0.01, (4, 250)), "x_c": rng.normal(0.0, 0.9, (4, 250))}
     found = check(changed(tree, "posterior", noise_scale=noise, **far))
     assert kinds(found) == ["beyond the prior", "set by the prior"]
-    assert found.messages[0].values["values"].startswith("rigidity_scale = 1.3 (prior: 0.8")
-    assert found.messages[1].values["names"] == "x_c"
+    assert found.messages[0].details["values"].startswith("rigidity_scale = 1.3 (prior: 0.8")
+    assert found.messages[1].details["names"] == "x_c"
     near = {**far, "rigidity_scale": rng.normal(1.0, 0.01, (4, 250))}
     assert kinds(check(changed(tree, "posterior", noise_scale=noise, **near))) == ["all is well", "set by the prior"]
 
@@ -151,8 +153,8 @@ def drifted(tree, sizes=(0.0, 0.2, 0.0)):
 
 def test_a_zero_that_moved_is_told():
     (moved,) = (message for message in check(drifted(predicted())).messages if message.kind == "zero moved")
-    assert moved.values["moved"].startswith("force_x (p = ")
-    assert moved.values["entry"] == 'drift = "default" under [unknown] of rig.toml'
+    assert moved.details["moved"].startswith("force_x (p = ")
+    assert moved.details["entry"] == 'drift = "default" under [unknown] of rig.toml'
 
 
 def test_a_zero_that_moved_is_not_told_where_that_is_inferred_or_stated():
@@ -181,13 +183,13 @@ def test_a_check_that_was_not_made_is_not_passed():
     assert not found.is_well
     assert np.isnan(found.predictive.overall_p_value)
     first = found.messages[0]
-    assert (first.kind, first.values["reason"]) == ("not checked", found.predictive.attrs["not_checked"])
+    assert (first.kind, first.details["reason"]) == ("not checked", found.predictive.attrs["not_checked"])
 
 
 def test_too_few_predictions_are_the_reason_given():
     found = check(predicted(chains=1, draws=20))
     assert found.messages[0].kind == "not checked"
-    assert "20 predictions" in found.messages[0].values["reason"]
+    assert "20 predictions" in found.messages[0].details["reason"]
     assert found.predictive is None
     assert not found.is_well
 

@@ -59,4 +59,4 @@ def test_wrong_units_and_signs_are_suspected(factors, kind, record):
 def test_the_unit_of_force_is_told_for_si(measured):
     wrong = measured.assign(force_x=1e3 * measured.force_x, force_y=1e3 * measured.force_y)
     unit = Rod(measured.rod_length, measured.rod_flexural_rigidity).force_unit
-    assert f"{unit:.3g} N" in unit_and_sign_findings(wrong)[0].values["stated"]
+    assert f"{unit:.3g} N" in unit_and_sign_findings(wrong)[0].details["stated"]

@@ -122,18 +122,23 @@ _SHOWN = 5  # largest number of samples that a finding lists
 
 
 class Finding(str):
-    """A sentence on a record or a result, of a kind in `TEXTS`, with the values that it states."""
+    """A sentence on a record or a result, of a kind in `TEXTS`, with the details that it states."""
 
     kind: str
-    values: Mapping[str, Any]
+    details: Mapping[str, Any]
 
     def __new__(cls, kind: str, **values: Any) -> Finding:
         self = super().__new__(cls, TEXTS[kind].format(**values))
-        self.kind, self.values = kind, values
+        self.kind, self.details = kind, values
         return self
 
     def __getnewargs_ex__(self) -> tuple[tuple[str], dict[str, Any]]:
-        return (self.kind,), dict(self.values)
+        return (self.kind,), dict(self.details)
+
+
+def contradiction(chance: float, dragging: str = "") -> Finding:
+    """Return the finding that loads of single samples contradict one another, which noise does with a probability."""
+    return Finding("contradiction", chance=f"{chance:.1g}" if chance > 1e-99 else "below 1e-99", dragging=dragging)
 
 
 def quantity(value: float, unit: str) -> str:

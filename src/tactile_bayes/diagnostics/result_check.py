@@ -14,7 +14,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_optional, check_probability, refused
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.diagnostics.findings import Finding, of_sweeps
+from tactile_bayes.diagnostics.findings import Finding, contradiction, of_sweeps
 from tactile_bayes.diagnostics.predictive_check import Residuals, predictive_check, residuals_of
 from tactile_bayes.diagnostics.reach_edge import cut_off_parameters
 from tactile_bayes.diagnostics.units_and_signs import unit_and_sign_findings
@@ -65,7 +65,7 @@ class Check:
     Attributes
     ----------
     messages : tuple of Finding
-        What is wrong, the most serious first, or that all is well: sentences, each with its `kind` and `values`.
+        What is wrong, the most serious first, or that all is well: sentences, each with its `kind` and `details`.
     is_well : bool
         True if nothing is wrong, and the record was compared with what the posterior predicts.
     predictive : xr.Dataset or None
@@ -359,8 +359,7 @@ def _contradictions(
     if not chance < CONTRADICTION or noisier > 0.75 * NOISE_FACTOR:  # more noise than stated explains it
         return []
     dragging = _dragging(posterior, float(contacts.attrs.get("axial_score", math.nan)))
-    words = f"{chance:.1g}" if chance > 1e-99 else "below 1e-99"
-    return [Finding("contradiction", chance=words, dragging=dragging)]
+    return [contradiction(chance, dragging)]
 
 
 def _dragging(posterior: xr.DataTree, axial_score: float) -> str:

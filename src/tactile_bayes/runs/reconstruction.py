@@ -13,7 +13,7 @@ import xarray as xr
 
 from tactile_bayes import plotting
 from tactile_bayes.arrays import Floats
-from tactile_bayes.diagnostics.findings import Finding
+from tactile_bayes.diagnostics.findings import contradiction
 from tactile_bayes.diagnostics.inspection import CellSource, known_cell
 from tactile_bayes.diagnostics.result_check import CONTRADICTION, doubtful_sides
 from tactile_bayes.load_cell import LoadCell
@@ -76,7 +76,7 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
             sentences.append(f"{words}; they share an unknown bias, so that no probability can be stated.")
         elif chance < CONTRADICTION:
             sentences.append(f"{words}.")
-            against.append(Finding("contradiction", chance=f"{chance:.1g}", dragging=""))
+            against.append(contradiction(chance))
         else:
             sentences.append(f"{words}, which noise explains with probability {chance:.2g}.")
         score = float(contacts.attrs["axial_score"])

@@ -148,7 +148,7 @@ def test_false_alarms_are_as_rare_as_stated():
 
 def correction_in(said):
     (finding,) = [finding for finding in said if finding.kind == "no fit"]
-    return finding.values["advice"].removeprefix("nearly all would if ") + "."
+    return finding.details["advice"].removeprefix("nearly all would if ") + "."
 
 
 def correction(record):
@@ -237,13 +237,13 @@ def test_friction_is_named():
 
 def test_wrong_units_come_first(coarse):
     first, *_ = words(changed(coarse, force_x=1e3 * coarse.force_x, force_y=1e3 * coarse.force_y))
-    assert (first.kind, first.values["largest"]) == ("large loads", "1.13e+04")
+    assert (first.kind, first.details["largest"]) == ("large loads", "1.13e+04")
 
 
 def test_a_wrong_rod_is_told_with_what_to_check(coarse):
     stiffer = coarse.assign_attrs(rod_flexural_rigidity=1.2 * ROD.flexural_rigidity)
     first, *_ = words(stiffer)
-    assert (first.kind, first.values["advice"]) == ("no fit", CHECK_RIG)
+    assert (first.kind, first.details["advice"]) == ("no fit", CHECK_RIG)
 
 
 def test_readings_that_stand_out_in_contact_and_out_of_it(record):
@@ -252,18 +252,22 @@ def test_readings_that_stand_out_in_contact_and_out_of_it(record):
     assert not found.samples.outlier.sel(channel=["holding_moment", "force_y"]).values.any()
     assert found.messages[0].kind == "outlier"
     assert found.messages[0].startswith("2 readings of force_x stand out from their neighbours (samples 5 and 100)")
-    assert "load_cell_degrees_of_freedom: 4" in found.messages[0].values["advice"]
+    assert "load_cell_degrees_of_freedom: 4" in found.messages[0].details["advice"]
     of_outliers = tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3, degrees_of_freedom=5.0)
     (sentence,) = words(put(record, "force_x", [5, 100], [0.05, 0.3]), load_cell=of_outliers)
-    assert "that is stated allows for some" in sentence.values["advice"]
+    assert "that is stated allows for some" in sentence.details["advice"]
 
 
 def test_readings_that_are_stuck(record):
     found = tb.inspect_record(put(record, "force_y", slice(60, 72), record.force_y[60]))
     assert np.flatnonzero(found.samples.stuck.sel(channel="force_y")).tolist() == list(range(60, 72))
     stuck_, *_ = found.messages
-    assert (stuck_.kind, stuck_.values["channel"], stuck_.values["samples"]) == ("stuck", "force_y", "samples 60 to 71")
-    assert stuck_.values["readings"] == "12 readings"
+    assert (stuck_.kind, stuck_.details["channel"], stuck_.details["samples"]) == (
+        "stuck",
+        "force_y",
+        "samples 60 to 71",
+    )
+    assert stuck_.details["readings"] == "12 readings"
 
 
 def test_samples_that_are_stored_twice(record):
@@ -271,7 +275,7 @@ def test_samples_that_are_stored_twice(record):
     found = tb.inspect_record(again)
     assert np.flatnonzero(found.samples.repeated).tolist() == [31]
     assert found.messages[0].kind == "stored twice"
-    assert found.messages[0].values["samples"] == "sample 31"
+    assert found.messages[0].details["samples"] == "sample 31"
 
 
 @pytest.mark.parametrize("stated", [False, True])
@@ -281,15 +285,15 @@ def test_readings_that_are_cut_off(ideal, stated):
     flagged = found.samples.cut_off.sel(channel="force_y").values
     assert np.abs(measured.force_y.values[flagged]).min() == 0.5
     assert np.count_nonzero(flagged) == (np.abs(measured.force_y.values) == 0.5).sum()
-    values = found.messages[0].values
+    values = found.messages[0].details
     assert (found.messages[0].kind, values["channel"], values["largest"]) == ("cut off", "force_y", "500 mN")
     assert bool(values["advice"]) is not stated
 
 
 def test_a_channel_that_never_changes(record):
     (dead,) = words(put(record, "force_x", slice(None), 0.013))
-    assert (dead.kind, dead.values["channel"]) == ("dead channel", "force_x")
-    assert dead.values["entry"] == 'missing = ["force_x"] under [file] of rig.toml'
+    assert (dead.kind, dead.details["channel"]) == ("dead channel", "force_x")
+    assert dead.details["entry"] == 'missing = ["force_x"] under [file] of rig.toml'
 
 
 def test_a_record_or_a_sweep_without_contact(record):
@@ -302,26 +306,26 @@ def test_a_record_or_a_sweep_without_contact(record):
     of_second = record.sweep.values == 1
     half = {name: np.where(of_second, silent[name], record[name]) for name in ("holding_moment", *noise)}
     (sentence,) = words(changed(record, **half))
-    assert (sentence.kind, sentence.values["sweeps"]) == ("sweep without contact", "Sweep 1 shows")
+    assert (sentence.kind, sentence.details["sweeps"]) == ("sweep without contact", "Sweep 1 shows")
 
 
 def test_a_zero_that_moves_and_one_that_is_not_as_stated(ideal, record):
     later = record.sweep.values == 1
     moved = words(changed(record, force_y=record.force_y + 0.01 * later))
     assert moved[0].kind == "zero moved"
-    assert moved[0].values["moved"].startswith("force_y (")
+    assert moved[0].details["moved"].startswith("force_y (")
     untared = changed(LOAD_CELL.measure(ideal, rng=1), force_y=LOAD_CELL.measure(ideal, rng=1).force_y + 0.015)
     (sentence,) = words(untared)
     assert sentence.kind == "zero off"
-    assert sentence.values["off"].startswith("force_y is off by 15.1 mN (")
+    assert sentence.details["off"].startswith("force_y is off by 15.1 mN (")
     assert words(bare(untared)) == NOTHING  # without a data sheet a bias is nothing wrong
 
 
 def test_a_zero_farther_off_than_infer_expects_is_to_be_taken_off(record):
     for load_cell in (None, LOAD_CELL):
         (sentence,) = words(changed(record, force_y=record.force_y.values - 0.03), load_cell=load_cell)
-        assert (sentence.kind, sentence.values["zeros"]) == ("far zero", "-29.9 mN of force_y")
-        assert sentence.values["how"].endswith('force_y = "force_y+0.0299" under [file] of rig.toml')
+        assert (sentence.kind, sentence.details["zeros"]) == ("far zero", "-29.9 mN of force_y")
+        assert sentence.details["how"].endswith('force_y = "force_y+0.0299" under [file] of rig.toml')
 
 
 def test_corrections_name_the_columns_of_the_file(coarse, tmp_path):
@@ -363,7 +367,7 @@ def test_noise_that_is_not_white_and_noise_that_is_not_as_stated(ideal):
     )
     first, *_ = words(stated)
     assert first.kind == "noise not as stated"
-    assert first.values == {"channel": "force_x", "found": "2.91 mN", "stated": "1 mN"}
+    assert first.details == {"channel": "force_x", "found": "2.91 mN", "stated": "1 mN"}
 
 
 def test_noise_without_a_standard_deviation_is_not_compared(record):
@@ -380,7 +384,7 @@ def test_a_drive_that_loses_steps_and_a_sweep_that_is_cut(record):
     assert np.flatnonzero(found.samples.uneven_step).tolist() == [50]
     assert [message.kind for message in found.messages] == ["uneven steps"]
     cut = words(record.isel(sample=slice(30, 140)))
-    assert [(each.kind, each.values["sweeps"]) for each in cut] == [
+    assert [(each.kind, each.details["sweeps"]) for each in cut] == [
         ("begins in contact", "Sweep 0 begins"),
         ("ends in contact", "Sweep 0 ends"),
     ]
@@ -475,7 +479,7 @@ def test_a_drive_that_stops_to_measure_raises_no_alarm(ideal):
     np.testing.assert_array_equal(found.sweeps.positions, found.sweeps.samples / 10)
     lost = held(ideal, 10).isel(sample=np.delete(np.arange(10 * ideal.sizes["sample"]), slice(400, 420)))
     (sentence,) = words(lost)
-    assert (sentence.kind, sentence.values["samples"]) == ("uneven steps", "sample 400")
+    assert (sentence.kind, sentence.details["samples"]) == ("uneven steps", "sample 400")
 
 
 def test_noise_between_positions_that_readings_do_not_explain_is_named(ideal):

@@ -47,7 +47,7 @@ class Inspection:
         The record.
     messages : tuple of Finding
         What looks wrong, the most serious first, or "Nothing looks wrong.": sentences, each with its `kind` and
-        `values`.
+        `details`.
     is_suspect : bool
         True if anything looks wrong.
     sweeps : xr.Dataset
