@@ -22,7 +22,7 @@ demo: $(READY)
 # what a file of tests prepares.
 test notebooks: export OPENBLAS_NUM_THREADS = 1
 test: $(READY)
-	$(BIN)/python -m pytest -n auto --dist worksteal --doctest-modules src tests
+	$(BIN)/python -m pytest -n auto --dist worksteal --doctest-modules src tests $(TEST_OPTIONS)
 
 notebooks: $(READY)
 	$(BIN)/python -m pytest -n auto --nbmake --nbmake-timeout=1200 notebooks

@@ -48,7 +48,6 @@ CALLS = [
     "sensitivity --rig {study/study.nc} --replicates 1 --out .",
     "design --carry {candidates.csv} --out .",
     "design {design.nc} --out .",
-    "figures --carry {figure_03_motion.pdf} --out .",
     "trust run --out {posterior.nc=trust.nc}",
     "report run --out {run/posterior.nc}",
     "report run --out {run/trust.nc}",

@@ -422,9 +422,6 @@ def _record_calls(folder: Path) -> dict[str, Call]:
             tb.inspect_record,
             {"record": measured(), "rig": STATED, "false_alarm": 1e-3, "progress": None},
         ),
-        "unit_and_sign_findings": Call(
-            tb.diagnostics.unit_and_sign_findings, {"measured": measured(), "load_cell": CELL}
-        ),
         "read_result": Call(tb.read_result, {"path": posterior_file}),
         "write_result": Call(tb.write_result, {"result": posterior(), "path": folder / "out.nc"}),
         "to_arviz": Call(tb.to_arviz, {"posterior": posterior()}),
@@ -577,7 +574,6 @@ def _summary_calls() -> dict[str, Call]:
         "contact_region": Call(
             tb.uncertainty.contact_region, {"posterior": contacts_drawn(), "sample": 20, "probability": 0.9}
         ),
-        "check_record": Call(tb.diagnostics.check_record, {"posterior": posterior(), "false_alarm": 1e-3}),
         "check": Call(tb.check, {"posterior": posterior(), "contacts": contacts(), "trust": None, "false_alarm": 1e-3}),
         "trust": Call(
             tb.trust,

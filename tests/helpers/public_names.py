@@ -13,7 +13,10 @@ PREFIXES = {
     "tactile_bayes.mechanics.elastica": "elastica.",
 }
 # Modules of what functions return or raise.
-RESULTS = {f"tactile_bayes.{name}" for name in ("errors", "sweep", "diagnostics.inspection", "load_cell.discrepancy")}
+RESULTS = {
+    f"tactile_bayes.{name}"
+    for name in ("errors", "sweep", "diagnostics", "diagnostics.inspection", "load_cell.discrepancy")
+}
 
 
 def listed():
