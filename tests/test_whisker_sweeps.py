@@ -13,17 +13,19 @@ from tactile_bayes.rig import Rig
 
 # The likeliest draw of `python -m benchmarks.whisker_sweeps`.
 RIG = {
-    "drive_angle_offset": -0.0143378,
-    "friction": 0.633395,
-    "rest_shape_1": 0.579817,
-    "rest_shape_2": -0.477267,
-    "rest_shape_3": -0.182371,
-    "moment_gain": 0.866107,
-    "moment_curve_quadratic": 692.468,
-    "moment_curve_cubic": 1.71219e6,
-    "suspension_compliance": 1233.83,
-    "gauge_x": 0.312755e-3,
-    "gauge_y": 3.40276e-3,
+    "drive_angle_offset": -0.0168945,
+    "friction": 0.499503,
+    "rest_shape_1": 0.484229,
+    "rest_shape_2": 0.0182758,
+    "rest_shape_3": 0.379892,
+    "rest_shape_4": 2.64461,
+    "rest_shape_5": -0.576152,
+    "moment_gain": 0.875982,
+    "moment_curve_quadratic": 778.27,
+    "moment_curve_cubic": 1.82393e6,
+    "suspension_compliance": 1300.49,
+    "gauge_x": 0.289417e-3,
+    "gauge_y": 3.31184e-3,
 }
 
 
