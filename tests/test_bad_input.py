@@ -95,7 +95,7 @@ def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
     (tmp_path / "rig.toml").write_text(f'unknown = "nothing"\n[file]\nmissing = {missing}\n')
     result = commands.call("infer", path, "--out", tmp_path / "run", "-q", "--rig", tmp_path / "rig.toml")
     assert result.exit_code == 0, result.output
-    assert "No contact points: Step 2 needs all three load channels." in result.stdout
+    assert "No contact points" in result.stdout
 
 
 # --- Contours -----------------------------------------------------------------------------------------------------

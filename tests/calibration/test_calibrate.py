@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import json
+import re
 import subprocess
 import sys
 import time
@@ -89,7 +90,7 @@ def test_what_is_found(small):
     assert np.all((found.coverage >= 0.0) & (found.coverage <= 1.0))
     assert np.all(found.width_in_gap > 0.0)
     assert np.all(found.evaluations > 0)
-    assert found.attrs["verdict"].startswith("Too few replicates to judge: 2 posteriors, and at least 20 are needed.")
+    assert (found.attrs["conclusion"], found.attrs["replicates"]) == ("too few", 2)
 
 
 SNAP_OFFS = ("snap_off_forward", "snap_off_backward")
@@ -157,9 +158,8 @@ def test_what_is_lost_holds_nowhere(with_lost):
 
 def test_what_is_lost_is_named_with_the_way_to_it(with_lost):
     found, _ = with_lost
-    said = found.attrs["verdict"]
-    assert said.startswith("Too few replicates to judge: 1 posteriors, and at least 20 are needed. ")
-    assert "3 lost, in which no claim holds: 0, 1, 2 (StrangeError). To see why, add --replicate 0 --debug" in said
+    for part in ("1 posteriors", "3 lost", ": 0, 1, 2 (StrangeError)", "--replicate 0 --debug"):
+        assert part in found.attrs["verdict"]
 
 
 def test_what_is_lost_is_kept(with_lost, monkeypatch):
@@ -496,7 +496,7 @@ def test_noise_larger_than_told_is_found():
     truth = replace(rig, load_cell=LoadCell(force_noise=0.055, moment_noise=0.022))
     found = quickly(replicates=25, rig=rig, truth=truth, workers=None)
     assert found.attrs["calibrated"] == 0
-    assert "noise_scale: posteriors lie too low" in found.attrs["verdict"]
+    assert re.search(r"noise_scale: [\w ]* low\b", found.attrs["verdict"])
 
 
 @pytest.mark.slow
@@ -513,7 +513,7 @@ def test_a_shifted_prior_is_found():
         workers=None,
     )
     assert found.attrs["calibrated"] == 0
-    assert "rigidity_scale: posteriors lie too low" in found.attrs["verdict"]
+    assert re.search(r"rigidity_scale: [\w ]* low\b", found.attrs["verdict"])
 
 
 @pytest.mark.slow
@@ -532,4 +532,4 @@ def test_a_wrong_sampler_is_found(monkeypatch):
     monkeypatch.setattr(moves.FittedMove, "get_proposal", turned)
     found = quickly(replicates=40)
     assert found.attrs["calibrated"] == 0
-    assert "log_likelihood: the truth explains the records worse than the draws do" in found.attrs["verdict"]
+    assert re.search(r"log_likelihood: [\w ]* worse\b", found.attrs["verdict"])

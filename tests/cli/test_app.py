@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -95,7 +96,7 @@ def test_every_command_has_an_example_can_be_quiet_and_answers_in_json(command):
 
 def test_help_states_the_exit_codes():
     words = " ".join(call("--help").stdout.split())
-    assert "0 for done, 1 for an unexpected error, 2 for input or options that are refused, 130 for Ctrl-C" in words
+    assert re.search(r" 0 .*done.* 1 .*error.* 2 .*refused.* 130 .*Ctrl-C.* 143 .*terminated", words)
 
 
 def test_version():
@@ -119,7 +120,7 @@ def test_a_record_too_short_of_time_is_said_not_to_have_converged(record, tmp_pa
     """As a stranger starts it, figures and all."""
     out, errors = start("infer", record, "--out", "run", "--max-seconds", 1, "--quiet", cwd=tmp_path)
     assert errors == ""
-    assert out.startswith("NOT CONVERGED, the time allowed ran out after ")
+    assert re.match(r"NOT CONVERGED, .*time allowed", out)
     assert out.lower().count("not converged") == 1
     assert "\nSamples: " in out
     for name in ("a", "q", "x_c", "noise_scale", "gap width"):
@@ -171,18 +172,17 @@ def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_p
         raise RuntimeError("it broke")
 
     monkeypatch.setattr(contour_run, "contour_band", broken)
-    said = "Left out: band. Unexpected error, RuntimeError: it broke"
     result = call("infer", record, "--out", tmp_path / "run", "--quiet")
     assert result.exit_code == 0, result.output
-    assert said in result.stdout.split("\n\n")[0].splitlines()
-    assert result.stderr == "tactile-bayes: left out: band; tactile-bayes --debug ... shows the traceback\n"
+    assert re.search("(?m)^Left out: band.*: it broke$", result.stdout.split("\n\n")[0])
+    assert re.fullmatch("tactile-bayes: .*band.*--debug.*\n", result.stderr)
     assert (tmp_path / "run" / "posterior.nc").exists()
     assert not (tmp_path / "run" / "band.csv").exists()
     traced = call("--debug", "infer", record, "--out", tmp_path / "run", "--json")
     assert traced.exit_code == 0
     answer = json.loads(traced.stdout)
     assert answer["left_out"] == {"band": "it broke"}
-    assert said in answer["words"]
+    assert any("RuntimeError: it broke" in words for words in answer["words"])
     assert "band" not in answer["files"]
     assert traced.stderr.startswith("Traceback (most recent call last):")
     assert "in broken" in traced.stderr
@@ -192,7 +192,7 @@ def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_p
 def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
     result = call("demo", "--out", tmp_path / "demo")
     assert result.exit_code == 0, result.output
-    assert "for your own record:\ntactile-bayes infer RECORD --rig rig.toml --out RUN" in result.stdout
+    assert "\ntactile-bayes infer RECORD --rig rig.toml --out RUN\n" in result.stdout
     assert "truth" in result.stdout
     assert f"record       {tmp_path / 'demo' / 'record.csv'}" in result.stdout
     assert Rig.read(tmp_path / "demo" / "rig.toml").entries == dict(NOTHING)
@@ -243,9 +243,8 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
     path.write_text("\n".join([names, *rows]) + "\n", encoding="utf-8")
     result = call("infer", path, "--out", tmp_path / "run", "-q")
     assert result.exit_code == 0, result.output
-    assert result.stderr.startswith("The record states no units: its numbers are taken as dimensionless")
-    assert "give --length and --flexural-rigidity, or a [rod] in rig.toml" in result.stderr
-    assert "No contact points: Step 2 needs all three load channels." in result.stdout
+    assert re.match(r".*dimensionless.*--length.*--flexural-rigidity.*\[rod\]", result.stderr)
+    assert "No contact points" in result.stdout
 
 
 # --- Refusals -------------------------------------------------------------------------------------------------------
@@ -254,16 +253,16 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--length", "0.1"], "--length and --flexural-rigidity go together"),
+        (["--length", "0.1"], "--length and --flexural-rigidity"),
         (["--rig", __file__], "not TOML"),
         (["--rig", "nowhere.toml"], "nowhere.toml: No such file or directory"),
-        (["--flexural-rigidity", "0.1"], "--length and --flexural-rigidity go together"),
-        (["--diameter", "0.001"], "--diameter needs --length and --flexural-rigidity beside it"),
-        (["--length", "-1", "--flexural-rigidity", "1"], "the rod's length is -1.0"),
-        (["--length", "0.3", "--flexural-rigidity", "1"], "but Rod(length=0.3, flexural_rigidity=1.0, diameter=0.0) w"),
-        (["--family", "blob"], "there is no family 'blob'"),
-        (["--probability", "1"], "probability is 1.0: give a number between 0 and 1, like 0.95"),
-        (["--force-noise", "-1"], "the load cell's force_noise is -1.0"),
+        (["--flexural-rigidity", "0.1"], "--length and --flexural-rigidity"),
+        (["--diameter", "0.001"], "--diameter needs --length and --flexural-rigidity"),
+        (["--length", "-1", "--flexural-rigidity", "1"], "length is -1.0"),
+        (["--length", "0.3", "--flexural-rigidity", "1"], "Rod(length=0.3, flexural_rigidity=1.0, diameter=0.0)"),
+        (["--family", "blob"], "no family 'blob'"),
+        (["--probability", "1"], "probability is 1.0"),
+        (["--force-noise", "-1"], "force_noise is -1.0"),
     ],
 )
 def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, options, message):
@@ -273,12 +272,12 @@ def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, opt
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        ('missing = ["force_z"]', "'force_z' is no channel; the channels are holding_moment, force_x, force_y"),
-        ('missing = ["force_x"]', "column 'force_x' has values, but is declared missing"),
-        ('force = "Fx"', "there is no key 'file.force': did you mean 'force_"),
-        ('force_x = "Fx[mN]"', "there is no column 'Fx', which is given for 'force_x' (columns: sweep, "),
-        ('force_x = "force_x[mm]"', "column 'force_x' is in [N], but [mm] is given for it"),
-        ("split_sweeps = true", "column 'sweep' is there already: do without split_sweeps, or remove the column"),
+        ('missing = ["force_z"]', "'force_z' is no channel"),
+        ('missing = ["force_x"]', "column 'force_x' has values"),
+        ('force = "Fx"', "no key 'file.force': did you mean 'force_"),
+        ('force_x = "Fx[mN]"', "no column 'Fx', which is given for 'force_x' (columns: sweep, "),
+        ('force_x = "force_x[mm]"', "column 'force_x' is in [N], but [mm]"),
+        ("split_sweeps = true", "column 'sweep' is there already: do without split_sweeps"),
     ],
 )
 @pytest.mark.parametrize("command", ["infer", "inspect", "reconstruct"])
@@ -293,9 +292,9 @@ def test_a_rigs_file_that_does_not_fit_the_record_is_refused_in_a_line(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
-        (["--column", "force_x=a", "--column", "force_x=b"], "--column force_x= is given twice: keep one of them"),
-        (["--column", "force=Fx"], "columns: 'force' is no column of a record: did you mean 'force_"),
+        (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT]"),
+        (["--column", "force_x=a", "--column", "force_x=b"], "--column force_x= is given twice"),
+        (["--column", "force=Fx"], "'force' is no column of a record: did you mean 'force_"),
         (["--missing", "force_z"], "'force_z' is no channel"),
         (["--split-sweeps"], "column 'sweep' is there already"),
     ],
@@ -305,12 +304,11 @@ def test_options_of_an_inspection_that_do_not_fit_are_refused(record, options, m
 
 
 @pytest.mark.filterwarnings("ignore:.*no unit is stated")
-@pytest.mark.parametrize("option", ["force", "moment"])
-def test_half_a_noise_is_refused_where_nobody_states_the_other(bare, tmp_path, option):
-    other = {"force": "holding_moment is measured too: give --moment-noise", "moment": "give --force-noise"}[option]
-    result = call("infer", bare, *ROD_OPTIONS, f"--{option}-noise", 0.1, "--out", tmp_path)
-    assert result.exit_code == 2
-    assert other in result.stderr
+@pytest.mark.parametrize(
+    ("option", "named"), [("force", ("holding_moment", "--moment-noise")), ("moment", ("force_x", "--force-noise"))]
+)
+def test_half_a_noise_is_refused_where_nobody_states_the_other(bare, tmp_path, option, named):
+    assert_refused(call("infer", bare, *ROD_OPTIONS, f"--{option}-noise", 0.1, "--out", tmp_path), *named)
 
 
 @pytest.mark.filterwarnings("ignore:.*no unit is stated")
@@ -374,7 +372,7 @@ def test_a_file_that_is_not_there(tmp_path, name):
 @pytest.mark.parametrize("name", ["a.csv", "a.nc", "a"])
 def test_a_directory_for_a_record(tmp_path, name):
     (tmp_path / name).mkdir()
-    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), "holds no record: give a folder of .csv")
+    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), tmp_path / name, "holds no record")
 
 
 def test_a_folder_that_cannot_be_made(record):
@@ -406,13 +404,13 @@ def test_an_error_that_nobody_foresaw_is_no_traceback_unless_asked(record, tmp_p
     assert result.exit_code == 1
     assert result.stdout == ""
     *before, last = result.stderr.splitlines()
-    first = "tactile-bayes: unexpected error, ZeroDivisionError: float division by zero"
+    first = "ZeroDivisionError: float division by zero"
     if debug:
         assert before[0] == "Traceback (most recent call last):"
-        assert last == first
+        assert last.endswith(first)
     else:
-        assert before == [first]
-        assert last == "Run it again as tactile-bayes --debug ... to see the traceback."
+        assert [line.endswith(first) for line in before] == [True]
+        assert "tactile-bayes --debug" in last
 
 
 @pytest.mark.filterwarnings("always::tactile_bayes.errors.StrainWarning")
@@ -421,7 +419,7 @@ def test_a_warning_is_a_line(rig_file, tmp_path):
     result = call("scan", "--rig", rod, "--drive-step", 10, "--direction", "forward", "--out", tmp_path / "record.csv")
     assert result.exit_code == 0, result.output
     (line,) = result.stderr.splitlines()
-    assert line.startswith("tactile-bayes: warning: in the forward sweep from (0, 0) the rod is strained by ")
+    assert re.match(r"tactile-bayes: warning: .*forward.*\(0, 0\).*strained", line)
 
 
 def test_shells_can_complete_options():
@@ -467,12 +465,9 @@ def test_control_c_while_sampling_keeps_what_there_is(record, tmp_path):
     code, out, errors = interrupted_while_sampling("infer", record, tmp_path, setup=NO_FIGURES)
     assert code == 130
     answer, end = errors.split("\n", 2)[1:]
-    assert answer.startswith("tactile-bayes: stopping; the draws made so far are checked, plotted and written now")
-    assert end == (
-        "tactile-bayes: interrupted, results are from the draws made by then: with --checkpoint FOLDER the same "
-        "command can resume an interrupted run\n"
-    )
-    assert "NOT CONVERGED, interrupted after " in out.split("\n\n")[0]
+    assert answer.startswith("tactile-bayes: stopping; ")
+    assert re.fullmatch("tactile-bayes: interrupted, .*--checkpoint FOLDER.*\n", end)
+    assert "NOT CONVERGED, interrupted" in out.split("\n\n")[0]
     assert {path.name for path in (tmp_path / "run").iterdir()} == {
         "posterior.nc",
         "contacts.csv",
@@ -491,7 +486,7 @@ def test_control_c_before_there_is_a_draw_says_so(record, tmp_path, monkeypatch)
     monkeypatch.setattr(contour, "sample", interrupted)
     result = call("infer", record, "--out", tmp_path, "-q")
     assert result.exit_code == 130
-    assert result.stderr == "tactile-bayes: interrupted, results are incomplete\n"
+    assert re.fullmatch("tactile-bayes: interrupted, .*incomplete\n", result.stderr)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -36,7 +36,7 @@ def done(call, tmp_path_factory, coarse_pictures):
 def test_the_verdict_comes_first_then_what_holds_then_the_files(done):
     out, said = done
     lines = said.splitlines()
-    assert lines[0].startswith("Too few replicates to judge: 2 posteriors, and at least 20 are needed.")
+    assert [part for part in ("Too few", " 2 posteriors", " 20 ") if part not in lines[0]] == []
     assert lines[0] == (out / "verdict.txt").read_text(encoding="utf-8").strip()
     assert lines[2].split() == ["stated", "with", "90%", "holds", "in", "of", "replicates"]
     assert any(line.startswith("band, in the gap") for line in lines)
@@ -70,8 +70,8 @@ def test_the_same_command_makes_nothing_again(call, done):
 
 def test_another_experiment_is_refused(call, done):
     out, _ = done
-    message = "holds replicates of another experiment: seed is 1 there and 2 here"
-    commands.assert_refused(call("--out", out, "--replicates", 2, "--seed", 2, *QUICK), message)
+    result = call("--out", out, "--replicates", 2, "--seed", 2, *QUICK)
+    commands.assert_refused(result, out, "seed is 1 there and 2 here")
 
 
 def test_the_rig_of_the_truth_is_passed_on(call, tmp_path, rig_file, monkeypatch):
@@ -128,7 +128,7 @@ def test_a_lost_replicate_is_said_to_be(call, tmp_path, monkeypatch):
     result = call("--out", tmp_path / "out", "--replicate", 3, *QUICK)
     assert result.exit_code == 0, result.output
     lines = result.stdout.splitlines()
-    assert lines[0] == "Replicate 3 was lost: ZeroDivisionError: nothing left. --debug shows the traceback."
+    assert [one for one in ("Replicate 3", "ZeroDivisionError: nothing left", "--debug") if one not in lines[0]] == []
     assert [line.split()[0] for line in lines[3:7]] == ["a", "q", "x_c", "noise_scale"]
     assert not (tmp_path / "out").exists()
 
@@ -141,15 +141,15 @@ def test_debug_lets_its_error_through(as_stated, tmp_path, monkeypatch, words):
     assert result.exit_code == 1
     assert "Traceback (most recent call last)" in result.stderr
     assert "in make_replicate" in result.stderr
-    assert result.stderr.splitlines()[-1] == "tactile-bayes: unexpected error, ZeroDivisionError: nothing left"
+    assert result.stderr.splitlines()[-1].endswith("ZeroDivisionError: nothing left")
 
 
 def test_lost_replicates_end_no_run(call, tmp_path, monkeypatch):
     monkeypatch.setattr(making, "sampled", fail)
     result = call("--out", tmp_path, "--replicates", 2, *QUICK)
     assert result.exit_code == 0, result.output
-    assert "2 lost, in which no claim holds: 0, 1 (ZeroDivisionError)" in result.stdout
-    assert "add --replicate 0 --debug to the command" in result.stdout
+    said = ("2 lost", "0, 1 (ZeroDivisionError)", "--replicate 0 --debug")
+    assert [part for part in said if part not in result.stdout] == []
     told = json.loads(call("--out", tmp_path, "--replicates", 2, "--json", *QUICK).stdout)
     assert (told["conclusion"], told["lost"], told["claims"]) == ("too few", 2, [])
 
@@ -161,7 +161,7 @@ def test_lost_replicates_end_no_run(call, tmp_path, monkeypatch):
     ("options", "words"),
     [
         (["--truth", "nowhere.toml"], "nowhere.toml: No such file or directory"),
-        (["--base", "0"], "--base is '0': give 2 numbers with commas between them"),
+        (["--base", "0"], "--base is '0'"),
         (["--family", "cube"], "cube"),
         (["--workers", "few"], "--workers is 'few'"),
     ],

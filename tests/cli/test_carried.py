@@ -60,7 +60,7 @@ def test_a_scan_prints_travels_and_how_contact_ends(tmp_path):
     assert f"{expected.events['forward'].snap_off.travel:.4f}" in result.stdout
     np.testing.assert_allclose(tb.read_record(out).base_x, expected.record.base_x, atol=1e-15)
     short = call("scan", *CIRCLE, "--carry", "0.8,0,180,68.75,1.1", "--drive-step", 0.05, "--out", out)
-    assert "still in contact at the end" in short.stdout
+    assert "still in contact" in short.stdout
     assert tb.read_record(out).sizes["sample"] == 23
     (sweep,) = json.loads(call("scan", *CARRY, "--out", out, "--json").stdout)["sweeps"]
     assert sweep["carried"]
@@ -78,14 +78,14 @@ def test_poses_are_read_from_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--carry", "0.8,0,180"], "5 numbers"),
-        (["--carry", "nowhere.csv"], "nowhere.csv: the poses cannot be read"),
-        (["--drive-step", 1e-4], "--drive-step is 0.0001: give a step of rotations from 0.001 to 28 degrees"),
-        ([*CARRY[:2], "--base", "0,0", "--drive-step", 0.1], "one by one"),
+        (["--carry", "0.8,0,180"], ["5 numbers"]),
+        (["--carry", "nowhere.csv"], ["nowhere.csv", "poses"]),
+        (["--drive-step", 1e-4], ["--drive-step is 0.0001", "0.001 to 28 degrees"]),
+        ([*CARRY[:2], "--base", "0,0", "--drive-step", 0.1], ["one by one"]),
     ],
 )
 def test_drives_that_contradict_each_other_are_refused(tmp_path, options, words):
-    assert_refused(call("scan", *CIRCLE, *options, "--out", tmp_path / "scan.csv"), words)
+    assert_refused(call("scan", *CIRCLE, *options, "--out", tmp_path / "scan.csv"), *words)
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_a_report_says_travels(carried):
     page = page_of(findings_of(carried[1]), "run")
     assert "carried 1.6\xa0L" in page["sweeps"].rows[0]
     assert page["all_readings"].heads[3] == "travel [L]"
-    assert "an arc without a gap" in page["gap"][0]
+    assert "without a gap" in page["gap"][0]
     frames = page["data"]["frames"]["said"]
     assert frames["travel"][-1].startswith(", travel 1.6")
 
@@ -136,11 +136,11 @@ def test_a_report_says_which_sweep_is_carried(mixed):
     both = page_of(findings_of(mixed[1]), "run")
     assert [sweep["name"] for sweep in both["data"]["frames"]["sweeps"]][-1] == "sweep 2, forward, carried"
     assert both["data"]["frames"]["said"]["travel"][0] == ""
-    assert both["gap"][0].startswith("No gap is left: the sweeps overlap by")
+    assert both["gap"][0].startswith("No gap ")
 
 
 def test_one_carried_sweep_has_no_gap(carried):
-    with refused(InferenceError, "one sweep touches an arc", "first contact", "last contact"):
+    with refused(InferenceError, "one sweep", "first contact", "last contact"):
         tb.gap(read_result(carried[1] / "posterior.nc"))
 
 
@@ -158,5 +158,5 @@ def test_a_misfit_of_a_carried_sweep_is_placed_by_its_travel(carried, tmp_path):
     bent = tmp_path / "bent.csv"
     tb.write_record(record.assign(force_y=record.force_y + 0.15 * np.sin(40.0 * record.base_x)), bent)
     result = call("infer", bent, "--family", "circle", "--rig", as_stated_in(tmp_path), "--out", tmp_path / "run")
-    assert "do not describe the record" in result.stdout
+    assert "do not describe" in result.stdout
     assert " L of travel it is off" in result.stdout.replace("\n", " ")

@@ -1,5 +1,6 @@
 """The command `compare`: what it prints, writes and refuses."""
 
+import re
 import sys
 
 import pandas as pd
@@ -59,7 +60,7 @@ def test_the_verdict_comes_first_then_the_table_then_the_files(compared):
     assert result.stdout.splitlines()[0].startswith("parabola with probability above 0.999")
     assert set(rows(result.stdout)) == {"parabola", "circle"}
     assert rows(result.stdout)["circle"][-1] == "no"
-    assert "Far off, and not sampled: circle" in result.stdout
+    assert "not sampled: circle" in result.stdout
     assert "elpd" not in result.stdout
     listed = result.stdout.split("\n\n")[-1].splitlines()
     assert {line.split(maxsplit=1)[1] for line in listed} == {str(folder / name) for name in FILES}
@@ -103,7 +104,7 @@ def test_the_table_says_how_samples_are_predicted(instead, record, tmp_path, mon
         "circle": ">0.999 -100.0 0 1 0.400 yes",
         "ellipse": "<0.001 -108.1 -9.0 ± 3.0 0 0.001 no",
     }
-    assert "Leave-one-out densities are unreliable (Pareto k̂ above 0.7) for circle, ellipse\n" in result.stdout
+    assert "(Pareto k̂ above 0.7) for circle, ellipse\n" in result.stdout
 
 
 def test_that_none_fits_is_the_first_line(instead, record, tmp_path):
@@ -127,7 +128,7 @@ def test_progress_names_the_family(instead, record, tmp_path, monkeypatch):
     ("options", "message"),
     [
         (["--family", "circle"], "families are circle"),
-        (["--family", "circle", "--family", "blob"], "there is no family 'blob'"),
+        (["--family", "circle", "--family", "blob"], "no family 'blob'"),
         (["--max-seconds", "0"], "max_seconds is 0.0"),
         (["--out", __file__ + "/run"], "Not a directory"),
     ],
@@ -156,6 +157,6 @@ def test_a_call_that_is_none_is_refused_with_the_usage(options, message):
 def test_control_c_while_sampling_ends_all_of_it(record, tmp_path):
     code, out, errors = interrupted_while_sampling("compare", record, tmp_path)
     assert code == 130
-    assert errors == "tactile-bayes: interrupted while sampling shape-free: there is no result\n"
+    assert re.fullmatch("tactile-bayes: interrupted .*shape-free: .*\n", errors)
     assert set(out.splitlines()) <= {"sampling"}
     assert list((tmp_path / "run").iterdir()) == []

@@ -157,7 +157,7 @@ def test_what_was_made_is_said_in_three_lines(small):
     folder, result = small
     assert result.stderr == ""
     first, *rest = result.stdout.splitlines()
-    assert re.fullmatch(r"6 records in 3 files, 0\.\d MB: 6 made in \S+ s, [\d,]+ records/s", first)
+    assert re.fullmatch(r"6 records in 3 files, 0\.\d MB: 6 made .* \S+ s, [\d,]+ .*/s", first)
     assert rest[-1] == f"{folder / 'README.md'} describes the files"
     assert len(list(folder.glob("shard-*.nc"))) == 3
 
@@ -166,8 +166,7 @@ def test_what_is_there_is_not_made_again(small, tmp_path):
     folder, _ = small
     result = call("generate", folder.parent / "small.toml", "--out", folder)
     assert result.exit_code == 0
-    words = ": all existed already, with the right sizes; dataset verify compares every byte"
-    assert result.stdout.splitlines()[0].endswith(words)
+    assert re.search(r"existed already.* dataset verify ", result.stdout.splitlines()[0])
 
 
 def test_contours_that_were_drawn_again_are_counted(specification, tmp_path):
@@ -177,7 +176,7 @@ def test_contours_that_were_drawn_again_are_counted(specification, tmp_path):
     line = result.stdout.splitlines()[1]
     redrawn = json.loads((tmp_path / "set" / "manifest.json").read_text())["redrawn"]
     total = sum(redrawn.values())
-    assert re.fullmatch(rf"{total} contours were drawn again: .*\d+ out of reach.*", line)
+    assert re.fullmatch(rf"{total} contours .*again: .*\d+ out of reach.*", line)
 
 
 def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(specification, tmp_path, monkeypatch):
@@ -195,8 +194,8 @@ def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(specification
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("a = ", "b = "), "there is no key 'contours[0].b'"),
-        (("[0.3, 0.7]", "[1.3, 1.7]"), "was drawn 1000 times, and no contour was one that every sweep can reach"),
+        (("a = ", "b = "), "no key 'contours[0].b'"),
+        (("[0.3, 0.7]", "[1.3, 1.7]"), "drawn 1000 times"),
         (("[scan]", "[scan"), "small.toml: not TOML"),
     ],
 )
@@ -210,7 +209,7 @@ def test_an_impossible_specification_is_refused_in_a_line(specification, tmp_pat
 def test_other_refusals_of_generate(small, specification, tmp_path):
     folder, _ = small
     specification.write_text(SMALL.replace("seed = 1", "seed = 2"), encoding="utf-8")
-    assert_refused(call("generate", specification, "--out", folder), "holds a data set of another specification")
+    assert_refused(call("generate", specification, "--out", folder), folder, "another specification")
     nowhere = tmp_path / "nowhere.toml"
     assert_refused(call("generate", nowhere, "--out", tmp_path), f"{nowhere}: No such file or directory")
     for wrong in ("many", "0", "-1"):
@@ -260,11 +259,11 @@ def test_control_c_says_how_to_go_on_and_the_same_command_does(
         process.send_signal(sent)
         out, errors = process.communicate(timeout=60)
     assert (process.returncode, out) == (code, "")
-    assert errors == f"tactile-bayes: {word}, 4 of 6 records are in set: the same command resumes\n"
+    assert re.fullmatch(f"tactile-bayes: {word}, 4 of 6 records .*set: .*resumes\n", errors)
     monkeypatch.chdir(tmp_path)
     done = call(*arguments[1:])
     assert done.exit_code == 0, done.output
-    assert re.match(r"6 records in 3 files, .* MB: 2 made in ", done.stdout)
+    assert re.match("6 records in 3 files, .*: 2 made ", done.stdout)
     assert tb.datasets.verify(tmp_path / "set").records == 6
 
 
@@ -281,7 +280,7 @@ def test_workers_end_when_it_is_terminated(specification, tmp_path):
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=60)
     assert process.returncode == 143
-    assert errors == "tactile-bayes: terminated, no further record was done: the same command resumes\n"
+    assert re.fullmatch("tactile-bayes: terminated, no further .*\n", errors)
     wait_until(lambda: not any(map(alive, team)), seconds=5.0)
 
 
@@ -294,8 +293,8 @@ def test_rods_that_are_strained_and_sweeps_without_contact_are_told(specificatio
     stated = json.loads((tmp_path / "set" / "manifest.json").read_text())
     assert stated["strained"] > 1
     assert stated["untouched"] > 1
-    assert f"\n{stated['strained']} records with a rod strained beyond the model: their loads" in result.stdout
-    assert f"\n{stated['untouched']} sweeps without a sample in contact\n" in result.stdout
+    assert re.search(rf"\n{stated['strained']} records .*strained", result.stdout)
+    assert re.search(rf"\n{stated['untouched']} sweeps without .*contact\n", result.stdout)
 
 
 # --- Verify ---------------------------------------------------------------------------------------------------------
@@ -305,10 +304,9 @@ def test_a_whole_data_set_is_verified(small):
     folder, _ = small
     result = call("verify", folder, "--regenerate", 5)
     assert (result.exit_code, result.stderr) == (0, "")
-    assert result.stdout.splitlines() == [
-        f"{folder}: 6 records in 3 files, every byte as it was written",
-        "3 files made again: every number is the same",
-    ]
+    written, again = result.stdout.splitlines()
+    assert written.startswith(f"{folder}: 6 records in 3 files, ")
+    assert again.startswith("3 files made again")
 
 
 def test_a_byte_that_differs_is_found(specification, tmp_path):
@@ -317,8 +315,8 @@ def test_a_byte_that_differs_is_found(specification, tmp_path):
     content = bytearray(shard.read_bytes())
     content[-100] ^= 1
     shard.write_bytes(content)
-    assert_refused(call("verify", tmp_path / "set"), "shard-000001.nc is not as it was written")
-    assert_refused(call("verify", tmp_path), f"{tmp_path} holds no data set: there is no manifest.json")
+    assert_refused(call("verify", tmp_path / "set"), shard, "not as it was")
+    assert_refused(call("verify", tmp_path), f"{tmp_path} holds no data set", "manifest.json")
 
 
 # --- Record ---------------------------------------------------------------------------------------------------------
@@ -348,7 +346,7 @@ def test_a_record_without_truth_is_what_a_laboratory_has(small, tmp_path):
 def test_refusals_of_record(small, tmp_path):
     folder, _ = small
     out = ("--out", tmp_path / "record.csv")
-    assert_refused(call("record", folder, 6, *out), "there is no record 6: they are numbered from 0 to 5")
-    assert_refused(call("record", folder, 0, "--out", tmp_path / "record.txt"), "a record is a .csv or a .nc file")
+    assert_refused(call("record", folder, 6, *out), "no record 6", "0 to 5")
+    assert_refused(call("record", folder, 0, "--out", tmp_path / "record.txt"), "record.txt", ".csv", ".nc")
     assert_refused(call("record", tmp_path, 0, *out), "holds no data set")
     assert_refused(call("record", tmp_path / "nowhere", 0, *out), "nowhere: No such file or directory")

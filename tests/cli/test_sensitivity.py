@@ -205,11 +205,11 @@ def test_the_study_is_of_the_profile_or_of_those_that_are_given(asked, tmp_path)
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--base", "0"], "--base is '0': give 2 numbers with commas between them"),
+        (["--base", "0"], "--base is '0'"),
         (["--rig", "nowhere.toml"], "nowhere.toml: No such file or directory"),
-        (["--distance", "1.5"], "the contour is out of reach"),
-        (["--band-width", "1e-12"], "no noise gives a band of 1e-12: without any it would be"),
-        (["--profile", "V"], "there is no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
+        (["--distance", "1.5"], "out of reach"),
+        (["--band-width", "1e-12"], "band of 1e-12"),
+        (["--profile", "V"], "no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
         (["--replicates", "1", "--workers", "few"], "--workers is 'few'"),
         (["--noise-factor", "1"], "--noise-factor is for a study: give --replicates"),
         (["--distance", "0.4", "--distance", "0.5"], "more than one --distance is for a study"),
@@ -238,8 +238,8 @@ def test_the_best_rod_of_a_material_is_found(tmp_path, rig_file, monkeypatch):
     answer = json.loads(result.stdout)
     assert answer["rod"]["length"] == pytest.approx(0.2)
     assert answer["rod"]["diameter"] == pytest.approx(0.7e-3, rel=1e-3)  # of music wire of this stiffness
-    said = "Of 3 rods of this material (1 bent too far) one 200 mm long and 0.7 mm thick suits the load cell best"
-    assert answer["words"][-1].startswith(said)
+    said = ("3 rods", "(1 bent too far)", "200 mm", "0.7 mm")
+    assert [part for part in said if part not in answer["words"][-1]] == []
     assert (tmp_path / "words.txt").read_text(encoding="utf-8").splitlines()[-1] == answer["words"][-1]
     assert (tmp_path / "required_rod.png").is_file()
     with xr.open_dataset(tmp_path / "rods.nc", engine="h5netcdf") as rods:
@@ -247,11 +247,11 @@ def test_the_best_rod_of_a_material_is_found(tmp_path, rig_file, monkeypatch):
 
 
 def test_no_rod_that_serves_is_said():
-    rods = xr.Dataset(
-        {"status": (("length", "diameter"), [["bent too far", "does not reach"]]), "best_width": ((), np.nan)}
-    )
+    statuses = ["bent too far", "does not reach"]
+    rods = xr.Dataset({"status": (("length", "diameter"), [statuses]), "best_width": ((), np.nan)})
     words = sensitivity_run.rod_message(rods)
-    assert words == "None of 2 rods of this material suits the load cell (1 bent too far, 1 does not reach)."
+    assert words.startswith("None of 2 rods ")
+    assert words.endswith("(1 {}, 1 {}).".format(*statuses))
 
 
 @pytest.mark.parametrize(
@@ -261,7 +261,7 @@ def test_no_rod_that_serves_is_said():
         ("[rod]\nlength = 0.2\nflexural_rigidity = 1e-3\ndiameter = 1e-3\n", "elastic_strain under [rod]"),
         (
             "[rod]\nlength = 0.2\nflexural_rigidity = 1e-3\ndiameter = 1e-3\nelastic_strain = 0.01\n",
-            "state its noise under [load_cell]",
+            "noise under [load_cell]",
         ),
     ],
 )

@@ -31,7 +31,7 @@ def test_it_prints_one_object_and_writes_into_the_run(folder, written):
     assert written.exit_code == 0, written.output
     said = json.loads(written.stdout)
     assert said["conclusion"] == "holds"
-    assert said["words"][0] == "The band of probability 0.95 holds, as far as this record shows."
+    assert "0.95 holds" in said["words"][0]
     assert said["parts"][0]["part"] == "sweep 1"
     assert {claim["claim"] for claim in said["claims"]} >= {"pointwise_in_gap", "contact_region"}
     assert said["files"] == {"trust": str(folder / "trust.nc"), "words": str(folder / "trust.txt")}
@@ -47,8 +47,8 @@ def test_it_prints_one_object_and_writes_into_the_run(folder, written):
 def test_the_report_states_it(folder):
     assert commands.call("report", folder).exit_code == 0
     page = Page((folder / "report.html").read_text(encoding="utf-8"))
-    assert "Does the band hold for this record?" in page.texts["h3"]
-    assert "The band of probability 0.95 holds, as far as this record shows." in page.texts["p"]
+    assert any("band hold" in words for words in page.texts["h3"])
+    assert (folder / "trust.txt").read_text(encoding="utf-8").splitlines()[0] in page.texts["p"]
     assert any(caption.startswith("Prediction of the rest") for caption in page.texts["caption"])
 
 
@@ -58,7 +58,7 @@ def test_the_report_refuses_that_of_another_posterior(folder, tmp_path):
     tree["posterior"] = tree["posterior"].to_dataset() * 1.0000001
     write_result(tree, tmp_path / "posterior.nc")
     (tmp_path / "trust.nc").write_bytes((folder / "trust.nc").read_bytes())
-    commands.assert_refused(commands.call("report", tmp_path), "is of another posterior")
+    commands.assert_refused(commands.call("report", tmp_path), "another posterior")
 
 
 def test_a_folder_without_a_posterior_is_refused(tmp_path):

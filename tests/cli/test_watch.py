@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import threading
 import time
@@ -86,8 +87,8 @@ def test_it_follows_a_file_and_ends_with_the_answer_of_a_run(path, lines, follow
     assert " 1/m, q " in said[1]
     assert said[2].startswith("100 samples, 40 new")
     assert said[4].startswith("130 samples, 30 new")
-    assert said[6] == "Ended after 130 samples: no new rows for 0 s."
-    assert said[8].startswith("All is well: the particles no longer depend on where they began")
+    assert said[6].startswith("Ended after 130 samples: ")
+    assert said[8].startswith("All is well: the particles ")
     folder = path.parent / "run"
     assert {"stream.nc", "posterior.nc", "band.csv", "summary.txt", "watch.html"} <= set(os.listdir(folder))
     posterior = read_result(folder / "posterior.nc")
@@ -96,7 +97,7 @@ def test_it_follows_a_file_and_ends_with_the_answer_of_a_run(path, lines, follow
     assert posterior["observed_data"].sizes["sample"] == 130
     assert commands.call("report", folder).exit_code == 0
     page = Page((folder / "report.html").read_text(encoding="utf-8"))
-    assert "Have the particles moved enough?" in page.texts["h3"]
+    assert any("particles" in words for words in page.texts["h3"])
 
 
 @pytest.mark.slow
@@ -136,7 +137,7 @@ def test_each_update_is_a_line_for_programs(path, lines, follow):
     assert {row["quantity"] for row in two["quantities"]} == {"a", "q", "x_c", "noise_scale"}
     assert two["seconds_behind"] >= two["seconds"] > 0.0
     (warning,) = two["warnings"]
-    assert f"line {len(head) + 31}, column 'force_x': the value is missing (nan)" in warning
+    assert re.search(rf"line {len(head) + 31}, column 'force_x': .*nan", warning)
     assert one["warnings"] == []
     assert warning in result.stderr
     assert (end["reason"], end["samples_taken"], end["converged"]) == ("no new rows for 0 s", 49, True)
@@ -152,7 +153,7 @@ def test_a_file_that_is_replaced_begins_again(path, lines, follow):
     )
     one, two, end = objects(result)
     assert (one["samples"], two["samples"], two["new"]) == (40, 25, 25)
-    assert "has been replaced or cut short" in two["warnings"][0]
+    assert f"{path} has been replaced" in two["warnings"][0]
     assert end["samples_taken"] == 25
 
 
@@ -205,7 +206,7 @@ def test_of_a_long_record_every_other_sample_is_taken(path, lines, follow):
     again, *_ = objects(follow(*some, json=True))
     assert (again["samples"], again["new"], again["every"]) == (half, 0, 2)
     said = follow(*some).stdout
-    assert f"Ended after {half} samples, one of 2 that were measured" in said
+    assert f"Ended after {half} samples, one of 2 " in said
     whole, *_ = objects(follow(json=True))[1:]
     assert (whole["samples"], whole["every"]) == (len(rows), 1)
 
@@ -232,7 +233,7 @@ def test_samples_that_do_not_go_on_in_order_are_taken_anew(path, lines, follow):
     result = follow(json=True, then=[partial(write, path, head, rows[:11], rows[12:13], rows[11:12], rows[13:turn])])
     _, two, _ = objects(result)
     assert (two["samples"], two["new"], two["restarted"]) == (turn, turn, True)
-    assert "do not follow in order" in two["warnings"][0]
+    assert f"{turn} taken again" in two["warnings"][0]
 
 
 @pytest.mark.slow
@@ -276,7 +277,7 @@ def test_a_wrong_model_is_told_once(path, follow, tmp_path):
     write(path, text[:-45])
     result = follow(then=[partial(write, path, text[: len(text) - left]) for left in (30, 15, 0)])
     assert result.exit_code == 0
-    assert result.stderr.count("samples are not what the shape, the rig and the noise predict (e-value") == 1
+    assert result.stderr.count("(e-value ") == 1
     assert "[unknown] of rig.toml" in result.stderr
 
 
@@ -287,8 +288,8 @@ def test_no_family_is_probable_while_an_evidence_is_too_small(path, lines, follo
     write(path, head, rows[:60])
     options = ("--family", "circle", "--family", "parabola", "--until-probability", 0.9)
     said = follow(*options).stdout
-    assert "; too small for circle, parabola: their particles had lost the posterior for a while; parameters" in said
-    assert "Ended after 60 samples: no new rows for 0 s." in said
+    assert "; too small for circle, parabola: " in said
+    assert "60 samples: no new rows" in said
 
 
 def test_control_c_ends_it_with_the_answer(path, lines, as_stated, monkeypatch):
@@ -297,31 +298,29 @@ def test_control_c_ends_it_with_the_answer(path, lines, as_stated, monkeypatch):
     monkeypatch.setattr(watching.time, "sleep", lambda seconds: os.kill(os.getpid(), signal.SIGINT))
     result = commands.call("watch", path, "--out", path.parent / "run", "--rig", as_stated, *FEW)
     assert result.exit_code == 0
-    assert "\nEnded after 10 samples: stopped by Ctrl-C.\n" in result.stdout
+    assert "10 samples: stopped by Ctrl-C.\n" in result.stdout
     path.unlink()
     result = commands.call("watch", path, "--out", path.parent / "other", "--rig", as_stated, *FEW)
     assert result.exit_code == 130
-    assert "interrupted before the first answer" in result.stderr
+    assert "interrupted before" in result.stderr
 
 
 def test_quiet_prints_the_answer_alone_and_warns_of_few_particles(path, lines, follow):
     write(path, lines[0], lines[1][:10])
     result = follow("--quiet", "--particles", 100)
     assert result.stdout.startswith("Ended after ")
-    assert (
-        "100 particles are few for 4 parameters, so that intervals may be wrong: give --particles 120" in result.stderr
-    )
+    assert re.search("100 particles .* 4 parameters.* --particles 120", result.stderr)
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--until-width", 0.1], "--until-width is for a stretch of the contour"),
+        (["--until-width", 0.1], "like --between"),
         (["--until-width", -1, "--between", "0,1"], "until_width is -1.0"),
-        (["--between", "0.1"], "--between is '0.1': give 2 numbers"),
-        (["--between", "0.1,-0.1"], "give the smaller one first"),
+        (["--between", "0.1"], "--between is '0.1'"),
+        (["--between", "0.1,-0.1"], "smaller one first"),
         (["--family", "star"], "star"),
-        (["--until-probability", 0.9], "until_probability is for several families"),
+        (["--until-probability", 0.9], "until_probability is for several"),
     ],
 )
 def test_options_that_are_wrong_are_refused(path, lines, follow, options, words):
@@ -342,16 +341,16 @@ def test_a_rig_that_is_wrong_is_refused(path, lines, follow, rig_file, text, wor
 
 
 def test_what_can_never_be_followed_is_refused(path, tmp_path):
-    for where, words in ((tmp_path, "is a folder"), (tmp_path / "record.nc", "only a .csv file can be followed")):
+    for where, words in ((tmp_path, "is a folder"), (tmp_path / "record.nc", "only a .csv file")):
         commands.assert_refused(commands.call("watch", where, "--out", tmp_path / "run"), words)
 
 
 def test_a_file_without_samples_is_said_to_have_none(path, lines, follow):
-    commands.assert_refused(follow(), "no new rows for 0 s, and there is no sample in it")
+    commands.assert_refused(follow(), path, "no new rows", "no sample")
     write(path, lines[0])
-    commands.assert_refused(follow(), "there is no sample in it")
+    commands.assert_refused(follow(), path, "no sample")
     write(path, ["drive_angle,force_x\n", "1.0,2.0\n"])
-    commands.assert_refused(follow(), "there is no column 'sweep'")
+    commands.assert_refused(follow(), "no column 'sweep'")
 
 
 @pytest.mark.slow

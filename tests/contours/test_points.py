@@ -216,7 +216,7 @@ def test_the_points_are_kept_as_they_were_and_the_text_is_short():
 
 
 def stretch(error):
-    found = re.search(r"not convex from x = (\S+) to (\S+): .* by (\S+) standard errors", str(error.value))
+    found = re.search(r"x = (\S+) to (\S+): .* (\S+) standard errors", str(error.value))
     assert found, str(error.value)
     return float(found[1]), float(found[2]), float(found[3])
 

@@ -141,7 +141,7 @@ def test_files_are_verified_and_inferred_from(spec, tmp_path):
     data = tb.datasets.open(tmp_path / "set")
     assert data.base_x.dims == ("record", "sweep", "sample")
     assert data.direction.dims == data.truth_first_contact_travel.dims == ("record", "sweep")
-    assert "way of the base at first contact" in data.truth_first_contact_travel.attrs["long_name"]
+    assert "at first contact" in data.truth_first_contact_travel.attrs["long_name"]
     card = (tmp_path / "set" / "README.md").read_text()
     assert "a flexible rod that is carried" in card
     assert "| translation 2: step |" in card

@@ -281,31 +281,27 @@ def test_a_run_that_made_nothing_stands_in_nobodys_way(tmp_path):
 
 
 CARDS = {
-    "plain": ({}, ["3 NetCDF files"], ["Of 48", "strained", "drift", "Records go", "32 bits"]),
+    "plain": ({}, ["3 NetCDF files"], ["Of 48", "_strain`", "drift", "entries of", "combinations", "32 bits"]),
     "one file": ({"shard_records": 24}, ["in 1 NetCDF file, "], []),
     "thick": (
         {"rod": {"length": 1.0, "flexural_rigidity": 1.0, "diameter": 0.1}},
-        ["In 24 of 24 records the rod is strained beyond 0.1 (`truth_largest_strain`)"],
+        ["In 24 of 24 records", "beyond 0.1 (`truth_largest_strain`)"],
         [],
     ),
     "fixed angles": (
         {"scan": {"samples": 24, "from_degrees": -20, "to_degrees": -10}},
-        ["driven far enough, reaches, whatever the drive angles above", "Of 48 sweeps, 48 have no sample in contact"],
+        ["driven far enough, reaches", "Of 48 sweeps, 48 have no"],
         [],
     ),
     "drift": (
         {"load_cell__ornstein_uhlenbeck_force": 0.01},
-        ["| load cell: ornstein_uhlenbeck_time | 100 |", "drift and the unknown bias of a record are not stored"],
+        ["| load cell: ornstein_uhlenbeck_time | 100 |", "drift and the unknown bias"],
         [],
     ),
-    "single": (
-        {"precision": "single", "load_cell__force_range": 1.0},
-        ["Readings at the end of the load cell's range are that end rounded to 32 bits"],
-        [],
-    ),
+    "single": ({"precision": "single", "load_cell__force_range": 1.0}, ["rounded to 32 bits"], []),
     "one list": (
         {"load_cell__force_noise": {"each": [0.01, 0.02, 0.03]}},
-        ["Records go through the 3 entries of load_cell.force_noise, 8 times."],
+        ["the 3 entries of load_cell.force_noise, 8 times."],
         [],
     ),
     "lists in step": (
@@ -315,8 +311,8 @@ CARDS = {
             "load_cell__moment_noise": {"each": [0.1, 0.2], "axis": "noise"},
         },
         [
-            "Records go through all 4 combinations of the lists, 6 times, the last of these fastest: "
-            "scan.bases[0][0]; noise (load_cell.moment_noise and load_cell.force_noise in step).",
+            "all 4 combinations of the lists, 6 times, ",
+            ": scan.bases[0][0]; noise (load_cell.moment_noise and load_cell.force_noise in step).",
             "| load cell: force_noise | each of 0.01, 0.02, on the axis noise |",
         ],
         [],

@@ -115,9 +115,9 @@ REFUSED = [
     ({"name": 3}, ["name is 3"]),
     ({"precision": "half"}, ["precision is 'half'"]),
     ({"each_contour": "yes"}, ["each_contour is 'yes'"]),
-    ({"contours": None}, ["there are no contours: give at least one table [[contours]]"]),
+    ({"contours": None}, ["there are no contours", "[[contours]]"]),
     ({"contours": 5}, ["there are no contours"]),
-    ({"contours": {"family": "circle"}}, ["contours is one table: write [[contours]], in two pairs of brackets"]),
+    ({"contours": {"family": "circle"}}, ["contours is one table", "[[contours]]"]),
     ({"contours": [{"a": 1.0}]}, ["contours[0].family is missing"]),
     (contour(a=-1.0), ["contours[0].a is -1"]),
     (contour(a={"uniform": [-0.5, 3.0]}), ["contours[0].a may be -0.5"]),
@@ -161,11 +161,8 @@ REFUSED = [
     (contour(q=10**400), ["contours[0].q", 10**400]),
     (contour(q=True), ["contours[0].q is True"]),
     (contour(q={"uniform": [0.3, 0.5], "normal": [0, 1]}), ["contours[0].q is {"]),
-    (contour(q={"gamma": [1, 2]}), ["contours[0].q has the distribution 'gamma', which is unknown"]),
-    (
-        contour(q={"uniform, log_uniform": [1, 2]}),
-        ["contours[0].q has the distribution 'uniform, log_uniform', which is unknown"],
-    ),
+    (contour(q={"gamma": [1, 2]}), ["contours[0].q has the distribution 'gamma'"]),
+    (contour(q={"uniform, log_uniform": [1, 2]}), ["contours[0].q has the distribution 'uniform, log_uniform'"]),
     (contour(q={"uniform": 0.3}), ["contours[0].q.uniform is 0.3"]),
     (contour(q={"choice": []}), ["contours[0].q.choice is []"]),
     (contour(q={"each": [1.0, "2"]}), ["contours[0].q.each is [1.0, '2']"]),
@@ -198,11 +195,8 @@ REFUSED = [
     ({"scan__from_degrees": 10}, ["scan.to_degrees is missing"]),
     ({"scan__to_degrees": 10}, ["scan.from_degrees is missing"]),
     ({"scan__seed": 10}, ["there is no key 'scan.seed'", "top"]),
-    (
-        {"scan": {"from_degrees": 10, "to_degrees": 90, "margin": 0.1}},
-        ["scan has from_degrees and to_degrees, and a margin"],
-    ),
-    ({"scan": {"from_degrees": 90, "to_degrees": 10}}, ["scan.from_degrees is 90, not below to_degrees, 10"]),
+    ({"scan": {"from_degrees": 10, "to_degrees": 90, "margin": 0.1}}, ["from_degrees and to_degrees, and a margin"]),
+    ({"scan": {"from_degrees": 90, "to_degrees": 10}}, ["scan.from_degrees is 90", "to_degrees, 10"]),
     ({"scan": {"from_degrees": -400, "to_degrees": 10}}, ["scan.from_degrees is -400"]),
     ({"scan__friction": 0.2}, ["there is no key 'scan.friction'", "[unknown]"]),
     ({"unknown": {"friction": 2.0}}, ["friction", "2.0", "0.8423"]),
@@ -214,10 +208,7 @@ REFUSED = [
     ({"load_cell__force_noise": {"normal": [0.05, 0.001]}}, ["load_cell.force_noise may be negative"]),
     ({"load_cell__force_noise": "some"}, ["load_cell.force_noise is 'some'"]),
     ({"load_cell": {"force_resolution": 2.0, "force_range": 1.0}}, ["load_cell", "force_resolution is 2.0"]),
-    (
-        {**contour(q={"each": [0.3, 0.4, 0.5]}), "records": 25},
-        ["records is 25, but the lists of 'each' make 3 combinations"],
-    ),
+    ({**contour(q={"each": [0.3, 0.4, 0.5]}), "records": 25}, ["records is 25", "'each'", "3 combinations"]),
 ]
 
 

@@ -11,12 +11,12 @@ def call(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
-def assert_refused(result, message):
-    """Exit code 2, a line on stderr with these words, and nothing else."""
+def assert_refused(result, *fragments):
+    """Exit code 2, a line on stderr with these fragments, and nothing else."""
     assert result.exit_code == 2, result.output
     assert isinstance(result.exception, SystemExit)
     assert result.stdout == ""
-    assert message in result.stderr
+    assert [words for words in map(str, fragments) if words not in result.stderr] == []
     assert len(result.stderr.splitlines()) == 1
     assert result.stderr.startswith("tactile-bayes: ")
 

@@ -1,5 +1,6 @@
 """The posterior of a contour, against independent computations, and its layout."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -474,9 +475,8 @@ def test_of_a_long_record_fewer_predictions_are_stored(monkeypatch):
     for result, stored in ((some, 120), (few, 50)):
         for group in ("posterior_predictive", "log_likelihood"):
             assert result[group].sizes["draw"] == stored
-            assert result[group].attrs["stored"] == (
-                f"of {stored} draws of each chain, not 240, since the record has {samples} samples"
-            )
+            numbers = re.findall(r"\d+", result[group].attrs["stored"])
+            assert numbers == [str(stored), "240", str(samples)]
         assert result["events"].sizes["draw"] == 240
 
 
@@ -513,7 +513,8 @@ def test_the_time_bounds_the_search_too(family, seconds, monkeypatch):
         keep=lambda tree: drawn.append(clock.now),
     )
     assert result["sample_stats"].attrs["steps_run"] == 1
-    assert result.attrs["message"].startswith("not converged, the time allowed ran out after 1 step: too few draws")
+    assert result.attrs["converged"] == 0
+    assert re.search("time allowed .* 1 step: too few", result.attrs["message"])
     assert drawn[0] < seconds + 25.0
     clock.now = 0.0
     free = replace(settings, max_steps=1, max_seconds=None)

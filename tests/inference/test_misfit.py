@@ -38,16 +38,19 @@ def test_what_was_inferred_is_not_suggested(inferred, name):
 def test_what_would_be_refused_is_not_suggested():
     assert suggested([], friction=0.2) == EVERY[1:]
     assert suggested(["discrepancy_length"]) == EVERY
-    assert suggested(["rigidity_scale"])[1] == "gain in place of rigidity_scale"
+    assert re.fullmatch("gain .* rigidity_scale", suggested(["rigidity_scale"])[1])
 
 
 def test_where_everything_was_inferred_only_the_family_is_left():
     words = what_to_try(["circle"], ["friction", "moment_gain", "force_y_drift", "lever_y", "backlash", *EVERY[-5:]])
-    assert words == "It may be the family or the rig. Try another family (--family shape-free, or compare)."
+    assert "(--family shape-free, or compare)" in words
+    assert "[unknown]" not in words
 
 
 def test_the_smooth_family_is_not_suggested_where_it_was_tried():
-    assert "Try another family (compare), or infer more" in what_to_try(["parabola", "shape-free"])
+    words = what_to_try(["parabola", "shape-free"])
+    assert "another family (compare), " in words
+    assert "shape-free" not in words
 
 
 def test_a_comparison_in_which_none_fits_names_both():
@@ -59,7 +62,5 @@ def test_a_comparison_in_which_none_fits_names_both():
 
 def test_a_gauge_is_no_family_to_be_exchanged():
     words = what_to_try(["gauge"], ["rigidity_scale"])
-    assert words.startswith(
-        "It may be the gauge or the rig. Check the size of the gauge and its place from the pivot, or"
-    )
+    assert "gauge or the rig" in words
     assert "family" not in words

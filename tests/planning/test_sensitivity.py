@@ -67,7 +67,7 @@ def test_words_are_in_the_units_of_the_record():
     assert "EI/L²" in dimensionless
     assert not re.search(r"\bmm\b|\bmN\b", dimensionless)
     assert " mm along the contour" in si
-    assert re.search(r"mN of noise in the forces and \S+ mN m in the moment", si)
+    assert re.search(r"\d mN .*\d mN m ", si)
     assert "EI/L" not in si
 
 
@@ -75,8 +75,8 @@ def test_words_say_the_numbers():
     told = in_si()["information"]
     (line,) = [line for line in words(in_si()) if "expected width" in line]
     touched, gap = (1e3 * float(told[f"{kind}_width"]) for kind in ("touched", "gap"))
-    assert f"{touched:.3g} mm where the contour is touched and {gap:.3g} mm in the gap" in line
-    assert line.startswith("The expected width of the 95% band")
+    for part in ("95%", f"{touched:.3g} mm where", f"{gap:.3g} mm in the gap"):
+        assert part in line
     needed = in_si()["required_noise"]
     lines = [line for line in words(in_si()) if line.startswith("A mean band")]
     assert len(lines) == 5
@@ -89,12 +89,12 @@ def test_words_say_the_numbers():
 
 def test_words_name_the_channel_that_is_missed_most():
     """Without the moment bounds grow most, as plans without it say."""
-    (line,) = [line for line in words(plain()) if line.startswith("Most information is lost without")]
+    (line,) = [line for line in words(plain()) if line.startswith("Most information")]
     told = plain()["information"]
     ratio = (told.bound_without_channel / told.bound_with_priors).drop_sel(parameter="noise_scale")
     mean = np.exp(np.log(ratio).mean("parameter"))
     assert str(mean.channel[int(np.argmax(mean.values))].values) == "holding_moment"
-    assert line.startswith("Most information is lost without the moment")
+    assert "without the moment" in line
     assert f"{float(mean.max()):.1f} times" in line
 
 
@@ -118,13 +118,14 @@ def test_an_answer_can_be_written_and_read(tmp_path):
 
 def test_a_wide_band_is_what_priors_give():
     tree = sensitivity(rng=1, parts=["required_noise"], band_widths=[100.0])
-    assert words(tree) == ["A mean band of 100 L follows from the priors without any record."]
+    (line,) = words(tree)
+    assert re.search(r"\b100 L .*\bpriors\b", line)
 
 
 def test_where_first_order_does_not_hold_the_words_say_so():
     loud = tb.LoadCell(force_noise=50.0, moment_noise=20.0)
     tree = sensitivity(rng=1, parts=["amplification"], rig=Rig(load_cell=loud))
-    assert "First order holds for no raw contact point at this noise." in words(tree)
+    assert any("for no raw" in line for line in words(tree))
 
 
 @pytest.mark.parametrize("parts", [["informations"], "information", [], ["information", "gap"]])

@@ -1,9 +1,7 @@
 import numpy as np
-import pytest
 import xarray as xr
 from matplotlib import pyplot as plt
 
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting import assumptions
 
 
@@ -25,8 +23,3 @@ def test_marks_lie_at_their_distances_and_rejected_ones_say_so():
     assert drawn["in the gap"][0] == 0.1
     assert drawn["beside it"].tolist() == [0.05, 0.2]
     assert [text.get_text() for text in ax.get_yticklabels()][1] == "family circle (rejected)"
-
-
-def test_other_results_are_refused():
-    with pytest.raises(ParameterError, match="give what trust returned"):
-        assumptions(example().drop_vars("fits"))

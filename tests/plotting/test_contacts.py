@@ -99,13 +99,6 @@ def test_si_axes_are_labelled_in_their_unit():
     assert "mm" in ax.get_xlabel() or "m]" in ax.get_xlabel()
 
 
-@pytest.mark.parametrize("probability", [0.0, 1.0, 90.0, np.nan])
-def test_impossible_probabilities_are_refused(contacts, posterior, probability):
-    for function, data in ((contact_ellipses, contacts), (contact_regions, posterior)):
-        with refused(ParameterError, probability=probability):
-            function(data, probability=probability, ax=own_axes())
-
-
 def test_samples_without_a_contact_are_refused(contacts, posterior):
     with refused(ParameterError, "contact", "standard deviation"):
         contact_ellipses(contacts, samples=[0, 1], ax=own_axes())

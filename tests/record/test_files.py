@@ -128,28 +128,21 @@ def test_remarks_of_very_different_length_are_kept_as_objects(tmp_path, monkeypa
 
 
 @pytest.mark.parametrize(
-    ("line", "message"),
+    ("line", "named"),
     [
-        (
-            "load_cell_bias_fx: 12.5 [mN]",
-            "line 1, attribute 'load_cell_bias_fx' is '12.5 [mN]', but a load cell has no entry 'bias_fx': did you "
-            "mean 'bias_force_x'?",
-        ),
-        ("load_cell_noise_force: 0.003 [N]", "has no entry 'noise_force': did you mean 'force_noise'?"),
-        ("load_cell_noise_force: 0,003 [N]", "has no entry 'noise_force': did you mean 'force_noise'?"),
-        ("load_cell_noise_force: 3 mN", "has no entry 'noise_force': did you mean 'force_noise'?"),
-        ("load_cell_bias_fx: 0.0125", "line 1, attribute 'load_cell_bias_fx' is 0.0125, but a load cell has no entry"),
-        (
-            "load_cell_bias_fx: 0,0125",
-            "line 1, attribute 'load_cell_bias_fx' is '0,0125', but a load cell has no entry",
-        ),
-        ("load_cell_serial: 4711", "needs a name that does not begin with 'load_cell_'"),
-        ("load_cell_force_noise: -1", "line 1, attribute 'load_cell_force_noise' is -1.0"),
+        ("load_cell_bias_fx: 12.5 [mN]", ["'load_cell_bias_fx'", "'12.5 [mN]'", "'bias_force_x'"]),
+        ("load_cell_noise_force: 0.003 [N]", ["'noise_force'", "'force_noise'"]),
+        ("load_cell_noise_force: 0,003 [N]", ["'noise_force'", "'force_noise'"]),
+        ("load_cell_noise_force: 3 mN", ["'noise_force'", "'force_noise'"]),
+        ("load_cell_bias_fx: 0.0125", ["'load_cell_bias_fx'", "0.0125"]),
+        ("load_cell_bias_fx: 0,0125", ["'load_cell_bias_fx'", "'0,0125'"]),
+        ("load_cell_serial: 4711", ["not begin with 'load_cell_'"]),
+        ("load_cell_force_noise: -1", ["'load_cell_force_noise'", "-1.0"]),
     ],
 )
-def test_a_load_cell_has_no_entries_but_its_own(tmp_path, line, message):
+def test_a_load_cell_has_no_entries_but_its_own(tmp_path, line, named):
     path = write_text(tmp_path / "lab.csv", f"# {line}", HEADER, ROW)
-    with refused(RecordError, message) as caught:
+    with refused(RecordError, *named) as caught:
         read_record(path, Rig(rod=WIRE))
     assert str(caught.value).startswith(f"{path}: line 1, ")
 
@@ -179,7 +172,7 @@ def test_separators_at_the_end_of_every_line_make_no_columns(tmp_path, end):
     assert read_record(path).identical(plain)
     cells = end.replace(",", ",7", 1)
     write_text(path, HEADER + end, ROW + end, ROW + cells)
-    with refused(RecordError, "line 1: column 7 has no name: name it, or remove it (in line 3 it has '7"):
+    with refused(RecordError, "line 1", "column 7", "line 3", "'7"):
         read_record(path)
     write_text(path, HEADER + end, ROW)
     with refused(RecordError, "columns (sweep, direction, drive_angle, holding_moment, force_x, force_y, (column 7)"):
@@ -189,9 +182,9 @@ def test_separators_at_the_end_of_every_line_make_no_columns(tmp_path, end):
 def test_names_that_are_only_values_make_no_line_of_names(tmp_path):
     """What is given for all samples stands in lines of samples too."""
     path = write_text(tmp_path / "rig.csv", "Angle,Sense", "1.25,forward")
-    with refused(RecordError, "there is no column 'holding_moment' (columns: Angle, Sense)"):
+    with refused(RecordError, "column 'holding_moment'", "(columns: Angle, Sense)"):
         read_record(path, Rig(file={"drive_angle": "1.25-Angle", "sweep": "0", "direction": "forward"}))
-    with refused(RecordError, "there is no column 'drive_angle', but a column 'Angle': did you mean 'drive_angle'?"):
+    with refused(RecordError, "no column 'drive_angle'", "a column 'Angle'"):
         read_record(path, Rig(file={"sweep": "0", "direction": "forward"}))
 
 
@@ -267,7 +260,7 @@ def test_a_file_without_header_is_assumed_to_be_dimensionless(tmp_path):
 
 
 def test_a_file_without_header_is_si_with_a_rod(tmp_path):
-    with pytest.warns(RecordWarning, match="force_x and force_y: taken as rad, N m, N and N"):
+    with pytest.warns(RecordWarning, match="force_x and force_y: .* rad, N m, N and N"):
         record = read_record(write_text(tmp_path / "plain.csv", HEADER, ROW), Rig(rod=WIRE))
     assert record.attrs["units"] == "SI"
     assert rod_of(record) == WIRE
@@ -288,11 +281,7 @@ def test_a_given_rod_completes_or_repeats_the_stated_one(tmp_path, suffix):
 
 def test_si_without_a_rod_is_refused_or_completed(tmp_path):
     path = write_text(tmp_path / "lab.csv", "# units: SI", "# rod_length: 0.2 [m]", HEADER, ROW)
-    with refused(
-        RecordError,
-        f"{path}: the record is SI, but rod_flexural_rigidity of its rod is not stated: give rod=Rod(length=..., "
-        "flexural_rigidity=...), length and flexural_rigidity under [rod] of rig.toml",
-    ):
+    with refused(RecordError, path, "rod_flexural_rigidity", "Rod(length=..., flexural_rigidity=...)", "[rod]"):
         read_record(path)
     assert rod_of(read_record(path, Rig(rod=WIRE))) == WIRE
 
@@ -310,89 +299,70 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
 
 
 @pytest.mark.parametrize(
-    ("lines", "message"),
+    ("lines", "named"),
     [
-        ([HEADER, ROW, "", ROW.replace("0.125", "oops")], "line 4, column 'force_x': 'oops' is not a number"),
-        (["# note", HEADER, ROW, ROW.replace("0.125", "")], "line 4, column 'force_x': the value is missing (nan)"),
-        ([HEADER + ",note", ROW + ',"two\nlines"', ROW.replace("0.5", "x") + ","], "line 4, column 'holding_moment'"),
-        ([HEADER, ROW, ROW.replace("forward", "Forward")], "line 3, column 'direction': 'Forward' is no direction"),
-        ([HEADER, ROW.replace("1.25", "71.6")], "line 2, column 'drive_angle': 71.6 is more than a turn"),
-        ([HEADER, ROW, ROW.replace("1.25", "1.0")], "from 1.25 rad (line 2) to 1.0 rad (line 3)"),
-        ([HEADER, "0,forward,1,25,0,5,0,125"], "line 2: there are 8 cells in 6 columns"),
-        ([HEADER.replace(",", ";"), ROW], "line 2: there are 1 cells in 6 columns"),
-        ([HEADER.replace(",", ";"), "0;forward;1.25;0,5;0;0"], "'0,5' is not a number"),
+        ([HEADER, ROW, "", ROW.replace("0.125", "oops")], ["line 4, column 'force_x'", "'oops'"]),
+        (["# note", HEADER, ROW, ROW.replace("0.125", "")], ["line 4, column 'force_x'", "nan"]),
+        ([HEADER + ",note", ROW + ',"two\nlines"', ROW.replace("0.5", "x") + ","], ["line 4, column 'holding_moment'"]),
+        ([HEADER, ROW, ROW.replace("forward", "Forward")], ["line 3, column 'direction'", "'Forward'"]),
+        ([HEADER, ROW.replace("1.25", "71.6")], ["line 2, column 'drive_angle'", "71.6"]),
+        ([HEADER, ROW, ROW.replace("1.25", "1.0")], ["1.25 rad (line 2)", "1.0 rad (line 3)"]),
+        ([HEADER, "0,forward,1,25,0,5,0,125"], ["line 2", "8 cells", "6 columns"]),
+        ([HEADER.replace(",", ";"), ROW], ["line 2", "1 cells", "6 columns"]),
+        ([HEADER.replace(",", ";"), "0;forward;1.25;0,5;0;0"], ["'0,5'"]),
+        ([HEADER.replace(",", " "), ROW.replace(",", " ")], ["'sweep'", "(columns: sweep direction drive_angle"]),
+        ([HEADER.replace(",", ";"), "0;forward;1,25;1.000,5;0;0"], ["line 2, column 'holding_moment'", "'1.000,5'"]),
+        (["," + HEADER, "0," + ROW], ["line 1", "column 1", "line 2", "'0'"]),
+        (["Rig 4", HEADER, ROW], ["line 1", "(Rig 4)", "in line 2"]),
         (
-            [HEADER.replace(",", " "), ROW.replace(",", " ")],
-            "there is no column 'sweep' (columns: sweep direction drive_angle",
+            ["Rig 4", "Operator;Max", HEADER.replace(",", ";"), ROW.replace(",", ";")],
+            ["line 1", "(Rig 4)", "in line 3"],
         ),
-        (
-            [HEADER.replace(",", ";"), "0;forward;1,25;1.000,5;0;0"],
-            "line 2, column 'holding_moment': '1.000,5' is not a",
-        ),
-        (["," + HEADER, "0," + ROW], "line 1: column 1 has no name: name it, or remove it (in line 2 it has '0')"),
-        (["Rig 4", HEADER, ROW], "line 1: this line was taken for the column names (Rig 4), but they are in line 2"),
-        (["Rig 4", "Operator;Max", HEADER.replace(",", ";"), ROW.replace(",", ";")], "(Rig 4), but they are in line 3"),
-        (
-            ["# note", "Rig 4,,,,,", HEADER, ROW],
-            "line 2: this line was taken for the column names (Rig 4), but they are",
-        ),
-        (
-            ["Rig 4", "Angle,Fx", "1.0,2.0"],
-            "line 1: this line was taken for the column names (Rig 4), but there are more cells in lines below: if the "
-            "names are further down, put # before the lines above them",
-        ),
-        ([HEADER + ",force_x", ROW + ",1"], "line 1: there are two columns 'force_x'"),
-        (["# tactile_bayes record, format 2", HEADER, ROW], "line 1: the file has format 2"),
-        (["# units: SI", "# units: SI", HEADER, ROW], "line 2: 'units' is stated a second time"),
-        (
-            ["# units: SI", "# rod_length: 200 [mN]", HEADER, ROW],
-            "line 2: rod_length is in [mN], but takes m, cm, mm or",
-        ),
-        (["# units: SI", "# rod_length: long", HEADER, ROW], "line 2: rod_length is 'long'"),
+        (["# note", "Rig 4,,,,,", HEADER, ROW], ["line 2", "(Rig 4)", "in line 3"]),
+        (["Rig 4", "Angle,Fx", "1.0,2.0"], ["line 1", "(Rig 4)", "more cells", "#"]),
+        ([HEADER + ",force_x", ROW + ",1"], ["line 1", "two columns 'force_x'"]),
+        (["# tactile_bayes record, format 2", HEADER, ROW], ["line 1", "format 2"]),
+        (["# units: SI", "# units: SI", HEADER, ROW], ["line 2", "'units'", "second time"]),
+        (["# units: SI", "# rod_length: 200 [mN]", HEADER, ROW], ["line 2", "rod_length", "[mN]", "m, cm, mm or"]),
+        (["# units: SI", "# rod_length: long", HEADER, ROW], ["line 2", "rod_length", "'long'"]),
         (
             ["# units: dimensionless", "# load_cell_force_noise: 0.1 [N]", HEADER, ROW],
-            "line 2: load_cell_force_noise is in [N], but takes 1",
+            ["line 2", "load_cell_force_noise", "[N]", "takes 1"],
         ),
-        (["# column time: clock [s]", HEADER, ROW], "line 1: 'clock' is no kind of column"),
-        (["# column n: integer [1]", HEADER + ",n", ROW + ",1.5"], "line 3, column 'n': '1.5' is no integer"),
+        (["# column time: clock [s]", HEADER, ROW], ["line 1", "'clock'", "no kind"]),
+        (["# column n: integer [1]", HEADER + ",n", ROW + ",1.5"], ["line 3, column 'n'", "'1.5'"]),
         (
             ["# column drive_angle: number [mm]", HEADER, ROW],
-            "line 1, column 'drive_angle' is in [mm], but takes rad, mrad, deg or °",
+            ["line 1, column 'drive_angle'", "[mm]", "rad, mrad, deg or °"],
         ),
         (
             ["# units: dimensionless", "# column force_x: number [mN]", HEADER, ROW],
-            "line 2, column 'force_x' is in [mN], but the record is dimensionless, so that it takes [1]",
+            ["line 2, column 'force_x'", "[mN]", "dimensionless", "[1]"],
         ),
-        (["# units: SI"], "there is no line of column names"),
-        ([HEADER], "there are no samples"),
-        ([HEADER, ROW.replace("1.25", '"1,25"')], "line 2, column 'drive_angle': '1,25' is not a number"),
-        (
-            [HEADER + ",a/b,a|b", ROW + ",1,2"],
-            "the name 'a/b' cannot be stored in every file, and as 'a|b' there is another",
-        ),
-        (
-            [HEADER.replace("drive_angle", "x") + ",a/b,a|b", ROW + ",1,2"],
-            "there is no column 'drive_angle' (columns: ",
-        ),
-        ([HEADER, ROW + '"' + "x" * 200_000], "line 2: the line cannot be read"),
+        (["# units: SI"], ["no line of"]),
+        ([HEADER], ["no samples"]),
+        ([HEADER, ROW.replace("1.25", '"1,25"')], ["line 2, column 'drive_angle'", "'1,25'"]),
+        ([HEADER + ",a/b,a|b", ROW + ",1,2"], ["'a/b'", "'a|b'"]),
+        ([HEADER.replace("drive_angle", "x") + ",a/b,a|b", ROW + ",1,2"], ["no column 'drive_angle'"]),
+        ([HEADER, ROW + '"' + "x" * 200_000], ["line 2", "cannot be read"]),
     ],
 )
-def test_what_is_wrong_in_a_csv_file_is_refused_with_its_line(tmp_path, lines, message):
+def test_what_is_wrong_in_a_csv_file_is_refused_with_its_line(tmp_path, lines, named):
     path = write_text(tmp_path / "bad.csv", *lines)
-    with refused(RecordError, message) as caught:
+    with refused(RecordError, *named) as caught:
         read_record(path)
     assert str(caught.value).startswith(f"{path}: ")
 
 
 def test_files_that_are_something_else_are_refused(tmp_path):
     (tmp_path / "a.nc").write_bytes(b"not a file of this kind")
-    with refused(RecordError, "a.nc: the file cannot be read, it is damaged or cut short, or no NetCDF 4 file ("):
+    with refused(RecordError, "a.nc", "cannot be read"):
         read_record(tmp_path / "a.nc")
     for path in ("a.txt", "a"):
         (tmp_path / path).write_text(f"{HEADER}\n{ROW}\n")
-        with refused(RecordError, "a record is a .csv or a .nc file, not"):
+        with refused(RecordError, ".csv", ".nc", path):
             read_record(tmp_path / path)
-        with refused(RecordError, "a record is a .csv or a .nc file, not"):
+        with refused(RecordError, ".csv", ".nc", path):
             write_record(make_record(columns()), tmp_path / path)
     image = xr.Dataset({"image": ("pixel", [1.0]), "sweep": ("t", [0])})
     image.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
@@ -408,23 +378,20 @@ def test_files_that_are_something_else_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
+    ("content", "named"),
     [
-        (
-            f"{HEADER}\n{ROW}".encode("utf-16"),
-            "the file is UTF-16 text, as its first bytes say: save it as CSV in UTF-8",
-        ),
-        (b"\xfe\xff" + HEADER.encode("utf-16-be"), "the file is UTF-16 text"),
-        (HEADER.encode("utf-32"), "the file is UTF-32 text"),
-        (HEADER.encode("utf-16-le"), "the file is no UTF-8 text, but looks like UTF-16: save it as CSV in UTF-8"),
-        (b"\x89HDF\r\n\x1a\n", "this is no CSV file, but a NetCDF (HDF5) file"),
-        (b"CDF\x01\x00", "this is no CSV file, but a NetCDF file of the classic kind: convert it to NetCDF-4"),
-        (b"PK\x03\x04\x14", "this is no CSV file, but a workbook of a spreadsheet, or another zip archive: save it as"),
+        (f"{HEADER}\n{ROW}".encode("utf-16"), ["UTF-16", "first bytes"]),
+        (b"\xfe\xff" + HEADER.encode("utf-16-be"), ["UTF-16"]),
+        (HEADER.encode("utf-32"), ["UTF-32"]),
+        (HEADER.encode("utf-16-le"), ["looks like UTF-16"]),
+        (b"\x89HDF\r\n\x1a\n", ["NetCDF (HDF5)"]),
+        (b"CDF\x01\x00", ["NetCDF", "classic"]),
+        (b"PK\x03\x04\x14", ["zip archive"]),
     ],
 )
-def test_a_file_that_is_no_csv_file_says_what_it_is(tmp_path, content, message):
+def test_a_file_that_is_no_csv_file_says_what_it_is(tmp_path, content, named):
     (tmp_path / "a.csv").write_bytes(content)
-    with refused(RecordError, f"a.csv: {message}"):
+    with refused(RecordError, "a.csv", *named):
         read_record(tmp_path / "a.csv")
 
 
@@ -454,44 +421,34 @@ NINES = "9" * 5000
 
 
 @pytest.mark.parametrize(
-    ("lines", "message"),
+    ("lines", "named"),
     [
-        ([HEADER, ROW.replace("0,", f"{NINES},", 1)], "line 2, column 'sweep'"),
-        ([f"# rod_length: 1 [{'Gm9 ' * 40}]", HEADER, ROW], "line 1: rod_length is in [Gm9"),
-        ([f"{HEADER},note", f"{ROW},a\0b"], "line 2: there is a NUL character (0x00), which is no text"),
-        (["# note: a\0b", HEADER, ROW], "line 1: there is a NUL character (0x00), which is no text"),
-        (
-            [f"{HEADER},note", f"{ROW},a", f"{ROW},{'x' * 131_073}"],
-            "line 3: the line cannot be read (field larger than",
-        ),
-        (
-            ['# note: "a\\u0000"', HEADER, ROW],
-            "line 1, attribute 'note' has a NUL character (0x00) in it, which no file",
-        ),
-        (
-            ['# note: "\\ud800"', HEADER, ROW],
-            "line 1, attribute 'note' has half of a surrogate pair in it, which no file",
-        ),
+        ([HEADER, ROW.replace("0,", f"{NINES},", 1)], ["line 2, column 'sweep'"]),
+        ([f"# rod_length: 1 [{'Gm9 ' * 40}]", HEADER, ROW], ["line 1", "rod_length", "[Gm9"]),
+        ([f"{HEADER},note", f"{ROW},a\0b"], ["line 2", "NUL", "0x00"]),
+        (["# note: a\0b", HEADER, ROW], ["line 1", "NUL", "0x00"]),
+        ([f"{HEADER},note", f"{ROW},a", f"{ROW},{'x' * 131_073}"], ["line 3", "cannot be read"]),
+        (['# note: "a\\u0000"', HEADER, ROW], ["line 1, attribute 'note'", "NUL", "0x00"]),
+        (['# note: "\\ud800"', HEADER, ROW], ["line 1, attribute 'note'", "surrogate"]),
         (
             ['# column note: text [m] "\\ud800"', f"{HEADER},note", f"{ROW},a"],
-            "line 1, column 'note' has an attribute 'long_name' that has half of a surrogate pair in it",
+            ["line 1, column 'note'", "'long_name'", "surrogate"],
         ),
-        (["# CLASS: 1", HEADER, ROW], "the name 'CLASS' cannot be stored in every file"),
-        ([f"{HEADER},{'x' * 201}", f"{ROW},a"], "cannot be stored in every file"),
-        ([f"# tactile_bayes record, format {NINES}", HEADER, ROW], "line 1: the file has format"),
+        (["# CLASS: 1", HEADER, ROW], ["'CLASS'", "cannot be stored"]),
+        ([f"{HEADER},{'x' * 201}", f"{ROW},a"], ["cannot be stored"]),
+        ([f"# tactile_bayes record, format {NINES}", HEADER, ROW], ["line 1", "has format"]),
     ],
-    ids=lambda value: None if isinstance(value, str) else "",
 )
-def test_what_no_file_could_store_is_refused_as_it_is_read(tmp_path, lines, message):
+def test_what_no_file_could_store_is_refused_as_it_is_read(tmp_path, lines, named):
     path = write_text(tmp_path / "rig.csv", *lines)
-    with refused(RecordError, message) as caught:
+    with refused(RecordError, *named) as caught:
         read_record(path)
     assert len(str(caught.value)) < 2000
 
 
 @pytest.mark.parametrize("text", ["a\0b", "\ud800", "x" * 131_073])
 def test_text_that_no_file_could_store_is_not_written(tmp_path, text):
-    with refused(RecordError, "sample 1, column 'note': the text has "):
+    with refused(RecordError, "sample 1, column 'note'"):
         make_record(columns(note=["", text, "", "", "", ""]))
 
 

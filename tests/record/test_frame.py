@@ -146,11 +146,7 @@ def test_one_force_alone_is_refused(name, other, frame):
     wanted = next(other_frame for other_frame in FRAMES if other_frame != frame)
     record = make_record(columns(**{name: None}), Rig(load_cell=LoadCell(frame=frame), file={"missing": (name,)}))
     assert in_frame(record, frame) is record
-    with refused(
-        RecordError,
-        f"{name} was not measured, and a force in the {wanted} frame takes both of the other frame, so {other} would "
-        "be lost too: keep the record in the frame in which it was measured",
-    ):
+    with refused(RecordError, f"{name} was not", f"{wanted} frame", f"so {other}"):
         in_frame(record, wanted)
 
 
@@ -162,12 +158,10 @@ def test_without_any_force_there_is_nothing_to_lose():
 
 
 def test_half_a_truth_is_refused():
-    with refused(
-        RecordError, "sample 0 has a truth_force_y, but no truth_force_x, and a force in the turning frame takes both"
-    ):
+    with refused(RecordError, "sample 0", "a truth_force_y", "no truth_force_x", "turning"):
         in_frame(make_record(columns(truth_force_y=np.ones(6))), "turning")
     gap = np.where(np.arange(6) == 2, np.nan, 0.5)
-    with refused(RecordError, "sample 2 has a truth_force_x, but no truth_force_y"):
+    with refused(RecordError, "sample 2", "a truth_force_x", "no truth_force_y"):
         in_frame(make_record(columns(truth_force_x=np.ones(6), truth_force_y=gap)), "turning")
 
 
@@ -200,15 +194,12 @@ def test_words_of_ones_own_are_kept():
 
 @pytest.mark.parametrize("frame", ["world", "Turning", "", 1, 1.0])
 def test_a_frame_that_is_none_is_refused(frame):
-    message = (
-        f"attribute 'load_cell_frame' is {frame!r}: write 'fixed' for a load cell that measures along the axes of the "
-        "laboratory, or 'turning' for one that turns with the drive"
-    )
+    named = ("'load_cell_frame'", repr(frame), "'fixed'", "'turning'")
     record = make_record(columns()).assign_attrs(load_cell_frame=frame)
     for use in (validate, frame_of, record_hash, lambda record: in_frame(record, "fixed")):
-        with refused(RecordError, message):
+        with refused(RecordError, *named):
             use(record)
-    with refused(RecordError, message):
+    with refused(RecordError, *named):
         make_record(columns(), attrs={"load_cell_frame": frame})
 
 
@@ -218,12 +209,12 @@ def test_a_frame_to_convert_to_that_is_none_is_refused(scanned):
 
 
 def test_what_is_no_record_is_refused():
-    with refused(RecordError, "a record is an xarray.Dataset, not a dict"):
+    with refused(RecordError, "xarray.Dataset", "dict"):
         in_frame({}, "turning")
 
 
 def test_two_statements_that_differ_are_refused():
-    with refused(RecordError, "the record states load_cell_frame 'fixed', but 'turning' was given"):
+    with refused(RecordError, "load_cell_frame 'fixed'", "'turning'"):
         make_record(columns(), Rig(load_cell=LoadCell(frame="turning")), attrs={"load_cell_frame": "fixed"})
     twice = make_record(columns(), Rig(load_cell=LoadCell(frame="turning")), attrs={"load_cell_frame": "turning"})
     assert frame_of(twice) == "turning"
@@ -231,7 +222,7 @@ def test_two_statements_that_differ_are_refused():
 
 def test_a_force_that_overflows_is_refused():
     huge = np.where(np.arange(6) == 5, 1.7e308, 0.0)
-    with refused(RecordError, "sample 5, column 'force_x': the value is inf"):
+    with refused(RecordError, "sample 5, column 'force_x'", "inf"):
         in_frame(make_record(columns(force_x=huge, force_y=huge, drive_angle=ANGLES - 1.0)), "turning")
 
 
@@ -249,9 +240,9 @@ def test_a_csv_file_states_the_frame_in_its_header(tmp_path):
     write_record(make_record(columns(), Rig(load_cell=LoadCell(frame="turning"))), path)
     lines = path.read_text(encoding="utf-8").splitlines()
     assert "# load_cell_frame: turning" in lines
-    assert "# column force_x: number [1] axial support reaction" in lines
+    assert any(line.startswith("# column force_x: number [1] axial ") for line in lines)
     path.write_text("\n".join(lines).replace(": turning", ": spinning") + "\n", encoding="utf-8")
-    with refused(RecordError, f"{path}: attribute 'load_cell_frame' is 'spinning': write 'fixed' for "):
+    with refused(RecordError, path, "'load_cell_frame'", "'spinning'", "'fixed'"):
         read_record(path)
 
 

@@ -53,10 +53,10 @@ def test_each_column_has_its_unit_and_place(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "there are no points in it"),
+        ("", "no points"),
         ("x,y\n1,\n", "'1,' is no point"),
         ("x,y\n1,2\n1,nan\n", "'1,nan' is no point"),
-        ("no,height,width\n1,2,3\n", "none of its columns are x and y"),
+        ("no,height,width\n1,2,3\n", "columns are x and y"),
         ("x [mm],y\n1,2\n", "different units"),
         ("x [N],y [N]\n1,2\n", "points are in [N]"),
     ],

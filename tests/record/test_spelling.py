@@ -67,7 +67,7 @@ def test_what_cannot_be_read_is_named(tmp_path):
     path.write_text("Angle,Mz,Fx,Fy\n30,1,1\N{THIN SPACE}2,3\n", encoding="utf-8")
     with refused(RecordError, "line 2, column 'Fx'", "U+2009 THIN SPACE"):
         read_record(path, Rig(rod=WIRE, file={**COLUMNS, "drive_angle": "Angle[deg]", "split_sweeps": True}))
-    assert look_alikes("\N{ZERO WIDTH SPACE}") == " (U+200B ZERO WIDTH SPACE cannot be seen)"
+    assert "U+200B ZERO WIDTH SPACE" in look_alikes("\N{ZERO WIDTH SPACE}")
     assert not look_alikes("µ é ß - °")
 
 

@@ -55,17 +55,15 @@ def test_units_convert_there_and_back(values, length, rigidity, diameter, turn):
 def test_a_record_in_si_stays_so_with_its_own_rod_only():
     si = make_record(columns(), Rig(rod=WIRE))
     assert to_si(si, WIRE) is si
-    with refused(RecordError, "the record is SI already, with Rod(length=0.2,"):
+    with refused(RecordError, "SI already", "Rod(length=0.2,"):
         to_si(si, Rod(0.1, 1e-5))
 
 
 def test_a_rod_of_another_diameter_is_refused():
-    with refused(
-        RecordError, "the record was made with Rod(length=1.0, flexural_rigidity=1.0, diameter=0.0) (in rod lengths)"
-    ):
+    with refused(RecordError, "Rod(length=1.0, flexural_rigidity=1.0, diameter=0.0)", "rod lengths"):
         to_si(make_record(columns()), WIRE)
 
 
 def test_a_conversion_that_overflows_is_refused():
-    with refused(RecordError, "sample 5, column 'force_y': the value is inf"):
+    with refused(RecordError, "sample 5, column 'force_y'", "inf"):
         to_dimensionless(make_record(edited("force_y", 5, 1e308), Rig(rod=WIRE)))

@@ -11,6 +11,7 @@ import io
 import json
 import pkgutil
 import re
+import shlex
 import sys
 import tomllib
 from itertools import pairwise
@@ -59,15 +60,16 @@ from tactile_bayes.rig import Rig
 from tactile_bayes.runs.reconstruction import reconstruction_messages
 from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
+COMMAND = ["tactile-bayes", "infer", "measured.csv", "--rig", "rig.toml", "--out", "my run"]
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     path = folder / "measured.csv"
     tb.write_record(coarse_record(), path)
-    command = ["tactile-bayes", "infer", "measured.csv", "--rig", "rig.toml", "--out", "my run"]
     analysed_quickly(
-        tb.read_record(path), folder, rig=tb.Rig(unknown="nothing"), probability=0.9, record_file=path, command=command
+        tb.read_record(path), folder, rig=tb.Rig(unknown="nothing"), probability=0.9, record_file=path, command=COMMAND
     )
     return folder
 
@@ -205,7 +207,7 @@ def test_the_band_in_words_and_table_is_that_of_the_posterior(page, posterior):
         np.testing.assert_allclose(shown, [lower, median, upper], atol=steep + 0.5e-6)
     said = page.data["band"]["said"]
     assert len(said) == 201
-    assert re.fullmatch(r"x = \S+\u00a0mm: y from \S+ to \S+\u00a0mm with 90\u00a0%, median \S+\u00a0mm", said[0])
+    assert re.fullmatch(r"x = \S+\u00a0mm: y .*\S+ to \S+\u00a0mm .*90\u00a0%, median \S+\u00a0mm", said[0])
 
 
 def test_what_is_worked_out_again_is_what_the_run_has_written(folder, findings):
@@ -235,11 +237,11 @@ def test_the_force_along_the_rod_is_judged_as_by_reconstruct(findings, score):
     elsewhere = " ".join(reconstruction_messages(contacts))
     for words in ("agrees with the moment", "too small", "too large", "as with friction", "check the zero"):
         assert (words in said) == (words in elsewhere)
-    assert "the friction that was stated" in said
+    assert "was stated" in said
     tree = findings.posterior.copy()
     tree.attrs["nuisances"] = '["friction"]'
     found = dataclasses.replace(findings, contacts=contacts, posterior=tree)
-    assert "the friction that was inferred" in contacts_messages(found)[-1]
+    assert "was inferred" in contacts_messages(found)[-1]
 
 
 def test_the_verdicts_come_first_and_say_whether_to_trust(page, folder, text):
@@ -266,24 +268,23 @@ def told(findings):
 
 def test_a_contour_is_known_to_within_its_band_only_where_all_is_well(told):
     well, doubtful, rejected = (told[kind]["answer"] for kind in ("well", "as it is", "rejected"))
-    assert "the contour is known to within a 90\u00a0% band whose median width is" in well
+    assert "known to within a 90\u00a0% band" in well
     for words in (doubtful, rejected):
         assert "known to within" not in words
-        assert "the posterior has a 90\u00a0% band whose median width is" in words
-    assert "Its validity depends on the messages above" in doubtful
-    assert "if the contour were of this family and the rig as assumed, but the record contradicts one of" in rejected
+        assert re.findall(r"\d[\d.]*", words) == re.findall(r"\d[\d.]*", well)
+    assert "validity depends" in doubtful
+    assert "record contradicts" in rejected
 
 
 def test_of_a_contour_that_is_rejected_nothing_is_said_but_with_an_if(told):
     (gap, certificate), (only,) = told["well"]["gap"], told["rejected"]["gap"]
-    assert gap.startswith("The gap, which no sweep touches, is ")
     assert "convexity alone" in certificate
-    assert only.startswith("On such a contour the gap, which no sweep touches, would be ")
+    assert ("would be" in gap, "would be" in only) == (False, True)
     assert re.findall(r"[\d.]+", only) == re.findall(r"[\d.]+", gap)
-    assert "which noise explains with probability" in told["well"]["contacts"][1]
+    assert "noise explains" in told["well"]["contacts"][1]
     explained = told["rejected"]["contacts"][1]
-    assert "which noise of the inferred scale explains with probability" in explained
-    assert explained.endswith("what the contour does not explain, so that this is no evidence.")
+    assert "inferred scale explains" in explained
+    assert explained.endswith("no evidence.")
 
 
 def test_the_place_along_x_looks_like_no_pivot(page):
@@ -291,7 +292,7 @@ def test_the_place_along_x_looks_like_no_pivot(page):
     assert marks == {"band-mark": "g", "contact": "circle"}
     pivots = [tag for tag, attrs in page.elements if attrs.get("class") == "pivot"]
     assert set(pivots) == {"circle"}
-    assert "place along x, chosen below or beside" in page.texts["li"]
+    assert any("place along x" in words for words in page.texts["li"])
     assert {"class": "js-only"} in page.all("li")  # as the mark is
 
 
@@ -307,7 +308,7 @@ def test_where_it_came_from_is_said(page, folder, posterior):
     assert versions["numpy"] == np.__version__
     assert versions["tactile-bayes"] == tb.__version__
     assert "Python" in versions
-    assert page.texts["code"][0] == "tactile-bayes infer measured.csv --rig rig.toml --out 'my run'"
+    assert shlex.split(page.texts["code"][0]) == COMMAND
     assert "The contour from measured.csv" in page.texts["h1"][0]
 
 
@@ -327,8 +328,8 @@ def test_what_hinders_that_is_said(posterior):
     other.attrs["rig"] = "not written"
     other.attrs["settings"] = json.dumps({"max_seconds": 5.0})
     clock, priors = hindrances(other, record)
-    assert clock.startswith("The run could end by the clock")
-    assert priors == "A prior of your own is none of SciPy's: give rig= as before."
+    assert "by the clock" in clock
+    assert "give rig=" in priors
 
 
 # --- The moving rod -----------------------------------------------------------------------------------------------
@@ -472,11 +473,11 @@ def test_a_rig_that_measures_the_moment_only_has_no_contact_points(tmp_path):
     record["force_x"][:] = record["force_y"][:] = np.nan
     analysed_quickly(record, tmp_path, rig=tb.Rig(unknown="nothing"))
     page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
-    assert "Contact points take all three channels, and force x and force y were not measured." in page.texts["p"]
-    assert "There are sweeps in one direction only, so there is no gap between two." in page.texts["p"]
+    assert any(re.match("Contact points .*force x and force y", words) for words in page.texts["p"])
+    assert any("no gap between" in words for words in page.texts["p"])
     assert [attrs["id"] for attrs in page.all("svg")][-1] == "readings-holding-moment"
     assert page.data["frames"]["said"]["force_x"][0][:2] == ["not measured", "not measured"]
-    assert any("lengths are in rod lengths L" in words for words in page.texts["p"])
+    assert any("in rod lengths L" in words for words in page.texts["p"])
 
 
 @pytest.mark.slow
@@ -526,7 +527,7 @@ def test_no_text_of_a_record_becomes_an_element(hostile):
     assert [ENTRY, VALUE] in page.table("Attributes of the record")
     assert page.texts["h1"] == [f"The contour from {FILE}"]
     assert page.texts["title"][0] == f"Contour from {FILE} – tactile_bayes"
-    assert f"tactile_bayes, report of the run {FOLDER}" in page.texts["p"]
+    assert any(words.endswith(f" {FOLDER}") for words in page.texts["p"])
 
 
 def test_what_the_script_is_given_cannot_end_it():

@@ -74,7 +74,7 @@ def test_another_file_is_not_replaced(text, tmp_path):
 def _is_refused(own):
     before, beside = own.read_bytes(), own.with_name("posterior.nc")
     beside.touch()
-    with pytest.raises(ParameterError, match=r"record\.csv is no record of the demonstration"):
+    with pytest.raises(ParameterError, match=r"record\.csv is no record"):
         measure_demo(own.parent, rng=1)
     assert own.read_bytes() == before
     assert beside.exists()

@@ -1,5 +1,7 @@
 """The words of a design."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -41,16 +43,13 @@ def test_the_outermost_candidate_is_said_to_be_so(best, outermost):
     widths = np.full(len(GRID), 2e-3)
     widths[best] = 1e-3
     words = design_messages(found(GRID, widths, np.full(len(GRID), 3e-3)))
-    said = [sentence for sentence in words if sentence.startswith("It is the ")]
-    if outermost is None:
-        assert said == []
-    else:
-        assert said == [f"It is the {outermost} of the candidates: a better one may lie beyond, try more."]
+    said = [sentence.partition(" of the candidates")[0] for sentence in words if "of the candidates" in sentence]
+    assert said == ([] if outermost is None else [f"It is the {outermost}"])
 
 
 def test_a_gap_that_is_not_known_is_not_told():
     first, *_ = design_messages(found(GRID[:2], [1e-3, 2e-3], [np.nan, 3e-3]))
-    assert first.endswith("band is then 1 mm wide on the mean; now it is 5 mm.")
+    assert re.findall(r"\S+ mm", first)[-2:] == ["1 mm", "5 mm"]
 
 
 def test_drives_that_carry_the_base_have_words_and_what_they_tell_for_each_reading():
@@ -58,6 +57,6 @@ def test_drives_that_carry_the_base_have_words_and_what_they_tell_for_each_readi
     made = found(GRID[:2], [1e-3, 4e-3], [3e-3, 3e-3])
     made.is_pivot[0], made.samples[0], made["drive"] = False, 100, ("candidate", [carried, "turned about (0, 0)"])
     words = design_messages(made)
-    assert words[0].startswith(f"The best drive: {carried} [m], with 100 readings: the 95% band is then 1 mm wide")
-    assert f"The most information per reading: {carried} [m], 3 nats in 100 readings." in words
-    assert not any(sentence.startswith("It is the ") for sentence in words)
+    assert [part for part in (f"{carried} [m], ", "100 readings", "95%", "1 mm") if part not in words[0]] == []
+    assert any(f"{carried} [m], 3 nats in 100 readings" in sentence for sentence in words)
+    assert not any("of the candidates" in sentence for sentence in words)

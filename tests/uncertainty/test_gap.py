@@ -138,7 +138,7 @@ def test_arcs_of_several_pivots_are_merged():
 def test_sweeps_may_overlap():
     found = gap(tree([[[-0.1, 0.1]]]))
     assert float(found.width.sel(bound="median")) == pytest.approx(-0.2)
-    assert found.status.item() == "the sweeps overlap: no gap is left"
+    assert "no gap" in found.status.item()
     for name in ("triangle_width", "apex_x", "band_width", "band_lower", "triangle_upper"):
         assert np.isnan(found[name]).all(), name
 
@@ -147,10 +147,10 @@ def test_sweeps_may_overlap_in_some_contours():
     found = gap(tree([[[0.1, -0.1], [0.1, -0.1], [0.1, 0.12]]]))
     np.testing.assert_allclose(found.triangle_width, 0.5 * A * 0.2**2, rtol=1e-13)
     assert found.share_open.item() == pytest.approx(2.0 / 3.0)
-    assert found.status.item().startswith("the sweeps overlap in some contours")
+    assert "overlap in some" in found.status.item()
     assert np.isfinite(found.band_width)
     found = gap(tree([[[0.1, -0.1], [0.1, 0.14], [0.1, 0.12]]]))
-    assert found.status.item().startswith("the sweeps overlap in most contours")
+    assert "overlap in most" in found.status.item()
     assert np.isnan(found.band_width)
     assert np.isfinite(found.triangle_width).all()
 
@@ -208,7 +208,7 @@ def test_draws_without_an_event_do_not_count():
     for name in ("left", "right", "width", "triangle_height", "snap_off_drive_angle", "band_lower", "band_upper"):
         np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
     assert expected.status == "ok"
-    assert found.status == "some contours are not touched in every sweep: this is of the others"
+    assert "not touched" in found.status.item()
 
 
 def test_without_any_event_there_are_no_ends():

@@ -253,7 +253,8 @@ def test_the_layout_is_that_of_infer_contacts():
     assert dict(tree["posterior"].sizes) == {"chain": 2, "draw": 100, "sample": measured().sizes["sample"]}
     assert tree.attrs["draws"] == 200
     assert tree.attrs["data_sha256"] == record_hash(measured())
-    assert tree.attrs["message"].startswith("contacts of 200 contours of the posterior; converged")
+    assert " 200 contours " in tree.attrs["message"]
+    assert "; converged" in tree.attrs["message"]
 
 
 def test_draws_are_picked_evenly():

@@ -102,11 +102,10 @@ def test_where_contours_end_the_band_is_not_known():
     for simultaneous in (False, True):
         band = normal_band(posterior, [0.0, 0.55, 0.65, 0.8], 0.9, simultaneous, reference=flat)
         np.testing.assert_allclose(band.share_reaching, [1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0])
-        some = "some contours end before the normal"
-        assert band.status.values.tolist() == ["ok", some, some, "all contours end before the normal"]
+        assert [status.split()[0] for status in band.status.values] == ["ok", "some", "some", "all"]
         assert np.isfinite(band.upper).values.tolist() == [True, False, False, False]
     band = normal_band(posterior, [0.0, 0.65], reference=Circle(0.6, q=0.3))
-    assert band.status.values.tolist() == ["ok", "the reference ends before"]
+    assert ["reference" in status for status in band.status.values] == [False, True]
     assert np.isnan(band.upper_x).values.tolist() == [False, True]
 
 

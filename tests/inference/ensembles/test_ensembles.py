@@ -108,7 +108,7 @@ def test_lost_walkers_are_taken_back(count):
 def test_walkers_that_stay_lost_are_counted():
     log_probability, start = _with_a_mode_of_no_weight(1)
     draws = sample(log_probability, start, names=["a"], seed=1, settings=SamplerSettings(max_steps=20))
-    assert "1 of 192 walkers are where the posterior is improbable" in draws.message
+    assert "1 of 192 walkers" in draws.message
 
 
 def test_a_run_that_took_walkers_back_resumes_as_if_uninterrupted(tmp_path):

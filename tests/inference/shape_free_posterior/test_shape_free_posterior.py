@@ -226,7 +226,8 @@ def test_time_that_ends_before_anything_possible_is_found_gives_what_the_prior_a
         rng=1,
         settings=SamplerSettings(ensembles=2, max_seconds=1e-3),
     )
-    assert kept.attrs["message"].startswith("not converged, the time allowed ran out")
+    assert kept.attrs["converged"] == 0
+    assert "time allowed" in kept.attrs["message"]
     assert ((kept["posterior"].q > 0.9) & (kept["posterior"].q < 0.95)).all()
 
 
