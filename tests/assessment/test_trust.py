@@ -47,7 +47,9 @@ def test_a_posterior_that_has_not_converged_is_judged_without_replicates_and_ass
 @pytest.mark.slow
 def test_a_wrong_family_is_not_to_be_relied_on():
     record = CELL.measure(swept(tb.contours.paper_profile("III", q=0.5)), rng=2)
-    found = trust(infer_as_stated(record, load_cell=CELL, rng=1, settings=SOUND), replicates=0, assumptions=False)
+    found = trust(
+        infer_as_stated(record, load_cell=CELL, rng=1, settings=SOUND), rng=1, replicates=0, assumptions=False
+    )
     assert found.attrs["conclusion"] == "do not rely on it"
     assert f"(p = {float(found.split_p_value):.2g} for all parts)" in found.attrs["summary"]
 

@@ -91,8 +91,8 @@ def test_infer_takes_the_rig_over(records, calibrated, tmp_path):
     page = call("report", tmp_path)
     assert page.exit_code == 0, page.output
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "calibrate-rig wrote" in text
-    assert "Priors of your own" not in text
+    assert "rig=tb.Rig.of(stored)" in text
+    assert "prior of your own" not in text
 
 
 @pytest.mark.slow

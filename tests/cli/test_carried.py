@@ -145,7 +145,7 @@ def test_one_carried_sweep_has_no_gap(carried):
 
 
 def test_a_check_knows_where_a_carried_rod_is_loaded(carried):
-    check = tb.diagnostics.predictive_check(read_result(carried[1] / "posterior.nc"))
+    check = tb.check(read_result(carried[1] / "posterior.nc")).predictive
     assert np.all(check.worst_from_travel >= 0.85)
     assert np.all(check.worst_to_travel <= 1.5)
     assert np.isfinite(check.p_value.sel(discrepancy="loaded")).all()

@@ -27,7 +27,7 @@ CELLS = {
 }
 
 
-CONVERGED = SamplerSettings(ensembles=2, walkers=24, max_steps=900, min_ess=200, max_r_hat=1.05)
+CONVERGED = SamplerSettings(ensembles=2, walkers=24, max_steps=1500, min_ess=200, max_r_hat=1.05)
 
 
 def readings(cell, seed):

@@ -121,11 +121,12 @@ def test_of_joined_contours_the_flank_that_was_touched_counts(contour, flank, ow
 
 
 @pytest.mark.parametrize("known", [{"x_c": 0.0}, {"q": 0.5}, {"r": 0.3}, {}])
-def test_a_size_or_vertex_that_is_known_leaves_no_ridge(known):
-    record = CELL.measure(swept(Circle(0.3, 0.5), step=0.1), rng=1)
-    model = Experiment(record, Rig(load_cell=CELL), Family("circle", **known)).model
-    point = [{"r": 0.3, "q": 0.5, "x_c": 0.05}.get(name, 0.0) for name in model.names]
-    assert (flank_at_contacts(model, np.array(point)) is None) == bool(known)
+def test_a_size_or_vertex_that_is_known_leaves_no_ridge_nor_does_a_record_of_both_flanks(known):
+    for direction in ("forward", "both"):
+        record = CELL.measure(swept(Circle(0.3, 0.5), step=0.1, direction=direction), rng=1)
+        model = Experiment(record, Rig(load_cell=CELL), Family("circle", **known)).model
+        point = [{"r": 0.3, "q": 0.5, "x_c": -0.01}.get(name, 0.0) for name in model.names]
+        assert (flank_at_contacts(model, np.array(point)) is None) == (bool(known) or direction == "both")
 
 
 @pytest.mark.slow

@@ -118,6 +118,10 @@ class _Search:
         self.coordinates = Logarithms(model.coordinates.positive[:size])
         self.deviation = model.deviations[:, model.present]
         self.measured = model.likelihood.measured[:, model.present] / self.deviation
+        bias = np.array(model.likelihood.load_cell.bias_uncertainty)[model.present] / self.deviation
+        size_of_bias = np.linalg.norm(bias, axis=0)
+        self.bias = bias / np.where(size_of_bias > 0.0, size_of_bias, 1.0)
+        self.of_bias = 1.0 - 1.0 / np.hypot(1.0, size_of_bias)
         self.brackets = event_brackets(model)
         self.candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
         for name, zero in _zeros(model).items():
@@ -136,7 +140,10 @@ class _Search:
         return self.coordinates.parameters(coordinates)[0]
 
     def residuals(self, coordinates: Floats) -> Floats:
-        """Return residuals of loads and events in deviations, (n, loads + events), beyond the ends of priors, too."""
+        """Return residuals of loads and events in deviations, (n, loads + events), beyond the ends of priors, too.
+
+        A bias that the likelihood integrates out is whitened with the noise.
+        """
         model, points, size = self.model, self.points(coordinates), self.middle.size
         least = np.where(model.may_vanish, -model.high, model.low)[:size]
         allowed = ((points > least) & (points < model.high[:size])).all(axis=1)
@@ -150,6 +157,7 @@ class _Search:
             # Zero loads are often closer to measured ones than wrong loads: without contact, residuals are constant.
             happens = ~np.isnan(self.brackets.at(events)).any(axis=1)
             missed = self.measured - expected[happens][..., model.present] / self.deviation
+            missed -= self.of_bias * self.bias * np.sum(self.bias * missed, axis=1, keepdims=True)
             out[np.flatnonzero(allowed)[happens]] = missed
             late[allowed] = self.brackets.missed(events)
         return np.concatenate([out.reshape(len(points), -1), late], axis=1)

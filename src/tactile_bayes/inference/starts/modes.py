@@ -26,6 +26,8 @@ _REPEATS, _REPEATS_FEW_SAMPLES = 2, 4
 # Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred: a
 # ridge that bends beyond the draws of the importance sampling looks straight.
 _FLANK_EFFICIENCY = 0.4
+# Share of the touched arc beyond the vertex from which the record is of two flanks.
+_OTHER_FLANK = 0.1
 _MAX_EXCESS_COST = 100.0  # above the smallest cost, from which an optimum is disregarded
 _MODE_RADIUS = 3.0  # distance from a mode, over that of typical points of its proposal, within which an optimum is its
 _MAX_LOG_MASS_RATIO = 9.0  # from which the smaller mode is left out: one draw in ten thousand
@@ -134,5 +136,9 @@ def flank_at_contacts(model: ContourModel, point: Floats) -> FlankCoordinates | 
         return None
     at = point[None]
     events = events_of(model.likelihood, model.contours(at), model.rig(at), exact=False)
-    x = float(np.mean([events["first_contact_x"], events["snap_off_contact_x"]]))
-    return FlankCoordinates.at(model.family.name, model.names, model.coordinates, point, x)
+    x = np.concatenate([events["first_contact_x"], events["snap_off_contact_x"]], axis=None)
+    found = FlankCoordinates.at(model.family.name, model.names, model.coordinates, point, float(np.mean(x)))
+    if found is None:
+        return None
+    beyond = -found.side * (x - point[found.columns[-1]])  # of the vertex
+    return None if beyond.max() > _OTHER_FLANK * np.ptp(x) else found
