@@ -11,7 +11,6 @@ from tactile_bayes.arrays import Flags
 from tactile_bayes.inference.misfit import CHECK_RIG
 
 _UNITS = "check the units of the loads, and the rod's length and flexural rigidity."
-_ONLY = "else bands come out too narrow."
 
 TEXTS: Mapping[str, str] = {
     # Of loads, whatever the contour.
@@ -56,7 +55,7 @@ TEXTS: Mapping[str, str] = {
     "far zero": "Without load the cell reads {zeros}, more than infer expects. Subtract it {how}.",
     "zero off": "Without load the cell does not read what is stated: {off}. Was the tare forgotten? {advice}",
     "noise not white": (
-        f"The noise is not white: {{how}}. {{advice}}, or have infer find a drift ({{entry}}), {_ONLY}"
+        "The noise is not white: {how}. {advice}, or have infer find a drift ({entry}), else bands come out too narrow."
     ),
     "noise not as stated": (
         "The noise of {channel} is {found} in unloaded samples, and stated as {stated}: state what it is, or are the "

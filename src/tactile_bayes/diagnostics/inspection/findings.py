@@ -80,18 +80,19 @@ def _dead(record: xr.Dataset, sweeps: xr.Dataset) -> list[Finding]:
     return [Finding("dead channel", channel=name, entry=rig_entry("missing", [name])) for name in names]
 
 
-def _of_channels(samples: xr.Dataset, flags: str) -> Iterator[tuple[str, Flags, dict[str, str]]]:
-    """Yield the channels that have flagged samples, these, and the words on them."""
+def _of_channels(samples: xr.Dataset, flags: str) -> Iterator[tuple[Flags, dict[str, str]]]:
+    """Yield the flagged samples of each channel that has some, and the words on them."""
     for index, name in enumerate(CHANNELS):
         flagged = samples[flags].values[:, index]
         if flagged.any():
             words = {"readings": counted(flagged, "reading"), "channel": name, "samples": listed(flagged)}
-            yield name, flagged, words | {"are": "is" if np.sum(flagged) == 1 else "are"}
+            yield flagged, words | {"are": "is" if np.sum(flagged) == 1 else "are"}
 
 
 def _cut_off(record: xr.Dataset, samples: xr.Dataset, cell: LoadCell | None) -> list[Finding]:
     found = []
-    for name, flagged, words in _of_channels(samples, "cut_off"):
+    for flagged, words in _of_channels(samples, "cut_off"):
+        name = words["channel"]
         largest = float(np.abs(record[name].values[flagged]).max())
         stated = cell is not None and np.isfinite(cell.limit[CHANNELS.index(name)])
         advice = "" if stated else ": state its end in the header, or take a cell with a larger one"
@@ -107,7 +108,7 @@ def _without_contact(sweeps: xr.Dataset) -> list[Finding]:
 
 
 def _stuck(samples: xr.Dataset) -> list[Finding]:
-    found = [Finding("stuck", **words) for _, _, words in _of_channels(samples, "stuck")]
+    found = [Finding("stuck", **words) for _, words in _of_channels(samples, "stuck")]
     flags = samples.repeated.values
     if flags.any():
         have = "has" if np.sum(flags) == 1 else "have"
@@ -130,7 +131,7 @@ def _outlying(samples: xr.Dataset, cell: LoadCell | None) -> list[Finding]:
             advice=advice,
             **words,
         )
-        for _, _, words in _of_channels(samples, "outlier")
+        for _, words in _of_channels(samples, "outlier")
     ]
 
 

@@ -157,7 +157,8 @@ class _Search:
             # Zero loads are often closer to measured ones than wrong loads: without contact, residuals are constant.
             happens = ~np.isnan(self.brackets.at(events)).any(axis=1)
             missed = self.measured - expected[happens][..., model.present] / self.deviation
-            missed -= self.of_bias * self.bias * np.sum(self.bias * missed, axis=1, keepdims=True)
+            if self.of_bias.any():
+                missed -= self.of_bias * self.bias * np.sum(self.bias * missed, axis=1, keepdims=True)
             out[np.flatnonzero(allowed)[happens]] = missed
             late[allowed] = self.brackets.missed(events)
         return np.concatenate([out.reshape(len(points), -1), late], axis=1)
